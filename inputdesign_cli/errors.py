@@ -1,0 +1,82 @@
+"""The few error types of the house.
+
+Every error that a user can cause is a `Complaint`: a stable code (which `idesign explain CODE`
+documents, see `codes.py`), one sentence that says what is wrong, and a hint that says how to mend it.
+The mathematics knows nothing of files: it names the key (`plant.F`), and the spec adds file, line and
+column where it is at hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+EXIT_DONE = 0
+EXIT_MISSED = 1
+EXIT_BAD_INPUT = 2
+EXIT_INFEASIBLE = 3
+EXIT_INACCURATE = 4
+EXIT_INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Location:
+    """A place in a text file: `line` and `column` count from 1, `text` is the whole line."""
+
+    file: str
+    line: int
+    column: int
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """One thing that is wrong: a code to look up, what is wrong, how to mend it, and where it stands."""
+
+    code: str
+    message: str
+    hint: str = ""
+    key: str = ""
+    location: Location | None = None
+
+
+class IdesignError(Exception):
+    """An error that the user can understand and mend; carries one or more complaints.
+
+    `exit_code` is what the command line returns for it.
+    """
+
+    exit_code = EXIT_BAD_INPUT
+
+    def __init__(self, complaints: Complaint | Sequence[Complaint]) -> None:
+        self.complaints = (complaints,) if isinstance(complaints, Complaint) else tuple(complaints)
+        super().__init__("; ".join(c.message for c in self.complaints))
+
+
+class SpecError(IdesignError):
+    """The spec cannot be read, or what it says is not well posed."""
+
+
+class DataError(IdesignError):
+    """A data file (table of r_adm, recorded signals) cannot be used."""
+
+
+class OutputError(IdesignError):
+    """The results cannot be written."""
+
+
+class InfeasibleError(IdesignError):
+    """No excitation can meet what the spec asks for."""
+
+    exit_code = EXIT_INFEASIBLE
+
+
+class InaccurateError(IdesignError):
+    """The solver stopped before the accuracy that the spec asks for was proved."""
+
+    exit_code = EXIT_INACCURATE
+
+
+def bad_spec(code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
+    """A `SpecError` with a single complaint."""
+    return SpecError(Complaint(code, message, hint, key))
