@@ -1,0 +1,1 @@
+"""Designs: least cost by exchange, with certificates."""

@@ -1,0 +1,108 @@
+"""The loop around the plant: u = r - C y, or no loop at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant.model import PolynomialModel
+from inputdesign_cli.plant.polynomial import (
+    Array,
+    ComplexArray,
+    Rational,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
+
+
+@dataclass(frozen=True)
+class LoopResponse:
+    """Transfer functions (n,) from the excitation x (r in closed loop, u in open loop) and from e."""
+
+    y_x: ComplexArray
+    u_x: ComplexArray
+    y_e: ComplexArray
+    u_e: ComplexArray
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A SISO model in open loop (`controller` None) or under u = r - C y.
+
+    Everything is written over the characteristic polynomial A F D_c + B N_c, so that unstable or
+    integrating poles of plant and controller never appear: S and G S stay finite where C or G is not.
+    """
+
+    model: PolynomialModel
+    controller: Rational | None = None
+
+    @cached_property
+    def characteristic(self) -> Array:
+        """Closed-loop characteristic polynomial in q^-1 (open loop: A F)."""
+        m = self.model
+        open_loop = np.convolve(m.A, m.F)
+        if self.controller is None:
+            return open_loop
+        left = np.convolve(open_loop, self.controller.denominator_polynomial)
+        right = np.convolve(m.B, self.controller.numerator)
+        total = np.zeros(max(left.size, right.size))
+        total[: left.size] += left
+        total[: right.size] += right
+        return total
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles in z of everything that the excitation and the noise cause, predictor included."""
+        return join_roots([roots_in_z(self.characteristic), self.model.predictor_poles])
+
+    def check_stability(self) -> None:
+        """Raise `SpecError` unless the loop is well posed and stable.
+
+        Raises:
+            SpecError: `unstable-loop` or `algebraic-loop`.
+        """
+        if self.controller is None:
+            return
+        leading = self.characteristic[0]
+        if abs(leading) < 1e-9 * np.abs(self.characteristic).max():
+            raise bad_spec(
+                "algebraic-loop",
+                "plant and controller both act without delay and 1 + C G vanishes at infinite frequency",
+                hint="put the delay of the plant into B (a leading 0) or into the controller's numerator",
+                key="experiment.controller",
+            )
+        poles = roots_in_z(self.characteristic)
+        radius = np.abs(poles)
+        if radius.size and radius.max() >= 1.0:
+            worst = poles[int(np.argmax(radius))]
+            raise bad_spec(
+                "unstable-loop",
+                f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
+                f"angle {abs(np.angle(worst)):.4g} rad/sample",
+                hint="check the signs (feedback is negative: u = r - C y), the delay in B, and that numerator "
+                "and denominator of the controller are in q^-1, ascending",
+                key="experiment.controller",
+            )
+
+    def responses(self, w: ArrayLike) -> LoopResponse:
+        """Transfer functions at normalised frequencies `w` (n,)."""
+        m = self.model
+        q = unit_circle(w)
+        A, B, C, D, F = (evaluate(p, q) for p in (m.A, m.B, m.C, m.D, m.F))
+        if self.controller is None:
+            one = np.ones_like(q)
+            return LoopResponse(y_x=B / (A * F), u_x=one, y_e=C / (A * D), u_e=np.zeros_like(q))
+        Nc, Dc = self.controller.numerator_at(w), self.controller.denominator_at(w)
+        closed = A * F * Dc + B * Nc
+        return LoopResponse(
+            y_x=B * Dc / closed,
+            u_x=A * F * Dc / closed,
+            y_e=F * C * Dc / (D * closed),
+            u_e=-F * C * Nc / (D * closed),
+        )

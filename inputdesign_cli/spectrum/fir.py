@@ -1,0 +1,116 @@
+"""FIR spectra: Phi(w) = c_0 + 2 sum_{r=1..m} c_r cos(r w), the c_r autocovariances of the excitation.
+
+Least-costly paper, (14); m = 0 is white noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.information import Quadrature, integrate
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.spectrum.svec import smat, svec_layout
+from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing, pointwise_scale
+
+_FIRST_ORDER = 11        # spectra up to this order are designed whole, in one face
+_DIRECTIONS = 8
+_KEPT = 1e-10            # share of the largest eigenvalue below which a generator is dropped
+_SINGULAR_PRICE = 1e-10
+
+
+@dataclass(frozen=True)
+class FirBasis:
+    """The unknowns are c_0 .. c_m (m = `order`); the cone is that of nonnegative cosine polynomials.
+
+    Each of those is a sum of |v_i(e^{jw})|^2, v_i polynomials of degree m (Fejer, Riesz). With the
+    v_i in the span of the columns of V (m + 1, q) it is v(w)^* Q v(w), Q >= 0 of order q: this is a
+    face, and its generators are V. The full Gram matrix has order m + 1, but the optimal one is of
+    low rank, so a few generators, found by pricing, reach the optimum.
+    """
+
+    order: int
+
+    @property
+    def size(self) -> int:
+        return self.order + 1
+
+    @property
+    def white(self) -> Array:
+        """(m + 1,): the flat spectrum of power one."""
+        unit = np.zeros(self.size)
+        unit[0] = 1.0
+        return unit
+
+    def functions(self, w: ArrayLike) -> Array:
+        """(n, m + 1): the basis functions 1, 2 cos w, .., 2 cos m w."""
+        table = 2.0 * np.cos(np.outer(np.asarray(w, dtype=float), np.arange(self.size)))
+        table[:, 0] = 1.0
+        return table
+
+    def density(self, x: Array, w: ArrayLike) -> Array:
+        """(n,): Phi at normalised frequencies `w`."""
+        return self.functions(w) @ x
+
+    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+        """(m + 1, ...): (1 / 2 pi) integral of density(w) times each basis function."""
+
+        def moments(rule: Quadrature) -> NDArray[np.float64]:
+            weighted = self.functions(rule.nodes) * rule.weights[:, None]
+            return np.tensordot(weighted, density(rule.nodes), axes=(0, 0))
+
+        return integrate(moments, singularities, highest_lag=self.order)
+
+    def first_face(self) -> Face:
+        """All spectra of order up to 11."""
+        return self._face(np.eye(self.size)[:, : min(self.order, _FIRST_ORDER) + 1])
+
+    def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
+        """The largest s with price - s value >= 0 on every spectrum of this basis.
+
+        A linear functional of c_0 .. c_m is nonnegative on all nonnegative cosine polynomials exactly
+        when its Toeplitz matrix is positive semidefinite (Caratheodory, Toeplitz): a generalised
+        eigenvalue, whose leading eigenvectors are the spectra |v|^2 that pay best. Where the price
+        itself nearly vanishes, rounding spoils that eigenvalue, and the pointwise ratio, which is
+        valid too, stands in.
+        """
+        metric, worth = _toeplitz(price.vector), _toeplitz(value.vector)
+        first = max(self.size - _DIRECTIONS, 0)
+        spread = np.linalg.eigvalsh(metric)
+        if spread[0] <= _SINGULAR_PRICE * spread[-1]:
+            _, vectors = scipy.linalg.eigh(worth - metric, subset_by_index=[first, self.order])
+            return Pricing(pointwise_scale(price, value, grid)[0], vectors)
+        ratios, vectors = scipy.linalg.eigh(worth, metric, subset_by_index=[first, self.order])
+        return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors)
+
+    def enlarge(self, face: Face, y: Array, directions: Array) -> tuple[FirBasis, Face]:
+        """Keep the generators that the solution uses, add the `directions` (m + 1, number)."""
+        if face.order == self.size:
+            return self, face
+        eigenvalues, vectors = np.linalg.eigh(smat(y))
+        used = face.generators @ vectors[:, eigenvalues > _KEPT * eigenvalues[-1]]
+        spanning = scipy.linalg.qr(np.concatenate([used, directions], axis=1), mode="economic")[0]
+        return self, self._face(spanning)
+
+    def _face(self, generators: Array) -> Face:
+        """Columns: the autocovariances of each pair of generators, in the order of svec."""
+        transform = np.fft.rfft(generators, 2 * self.size, axis=0)
+        rows, columns, scale = svec_layout(generators.shape[1])
+        cross = np.fft.irfft(transform[:, rows] * transform[:, columns].conj(), 2 * self.size, axis=0)
+        lags = np.arange(self.size)
+        return Face(
+            columns=0.5 * (cross[lags] + cross[-lags]) * scale,
+            kind="psd",
+            order=generators.shape[1],
+            generators=generators,
+        )
+
+
+def _toeplitz(g: Array) -> Array:
+    # g_r multiplies c_r = c_{-r} twice, hence the halves.
+    column = 0.5 * g
+    column[0] *= 2.0
+    return scipy.linalg.toeplitz(column)

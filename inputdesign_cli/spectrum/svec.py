@@ -1,0 +1,41 @@
+"""Symmetric matrices as vectors: the upper triangle by columns, off-diagonal entries times sqrt(2).
+
+The scaling makes svec(A) . svec(B) = tr(A B); the order is the one that Clarabel uses.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array
+
+
+@lru_cache(maxsize=64)
+def svec_layout(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Row, column and scale of each entry of svec of an (order, order) matrix."""
+    columns, rows = np.tril_indices(order)
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
+
+
+def svec_length(order: int) -> int:
+    """Number of entries of svec of an (order, order) matrix."""
+    return order * (order + 1) // 2
+
+
+def svec(matrix: NDArray[np.float64]) -> Array:
+    """(..., k, k) symmetric -> (..., k (k + 1) / 2)."""
+    rows, columns, scale = svec_layout(matrix.shape[-1])
+    return matrix[..., rows, columns] * scale
+
+
+def smat(vector: Array) -> Array:
+    """The inverse of `svec` for a single vector."""
+    order = int((np.sqrt(8 * vector.size + 1) - 1) / 2)
+    rows, columns, scale = svec_layout(order)
+    matrix = np.zeros((order, order))
+    matrix[rows, columns] = vector / scale
+    matrix[columns, rows] = vector / scale
+    return matrix
