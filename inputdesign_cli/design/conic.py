@@ -76,7 +76,6 @@ def solve_conic(q: Array, blocks: Sequence[Block], *, tolerance: float = 1e-9, m
     settings.verbose = False
     settings.max_iter = max_iterations
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
-    settings.direct_solve_method = "qdldl"   # on these small dense programs several times faster than the default
     n = q.size
     solver = clarabel.DefaultSolver(
         sp.csc_matrix((n, n)),

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
+_REFINEMENT = 6
 _ZOOM_POINTS = 8
-_ZOOM_STEPS = 7
+_ZOOM_STEPS = 6
+# A peak between two grid points may stand this much higher than both.
+_SLACK = 0.05
 
 
 def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
@@ -21,28 +24,28 @@ def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
 
 
 def graded_grid(
-    singularities: ArrayLike, lo: float, hi: float, *, points: int = 600, knots: ArrayLike = ()
+    singularities: ArrayLike, lo: float, hi: float, *, points: int = 1000, knots: ArrayLike = ()
 ) -> Array:
     """A grid on [lo, hi] in rad/sample that resolves every pole and zero near the axis.
 
     Linear and logarithmic spacing together, and around each of the `singularities` (complex points
-    of the frequency plane, see `logarithmic_distance`) offsets that grow geometrically from a
-    fraction of its distance to the axis. `knots` (breakpoints of tables) are included as they are.
+    of the frequency plane, see `logarithmic_distance`) even steps of a fortieth of its distance to
+    the axis, then offsets that grow geometrically. `knots` (breakpoints of tables) are included as
+    they are.
     """
     span = hi - lo
     floor = max(lo, hi * 1e-6)
     parts = [np.linspace(lo, hi, points), np.geomspace(floor, hi, points // 3), np.asarray(knots, dtype=float)]
+    near = np.linspace(0.0, 2.0, 81)
     for s in np.unique(np.round(np.asarray(singularities, dtype=complex), 12)):
         width = max(s.imag, 1e-8)
         if width < span:
-            offsets = width * np.concatenate([[0.0], np.geomspace(0.1, span / width, 8 + 6 * _decades(span / width))])
+            reach = max(span / width, 2.5)
+            far = np.geomspace(2.0, reach, int(np.ceil(20 * np.log10(reach))))
+            offsets = width * np.concatenate([near, far[1:]])
             parts += [s.real + offsets, s.real - offsets]
     grid = np.unique(np.concatenate(parts))
     return grid[(grid >= lo) & (grid <= hi)]
-
-
-def _decades(ratio: float) -> int:
-    return int(np.ceil(np.log10(ratio)))
 
 
 def local_maxima(
@@ -50,30 +53,43 @@ def local_maxima(
 ) -> tuple[Array, Array]:
     """Local maxima of `function` over [grid[0], grid[-1]], polished between the grid points.
 
-    `function` maps frequencies (n,) to values (n,) and `values` are its values on `grid`. Only grid
-    maxima with values > `above` are polished: each bracket between neighbours is narrowed by
-    repeated sampling, which asks for continuity only (tables have kinks), all brackets at once.
+    `function` maps frequencies (n,) to values (n,) and `values` are its values on `grid`. Around
+    every grid maximum the grid is refined once, which parts twin peaks that share a bracket; then each
+    bracket is narrowed by repeated sampling, all at once. Only continuity is asked for (tables have
+    kinks). Maxima with values <= `above` are left out.
 
     Returns:
         Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
     """
-    padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    peak = (values >= padded[:-2]) & (values > padded[2:]) & (values > above)
-    index = np.flatnonzero(peak)
+    index = _peaks(values, above - _SLACK * abs(above) if np.isfinite(above) else above)
     if index.size == 0:
         return np.zeros(0), np.zeros(0)
-    left = grid[np.maximum(index - 1, 0)]
-    right = grid[np.minimum(index + 1, grid.size - 1)]
-    best, best_value = grid[index], values[index]
-    steps = np.linspace(0.0, 1.0, _ZOOM_POINTS + 2)[1:-1]
+    around = np.unique(np.clip(index[:, None] + np.arange(-2, 2), 0, grid.size - 2))
+    inside = (grid[around, None] + np.diff(grid)[around, None] * _fractions(_REFINEMENT)).ravel()
+    finer = np.concatenate([grid, inside])
+    order = np.argsort(finer, kind="stable")
+    finer, values = finer[order], np.concatenate([values, function(inside)])[order]
+    index = _peaks(values, above - _SLACK * abs(above) if np.isfinite(above) else above)
+    left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
+    best, best_value = finer[index], values[index]
+    steps, rows = _fractions(_ZOOM_POINTS), np.arange(index.size)
     for _ in range(_ZOOM_STEPS):
         samples = left[:, None] + (right - left)[:, None] * steps
         found = function(samples.ravel()).reshape(samples.shape)
         top = np.argmax(found, axis=1)
-        rows = np.arange(index.size)
         better = found[rows, top] > best_value
         best = np.where(better, samples[rows, top], best)
         best_value = np.where(better, found[rows, top], best_value)
         width = (right - left) / (_ZOOM_POINTS + 1)
         left, right = np.maximum(left, best - width), np.minimum(right, best + width)
-    return best, best_value
+    kept = best_value > above
+    return best[kept], best_value[kept]
+
+
+def _peaks(values: Array, above: float) -> NDArray[np.intp]:
+    padded = np.concatenate([[-np.inf], values, [-np.inf]])
+    return np.flatnonzero((values >= padded[:-2]) & (values > padded[2:]) & (values > above))
+
+
+def _fractions(number: int) -> Array:
+    return np.linspace(0.0, 1.0, number + 2)[1:-1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -80,15 +80,19 @@ class Basis(Protocol):
         """(size, ...): (1 / 2 pi) integral of the even function density(w) times each basis function."""
         ...
 
-    def first_face(self) -> Face:
-        """A face rich enough to identify every parameter."""
+    def coarser(self) -> Sequence[Basis]:
+        """Smaller families to design first, from coarse to fine; x of each is the head of x of the next."""
+        ...
+
+    def first_face(self, price: Functional) -> Face:
+        """A face rich enough to identify every parameter, scaled so that each column has a like price."""
         ...
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """How far the dual point may be scaled, and where it is tightest."""
         ...
 
-    def enlarge(self, face: Face, y: Array, directions: Array) -> tuple[Basis, Face]:
+    def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[Basis, Face]:
         """A face that holds the current solution `y` and the `directions` (the basis may grow with it)."""
         ...
 

@@ -17,7 +17,7 @@ from inputdesign_cli.spectrum.svec import smat, svec_layout
 from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing, pointwise_scale
 
 _FIRST_ORDER = 11        # spectra up to this order are designed whole, in one face
-_DIRECTIONS = 8
+_DIRECTIONS = 6
 _KEPT = 1e-10            # share of the largest eigenvalue below which a generator is dropped
 _SINGULAR_PRICE = 1e-10
 
@@ -64,9 +64,16 @@ class FirBasis:
 
         return integrate(moments, singularities, highest_lag=self.order)
 
-    def first_face(self) -> Face:
+    def coarser(self) -> list[FirBasis]:
+        """Lower orders, each about half the next, whose optimum is a good start for this one."""
+        orders = [self.order]
+        while orders[0] > 2 * _FIRST_ORDER:
+            orders.insert(0, orders[0] // 2)
+        return [FirBasis(order) for order in orders[:-1]]
+
+    def first_face(self, price: Functional) -> Face:
         """All spectra of order up to 11."""
-        return self._face(np.eye(self.size)[:, : min(self.order, _FIRST_ORDER) + 1])
+        return self._face(np.eye(self.size)[:, : min(self.order, _FIRST_ORDER) + 1], price)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """The largest s with price - s value >= 0 on every spectrum of this basis.
@@ -86,17 +93,27 @@ class FirBasis:
         ratios, vectors = scipy.linalg.eigh(worth, metric, subset_by_index=[first, self.order])
         return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors)
 
-    def enlarge(self, face: Face, y: Array, directions: Array) -> tuple[FirBasis, Face]:
+    def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[FirBasis, Face]:
         """Keep the generators that the solution uses, add the `directions` (m + 1, number)."""
-        if face.order == self.size:
+        known = len(face.generators)
+        if face.order == self.size == known:
             return self, face
         eigenvalues, vectors = np.linalg.eigh(smat(y))
         used = face.generators @ vectors[:, eigenvalues > _KEPT * eigenvalues[-1]]
+        used = np.pad(used, ((0, self.size - known), (0, 0)))
         spanning = scipy.linalg.qr(np.concatenate([used, directions], axis=1), mode="economic")[0]
-        return self, self._face(spanning)
+        return self, self._face(spanning, price)
 
-    def _face(self, generators: Array) -> Face:
-        """Columns: the autocovariances of each pair of generators, in the order of svec."""
+    def _face(self, spanning: Array, price: Functional) -> Face:
+        """Columns: the autocovariances of each pair of generators, in the order of svec.
+
+        Generators are made orthonormal in the metric of the price, so that the cost is tr Q: where
+        the price varies by orders of magnitude over frequency, the dual residual of the solver then
+        counts in units of the price at each frequency, and the certificate loses nothing.
+        """
+        metric = spanning.T @ _toeplitz(price.vector) @ spanning
+        values, vectors = np.linalg.eigh(metric)
+        generators = spanning @ (vectors / np.sqrt(np.maximum(values, _SINGULAR_PRICE * values[-1])))
         transform = np.fft.rfft(generators, 2 * self.size, axis=0)
         rows, columns, scale = svec_layout(generators.shape[1])
         cross = np.fft.irfft(transform[:, rows] * transform[:, columns].conj(), 2 * self.size, axis=0)

@@ -1,0 +1,57 @@
+"""The command line: one thin file a command, and the only room that prints.
+
+Nothing heavy is imported here or at the top of a command's file: `idesign --help` answers at once.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from inputdesign_cli import __version__
+from inputdesign_cli.cli.analyse import analyse
+from inputdesign_cli.cli.check import check
+from inputdesign_cli.cli.explain import explain
+from inputdesign_cli.cli.init import init
+from inputdesign_cli.cli.schema import schema
+from inputdesign_cli.cli.solve import solve
+from inputdesign_cli.cli.terminal import guarded
+from inputdesign_cli.cli.validate import validate
+
+app = typer.Typer(
+    name="idesign",
+    help="Optimal experiments for system identification: from a YAML file to a signal and a proof.",
+    epilog="Exit codes: 0 done, 1 a golden mismatch or a missed target, 2 bad input or usage, "
+    "3 infeasible, 4 the required accuracy was not proved, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"idesign {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _start(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version and exit.", callback=_show_version, is_eager=True),
+    ] = False,
+) -> None:
+    pass
+
+
+for command in (solve, analyse, validate, check, init, explain, schema):
+    app.command()(guarded(command))
+
+
+def main() -> None:
+    """The `idesign` command."""
+    app(prog_name="idesign")

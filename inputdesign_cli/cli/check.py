@@ -1,0 +1,97 @@
+"""`idesign check`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inputdesign_cli.cli.options import Json, Quiet
+from inputdesign_cli.cli.terminal import aligned, status
+from inputdesign_cli.errors import EXIT_MISSED, Complaint, DataError
+
+if TYPE_CHECKING:
+    from inputdesign_cli.golden import Row
+
+HEADER = ("", "run", "quantity", "computed", "expected", "deviation", "tolerance", "source")
+
+
+def check(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[GOLDEN]...", help="Golden files; the default is golden/*.yaml."),
+    ] = None,
+    junit: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a JUnit report for a CI server too.")
+    ] = None,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare results with golden values.
+
+    Runs the specs that the golden files name. Prints computed and expected values with their deviation,
+    tolerance and source; exits with 1 if a value lies outside its tolerance.
+    """
+    from inputdesign_cli.golden import compare, execute, load_golden
+
+    rows: list[Row] = []
+    for golden in [load_golden(path) for path in files or _default_files()]:
+        results = {}
+        for run in golden.runs:
+            with status(f"{golden.file}: {run.name} ...", quiet=quiet):
+                results[run.name] = execute(golden, run)
+        rows += compare(golden, results)
+    if junit is not None:
+        from inputdesign_cli.cli.junit import junit_text
+        from inputdesign_cli.record import write_text
+
+        write_text(junit, junit_text(rows))
+    failed = sum(not row.passed for row in rows)
+    if json_output:
+        content = {"passed": failed == 0, "rows": [row.as_dict() for row in rows]}
+        typer.echo(json.dumps(content, indent=1, ensure_ascii=False))
+    elif not quiet:
+        typer.echo(table(rows))
+        typer.echo(f"\n{len(rows) - failed} of {len(rows)} quantities agree")
+    if failed:
+        raise typer.Exit(EXIT_MISSED)
+
+
+def _default_files() -> list[Path]:
+    found = sorted(Path("golden").glob("*.yaml"))
+    if not found:
+        raise DataError(
+            Complaint(
+                "golden-missing",
+                "there is no golden/*.yaml in the current folder, and idesign installs none",
+                hint="name golden files, or run this in a checkout of the project",
+            )
+        )
+    return found
+
+
+def table(rows: Sequence[Row]) -> str:
+    """The comparison as aligned text; where a number is missing, the reason follows its line."""
+    cells = [HEADER]
+    for row in rows:
+        quantity = row.quantity
+        cells.append(
+            (
+                "ok" if row.passed else "FAILS",
+                f"{row.golden}: {row.run}",
+                quantity.name,
+                "-" if row.computed is None else f"{row.computed:.8g}",
+                f"{quantity.expected:.8g}",
+                "-" if row.deviation is None else f"{row.deviation:+.1e}",
+                f"{quantity.tolerance:.1e}",
+                quantity.source,
+            )
+        )
+    header, *lines = aligned(cells, right=(3, 4, 5, 6))
+    for i, row in enumerate(rows):
+        if row.note:
+            lines[i] += f"\n       {row.note}"
+    return "\n".join([header, *lines])

@@ -1,0 +1,26 @@
+"""`idesign explain`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from inputdesign_cli.cli.terminal import aligned
+
+
+def explain(
+    code: Annotated[
+        str | None, typer.Argument(metavar="[CODE]", help="The code of an error; without it, all codes.")
+    ] = None,
+) -> None:
+    """Explain an error code.
+
+    Says what it means and what to do about it.
+    """
+    from inputdesign_cli.codes import CODES, explanation
+
+    if code is None:
+        typer.echo("\n".join(aligned([(name, known.title) for name, known in sorted(CODES.items())])))
+    else:
+        typer.echo(explanation(code))

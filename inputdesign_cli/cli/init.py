@@ -1,0 +1,42 @@
+"""`idesign init`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inputdesign_cli.errors import Complaint, OutputError
+
+
+class Kind(StrEnum):
+    """The starter specs, named as their files in `starters/`."""
+
+    OPEN_LOOP = "open-loop"
+    CLOSED_LOOP = "closed-loop"
+
+
+def init(
+    file: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="Where to write it, if not to standard output.")
+    ] = None,
+    kind: Annotated[Kind, typer.Option(help="The experiment to start from.")] = Kind.OPEN_LOOP,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
+) -> None:
+    """Write a commented starter spec.
+
+    It is complete: `idesign solve` runs it as it is.
+    """
+    text = (resources.files(__package__) / "starters" / f"{kind.value}.yaml").read_text(encoding="utf-8")
+    if file is None:
+        typer.echo(text, nl=False)
+        return
+    if file.exists() and not force:
+        hint = "choose another name, or overwrite it with --force"
+        raise OutputError(Complaint("output-exists", f"{file} exists already", hint))
+    from inputdesign_cli.record import write_text
+
+    write_text(file, text)

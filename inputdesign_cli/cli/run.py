@@ -1,0 +1,38 @@
+"""What `solve` and `analyse` have in common: spec in, run directory and summary out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import typer
+
+import inputdesign_cli
+from inputdesign_cli.cli.terminal import status
+
+
+def produce(
+    verb: Literal["solve", "analyse"],
+    spec_file: Path,
+    overrides: list[str] | None,
+    output: Path | None,
+    *,
+    figures: bool,
+    json_output: bool,
+    quiet: bool,
+) -> None:
+    """Run a verb of the package on a spec file, write the run, and print it or its summary."""
+    with status(f"{spec_file}: computing ...", quiet=quiet):
+        spec = inputdesign_cli.load_spec(spec_file, overrides or [])
+        outcome = getattr(inputdesign_cli, verb)(spec)
+    with status(f"{spec_file}: writing ...", quiet=quiet):
+        from inputdesign_cli.record import write_run
+
+        directory = output or Path("runs") / spec_file.stem
+        files = write_run(outcome, directory, figures=figures)
+    if json_output:
+        typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        from inputdesign_cli.cli.summary import summary
+
+        typer.echo(summary(outcome.result, outcome.time_unit, files))

@@ -1,0 +1,39 @@
+"""`idesign validate`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import inputdesign_cli
+from inputdesign_cli.cli.options import Json, Overrides, Quiet
+from inputdesign_cli.errors import IdesignError
+
+
+def validate(
+    specs: Annotated[list[Path], typer.Argument(metavar="SPEC...", help="The specs to check, YAML files.")],
+    overrides: Overrides = None,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Check specs without computing a design.
+
+    A valid spec can be read and is well posed. All problems of all files are reported at once.
+    """
+    errors: list[IdesignError] = []
+    for path in specs:
+        try:
+            inputdesign_cli.validate(inputdesign_cli.load_spec(path, overrides or []))
+        except IdesignError as error:
+            errors.append(error)
+        else:
+            if not quiet and not json_output:
+                typer.echo(f"{path}: valid")
+    if errors:
+        worst = max(errors, key=lambda error: error.exit_code)
+        raise type(worst)([complaint for error in errors for complaint in error.complaints])
+    if json_output:
+        typer.echo(json.dumps({"valid": [str(path) for path in specs]}, indent=1, ensure_ascii=False))

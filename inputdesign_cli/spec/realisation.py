@@ -1,0 +1,86 @@
+"""`signal:`, `solver:` and `simulation:`: how a spectrum is realised, found and tried."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from inputdesign_cli.spec.experiment import SimulationNoise
+from inputdesign_cli.spec.fields import Count, Index, PerChannel, PositivePerChannel, Tolerance
+from inputdesign_cli.spec.findings import Findings
+from inputdesign_cli.spec.plant import TruePlant
+from inputdesign_cli.spec.section import Section
+
+SignalType = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
+
+# Settings that mean something for some types of signal only.
+_ONLY_FOR = {"phases": ("multisine",), "lines": ("multisine",), "bits": ("prbs",)}
+
+
+class Signal(Section):
+    """The time series that realises the spectrum."""
+
+    type: SignalType | None = Field(
+        default=None, description="Kind of signal (default: what suits the spectrum)."
+    )
+    samples: Count | None = Field(default=None, description="Length (default: experiment.samples).")
+    seed: Index | None = Field(default=None, description="Seed of the random numbers.")
+    phases: Literal["random", "schroeder", "optimised"] | None = Field(
+        default=None, description="Phases of a multisine; optimised: for a low crest factor."
+    )
+    periods: Count | None = Field(default=None, description="Number of equal periods.")
+    hold: Count | None = Field(default=None, description="Samples for which each value is held.")
+    lines: Count | None = Field(default=None, description="Number of sinusoids of a multisine.")
+    amplitudes: PositivePerChannel | None = Field(
+        default=None, description="Amplitude (level) to scale to; a number or one per input."
+    )
+    offset: PerChannel | None = Field(
+        default=None, description="Operating point added; a number or one per input."
+    )
+    ramp: Index | None = Field(default=None, description="Samples over which the signal fades in and out.")
+    bits: Count | None = Field(default=None, description="Length of the shift register of a prbs.")
+    candidates: Count | None = Field(
+        default=None, description="Number of random realisations to choose the best of."
+    )
+
+    @model_validator(mode="after")
+    def _companions(self) -> Signal:
+        findings = Findings()
+        for key, types in _ONLY_FOR.items():
+            if getattr(self, key) is not None and self.type is not None and self.type not in types:
+                findings.add(
+                    "unsuitable-key",
+                    f"{{key}} does not go with type: {self.type}",
+                    f"it belongs to type: {types[0]}; remove it, or change the type",
+                    key,
+                    at_key=True,
+                )
+        findings.stop()
+        return self
+
+
+class Solver(Section):
+    """How the optimum is found."""
+
+    method: Literal["exchange", "lmi", "alternating"] = Field(
+        default="exchange",
+        description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
+    )
+    tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
+    grid: Count = Field(default=1000, description="Number of frequencies of the lmi method (default 1000).")
+    positivity: Literal["kyp", "gram"] = Field(default="gram", description="Positivity in the lmi method.")
+
+
+class Simulation(Section):
+    """The Monte Carlo study on the true system."""
+
+    runs: Count = Field(default=100, description="Number of runs (default 100).")
+    seed: Index = Field(default=0, description="Seed of the random numbers (default 0).")
+    plant: TruePlant | None = Field(default=None, description="The true system (default: the nominal plant).")
+    noise: SimulationNoise | None = Field(
+        default=None, description="The true noise (default: the nominal noise)."
+    )
+    compare: tuple[Literal["white", "prbs", "multisine", "binary"], ...] = Field(
+        default=(), description="Other inputs to compare with, at equal power."
+    )

@@ -1,0 +1,92 @@
+"""Imports run one way: each room knows the rooms below it, and none above."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import inputdesign_cli
+
+ROOT = Path(inputdesign_cli.__file__).parent
+
+# From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
+ORDER = [
+    {"errors", "codes"},
+    {"complaints", "provenance"},
+    {"spec", "plant"},
+    {"spectrum", "information", "accuracy"},
+    {"design", "signal", "identification"},
+    {"outcome"},
+    {"assemble"},
+    {"study", "report", "record", "textformats", "golden", "golden_file"},
+    {"cli", "__main__"},
+]
+LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
+MATHEMATICS = {"plant", "spectrum", "information", "accuracy", "design", "signal", "identification"}
+FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("spec", "outcome")} | {("spec", "plant")}
+
+FILES = sorted(path for path in ROOT.rglob("*.py") if path != ROOT / "__init__.py")
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Every module that a file imports, at its top or inside a function."""
+    package = ["inputdesign_cli", *path.relative_to(ROOT).parts[:-1]]
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            # `from package import name` may import a module of that name.
+            found |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
+    return found
+
+
+def imported_rooms(path: Path) -> set[str]:
+    parts = (module.split(".") for module in imported_modules(path))
+    rooms = {p[1] for p in parts if p[0] == "inputdesign_cli" and len(p) > 1}
+    return {room for room in rooms if (ROOT / room).is_dir() or (ROOT / f"{room}.py").is_file()}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_file_imports_only_from_below(path):
+    room = room_of(path)
+    assert room in LEVEL, f"{room} has no place in the order of rooms"
+    for other in imported_rooms(path) - {room}:
+        assert LEVEL[other] <= LEVEL[room], f"{room} is below {other}"
+        assert (room, other) not in FORBIDDEN, f"{room} must not know {other}"
+
+
+def test_no_two_rooms_import_each_other():
+    known = {}
+    for path in FILES:
+        known.setdefault(room_of(path), set()).update(imported_rooms(path) - {room_of(path)})
+    both_ways = {(a, b) for a in known for b in known[a] if a < b and a in known.get(b, ())}
+    assert both_ways == set()
+
+
+def test_outcome_is_plain_data():
+    assert imported_rooms(ROOT / "outcome.py") == set()
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_only_one_file_calls_the_solver(path):
+    if path != ROOT / "design" / "conic.py":
+        assert not any(module.split(".")[0] == "clarabel" for module in imported_modules(path))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_only_the_command_line_prints(path):
+    calls = (node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call))
+    prints = any(isinstance(func, ast.Name) and func.id == "print" for func in calls)
+    assert not prints or room_of(path) == "cli"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_nobody_uses_pyplot(path):
+    assert not any("pyplot" in module for module in imported_modules(path))
