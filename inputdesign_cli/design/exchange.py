@@ -19,7 +19,7 @@ from inputdesign_cli.design.certificate import Certificate, certify
 from inputdesign_cli.design.conic import Block, ConicSolution, solve_conic
 from inputdesign_cli.design.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Face, smat, svec, svec_length
+from inputdesign_cli.spectrum import Basis, Face, smat, svec, svec_length
 
 MAX_ROUNDS = 60
 # The conic program is solved this much tighter than the gap that is asked for.
@@ -32,12 +32,15 @@ _FIRST_CUTS = 0.3
 _MORE_CUTS = 6
 _STAGE_TOLERANCE = 1e-2
 _STAGE_ROUNDS = 10
+# Rounds without a tenth of progress after which rounding has the last word.
+_PATIENCE = 6
 
 
 @dataclass(frozen=True)
 class ExchangeResult:
-    """A spectrum `x` that meets everything, its cost and information, and the proved lower bound."""
+    """A spectrum `x` of `basis` that meets everything, its cost and information, and the proved bound."""
 
+    basis: Basis
     x: Array
     cost: float
     information: Array
@@ -56,7 +59,8 @@ def exchange(problem: Problem, start: Array, *, tolerance: float) -> ExchangeRes
     """Solve a least-cost problem to a proved relative gap.
 
     Args:
-        start: (size,) a spectrum that meets everything (the white baseline); the answer is never worse.
+        start: (size,) a spectrum to begin with, scaled up until it meets everything (the white
+            baseline does); the answer is never worse.
         tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
             when the solver makes no more progress: its `gap` says so.
     """
@@ -67,14 +71,24 @@ def exchange(problem: Problem, start: Array, *, tolerance: float) -> ExchangeRes
         if stage is not stages[0]:
             state = state.moved_to(stage)
         goal = tolerance if stage is problem else max(_STAGE_TOLERANCE, tolerance)
+        gaps: list[float] = []
         for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
             rounds += 1
-            improved = state.improve(tolerance)
-            if not improved or state.gap <= goal:
+            solved = state.improve(tolerance)
+            gaps.append(state.gap)
+            stalled = len(gaps) > _PATIENCE and gaps[-1] > 0.9 * gaps[-1 - _PATIENCE]
+            if not solved or state.gap <= goal or stalled:
                 break
-    best, certificate = state.best, state.certificate
+    best = state.best
     return ExchangeResult(
-        best.x, best.cost, best.information, certificate, state.active, rounds, len(state.cuts)
+        basis=state.problem.basis,
+        x=best.x,
+        cost=best.cost,
+        information=best.information,
+        certificate=state.certificate,
+        active=state.active,
+        rounds=rounds,
+        cuts=len(state.cuts),
     )
 
 
@@ -104,7 +118,7 @@ class _State:
         return (self.best.cost - self.certificate.bound) / self.best.cost
 
     def improve(self, tolerance: float) -> bool:
-        """One round: solve, prove, repair, enlarge. False when the solver fails or nothing was left to add."""
+        """One round: solve, prove, repair, enlarge. False when the solver fails."""
         problem = self.problem
         y, multipliers, solution = _solve(problem, self.face, self.cuts, self.best, tolerance)
         if solution.status == "failed":
@@ -120,7 +134,10 @@ class _State:
             candidate = _scaled(problem, x, [(i, v.frequency) for i, v in found])
             self.best = min(self.best, candidate, key=lambda c: c.cost)
         self._add(_most_violated(found, self.keys, 2 * problem.experiment.size + _MORE_CUTS))
-        _, self.face = problem.basis.enlarge(self.face, y, proved.directions, problem.price)
+        basis, self.face = problem.basis.enlarge(self.face, y, proved.directions, problem.price)
+        if basis is not problem.basis:
+            self.problem = replace(problem, basis=basis)
+            self.best = replace(self.best, x=np.pad(self.best.x, (0, basis.size - self.best.x.size)))
         return True
 
     def moved_to(self, problem: Problem) -> _State:
@@ -138,7 +155,7 @@ class _State:
 
 
 def _first_state(problem: Problem, start: Array) -> _State:
-    best = _feasible(problem, start[: problem.basis.size])
+    best = _scaled(problem, start[: problem.basis.size], [])
     state = _State(
         problem=problem,
         face=problem.basis.first_face(problem.price),

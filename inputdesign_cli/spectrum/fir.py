@@ -17,7 +17,8 @@ from inputdesign_cli.spectrum.svec import smat, svec_layout
 from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing, pointwise_scale
 
 _FIRST_ORDER = 11        # spectra up to this order are designed whole, in one face
-_DIRECTIONS = 6
+_DIRECTIONS = 8
+_MOST_KEPT = 18
 _KEPT = 1e-10            # share of the largest eigenvalue below which a generator is dropped
 _SINGULAR_PRICE = 1e-10
 
@@ -99,7 +100,9 @@ class FirBasis:
         if face.order == self.size == known:
             return self, face
         eigenvalues, vectors = np.linalg.eigh(smat(y))
-        used = face.generators @ vectors[:, eigenvalues > _KEPT * eigenvalues[-1]]
+        kept = eigenvalues > _KEPT * eigenvalues[-1]
+        kept[:-_MOST_KEPT] = False
+        used = face.generators @ vectors[:, kept]
         used = np.pad(used, ((0, self.size - known), (0, 0)))
         spanning = scipy.linalg.qr(np.concatenate([used, directions], axis=1), mode="economic")[0]
         return self, self._face(spanning, price)
