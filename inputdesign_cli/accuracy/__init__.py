@@ -5,6 +5,7 @@ from inputdesign_cli.accuracy.admissible import AdmissibleError as AdmissibleErr
 from inputdesign_cli.accuracy.admissible import Relative as Relative
 from inputdesign_cli.accuracy.admissible import Sensitivity as Sensitivity
 from inputdesign_cli.accuracy.admissible import Table as Table
+from inputdesign_cli.accuracy.admissible import Weighted as Weighted
 from inputdesign_cli.accuracy.model_error import ModelError as ModelError
 from inputdesign_cli.accuracy.requirement import Cut as Cut
 from inputdesign_cli.accuracy.requirement import Requirement as Requirement

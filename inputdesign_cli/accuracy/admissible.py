@@ -17,6 +17,8 @@ from inputdesign_cli.plant import Loop, PolynomialModel, Rational, logarithmic_d
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z
 
 _NOWHERE = np.zeros(0)
+# Where the weight vanishes the requirement is void; a large finite r_adm says so without an infinity.
+_NO_WEIGHT = 1e-12
 
 
 class AdmissibleError(Protocol):
@@ -116,3 +118,23 @@ class Sensitivity:
         room = np.abs(denominator + numerator * self.model.plant_at(w))
         used = np.abs(self.weight.at(w)) * np.abs(denominator)
         return (room - used) / np.abs(numerator)
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """r_adm / |W|, so that |W| r_u stays below r_adm."""
+
+    inner: AdmissibleError
+    weight: Rational
+
+    @property
+    def knots(self) -> Array:
+        return self.inner.knots
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        own = logarithmic_distance(join_roots([self.weight.poles, self.weight.zeros]))
+        return np.concatenate([self.inner.singularities, own])
+
+    def at(self, w: ArrayLike) -> Array:
+        return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)

@@ -58,16 +58,16 @@ class Experiment:
         below (4) and (15)).
         """
         t = self.loop.responses(w)
-        return self._transform(self.model.prediction_gradient(w, t.y_x, t.u_x, np.zeros_like(t.y_x)))
+        return self.whiten_rows(self.model.prediction_gradient(w, t.y_x, t.u_x, np.zeros_like(t.y_x)))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """F_e or F_v (n, k): what e contributes, Lambda_H / H - C S Lambda_G (least-costly paper, (15))."""
         t = self.loop.responses(w)
-        return self._transform(self.model.prediction_gradient(w, t.y_e, t.u_e, np.ones_like(t.y_e)))
+        return self.whiten_rows(self.model.prediction_gradient(w, t.y_e, t.u_e, np.ones_like(t.y_e)))
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """Lambda_G (n, k): the gradient of G, in these coordinates."""
-        return self._transform(self.model.plant_gradient(w))
+        return self.whiten_rows(self.model.plant_gradient(w))
 
     def information_density(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, k, k): D with M = M0 + (1/2 pi) integral D(w) Phi_x(w) dw, for all N samples."""
@@ -91,8 +91,7 @@ class Experiment:
         from_noise = self.samples * integrate(moments, self.singularities)
         if self.prior is None:
             return from_noise
-        half = self._transform(self.prior)
-        return from_noise + self._transform(half.T)
+        return from_noise + self.whiten_matrix(self.prior)
 
     def whitened(self, power: float) -> Experiment:
         """The same experiment in coordinates where white excitation of this power gives M = I.
@@ -120,6 +119,10 @@ class Experiment:
         self._check_rank(triangle)
         return replace(self, factor=(triangle * scale).T)
 
+    def whiten_matrix(self, information: Array) -> Array:
+        """An information matrix (k, k) of raw parameters in these coordinates."""
+        return self.whiten_rows(self.whiten_rows(information).T)
+
     def to_raw(self, information: Array) -> Array:
         """An information matrix of these coordinates in raw parameters."""
         if self.factor is None:
@@ -133,7 +136,8 @@ class Experiment:
             half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
         return half.T @ half
 
-    def _transform(self, rows: NDArray) -> NDArray:
+    def whiten_rows(self, rows: NDArray) -> NDArray:
+        """Gradients (n, k) of raw parameters in these coordinates."""
         if self.factor is None:
             return rows
         return scipy.linalg.solve_triangular(self.factor, rows.T, lower=True).T

@@ -1,0 +1,80 @@
+"""Data files that a spec names: columns of numbers, read with complaints that name the line."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import Complaint, DataError, Location
+
+Array = NDArray[np.float64]
+_MOST_BYTES = 100 * 2**20
+
+
+def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, Array]:
+    """The wanted columns of a CSV file with a header line: role -> (n,).
+
+    Args:
+        wanted: role -> how its header begins; `frequency` also finds `frequency_rad_per_s`.
+        key: the key of the spec that names the file, for complaints.
+
+    Raises:
+        DataError: `data-unreadable`, `data-missing-column` or `data-not-a-number`.
+    """
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise _unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [(number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))]
+    except FileNotFoundError:
+        raise _unreadable(path, key, "does not exist", "paths are relative to the folder of the spec") from None
+    except IsADirectoryError:
+        raise _unreadable(path, key, "is a folder", "name a CSV file") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise _unreadable(path, key, f"cannot be read ({error})", "name a CSV file in UTF-8") from None
+    if len(rows) < 2:
+        raise _unreadable(path, key, "holds no rows of numbers", "write a header line and rows below it")
+    header = [name.strip().lower() for name in rows[0][1]]
+    columns: dict[str, Array] = {}
+    for role, start in wanted.items():
+        found = [i for i, name in enumerate(header) if name.startswith(start.lower())]
+        if len(found) != 1:
+            raise DataError(
+                Complaint(
+                    "data-missing-column",
+                    f"{path.name} has {'no column' if not found else 'several columns'} for {role} "
+                    f"(its header is: {', '.join(rows[0][1])})",
+                    f"name one column {start}, such as {start}_rad_per_s" if role == "frequency" else f"name one column {start}",
+                    key,
+                    Location(str(path), 1, 1, ",".join(rows[0][1])),
+                )
+            )
+        columns[role] = np.array([_number(path, key, line, row, found[0]) for line, row in rows[1:]])
+    return columns
+
+
+def _number(path: Path, key: str, line: int, row: list[str], column: int) -> float:
+    text = row[column].strip() if column < len(row) else ""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise DataError(
+            Complaint(
+                "data-not-a-number",
+                f"{text!r} is not a finite number" if text else "a number is missing",
+                "write plain numbers with a decimal point, one row a line",
+                key,
+                Location(str(path), line, 1, ",".join(row)),
+            )
+        )
+    return value
+
+
+def _unreadable(path: Path, key: str, what: str, hint: str) -> DataError:
+    return DataError(Complaint("data-unreadable", f"the file {path} {what}", hint, key))
