@@ -258,6 +258,144 @@ CODES: dict[str, Explanation] = {
         "The code is misspelt, or comes from another version.",
         "`idesign explain` without a code lists all.",
     ),
+    # Results on the disc
+    "output-not-a-directory": Explanation(
+        "The destination is a file",
+        "A run is a directory of files.",
+        "Choose another directory with -o.",
+    ),
+    "output-not-writable": Explanation(
+        "The destination cannot be written",
+        "The system refused; an earlier run there is as it was.",
+        "Choose another place, or change the permissions.",
+    ),
+    "output-full": Explanation(
+        "The disc is full",
+        "There was no space for the results; nothing half-written remains.",
+        "Free some space, or choose another disc.",
+    ),
+    "output-not-a-run": Explanation(
+        "A file of yours is in the way",
+        "The directory has a file of the same name that no earlier run wrote; it would be lost.",
+        "Choose another directory with -o, or move the file away.",
+    ),
+    "output-exists": Explanation(
+        "The file exists already",
+        "`idesign init` does not overwrite.",
+        "Choose another name, or give --force.",
+    ),
+    "run-missing": Explanation(
+        "No finished run",
+        "Without result.json a directory holds no whole run.",
+        "Run `idesign solve SPEC -o DIR`.",
+    ),
+    "run-unreadable": Explanation(
+        "The result cannot be read",
+        "result.json is not one that idesign wrote, or it was changed.",
+        "Run the spec again.",
+    ),
+    "run-incomplete": Explanation(
+        "A file of the run is gone",
+        "result.json lists a file that is no longer there.",
+        "Run the spec again.",
+    ),
+    # Golden files
+    "golden-path": Explanation(
+        "Not a path into a result",
+        "A path is keys with dots and list items in brackets.",
+        "Write objective.value or power.input[0].",
+    ),
+    "golden-tolerance": Explanation(
+        "Not one tolerance",
+        "A quantity has either an absolute or a relative tolerance; 0 has no relative one.",
+        "Give absolute, or relative.",
+    ),
+    "golden-name": Explanation(
+        "Two runs of one name",
+        "Results go by the name of the run.",
+        "Rename one.",
+    ),
+    "golden-missing": Explanation(
+        "No golden files",
+        "The current folder has no golden/*.yaml, and the package installs none.",
+        "Name golden files, or work in a checkout.",
+    ),
+    # The plant, its loop and its parameters
+    "unstable-loop": Explanation(
+        "The loop is unstable",
+        "With u = r - C y the closed loop has a pole on or outside the unit circle: no stationary "
+        "experiment can be run in it.",
+        "Check the sign of the feedback, the delay of the plant, and that all polynomials are in q^-1.",
+    ),
+    "algebraic-loop": Explanation(
+        "The loop is not well posed",
+        "Plant and controller both act at once and 1 + C G vanishes at infinite frequency.",
+        "Give the plant its delay (a leading 0 in B), or the controller one.",
+    ),
+    "not-identifiable": Explanation(
+        "Some parameters cannot be told apart",
+        "Even white excitation leaves the information matrix singular, most often because two "
+        "polynomials share a factor.",
+        "Lower an order, or cancel the common factor.",
+    ),
+    "unknown-parameter": Explanation(
+        "The model has no such parameter",
+        "Parameters are named a1, b1, c1, d1, f1 .. after their polynomial and power of q^-1.",
+        "Use the names that the message lists.",
+    ),
+    "no-feedback": Explanation(
+        "The controller is zero",
+        "Without feedback the sensitivity is one whatever the model, so it asks nothing of the model.",
+        "Give the controller of the loop that is to be kept.",
+    ),
+    # Accuracy and its data
+    "admissible-not-positive": Explanation(
+        "The admissible error vanishes",
+        "At some frequency of the band r_adm is zero or negative: no experiment is long enough.",
+        "Restrict the band, or loosen the requirement there.",
+    ),
+    "bad-table": Explanation(
+        "The table of r_adm cannot be used",
+        "It must have increasing frequencies, positive values, and cover the whole band.",
+        "Mend the rows that the message names, or restrict the band.",
+    ),
+    "data-unreadable": Explanation(
+        "A data file cannot be read",
+        "The spec names a file that is missing, empty, no CSV file or too large.",
+        "Paths are relative to the folder of the spec.",
+    ),
+    "data-missing-column": Explanation(
+        "A column is missing",
+        "Columns are found by the beginning of their header, such as frequency or r_adm.",
+        "Rename the column in the header line.",
+    ),
+    "data-not-a-number": Explanation(
+        "A cell is not a number",
+        "Every cell below the header must be a finite number with a decimal point.",
+        "Mend the cell, or remove the row.",
+    ),
+    # What was computed
+    "integral-inaccurate": Explanation(
+        "An integral did not settle",
+        "The information matrix is an integral over frequency; here its integrand has a pole on the "
+        "unit circle.",
+        "Move the pole inside, or close a stable loop around the integrator.",
+    ),
+    "gap-not-closed": Explanation(
+        "The proof did not close",
+        "The design and the proved lower bound stayed further apart than 100 solver.tolerance.",
+        "Loosen solver.tolerance, lower the order, or rescale a nearly unidentifiable model.",
+    ),
+    "solver-failed": Explanation(
+        "The solver failed",
+        "The grid program of solver.method lmi ended without an answer.",
+        "Use solver.method exchange.",
+    ),
+    "not-supported": Explanation(
+        "Not in this version",
+        "The spec is well formed, but this version does not do what it asks; it is never ignored silently.",
+        "Do as the hint says, or watch CHANGELOG.md.",
+    ),
 }
 
 

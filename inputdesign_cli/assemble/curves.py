@@ -12,12 +12,13 @@ from inputdesign_cli.spec import Spec
 from inputdesign_cli.spectrum import FirBasis
 
 _POINTS = 800
-# Logarithmic axes start three decades below the highest frequency, or where the band does.
+# Logarithmic axes start where the band does, or three decades below its end if it starts at zero.
 _DECADES = 1e-3
+_ZERO = 1e-5
 
 
 def _axis(lo: float, hi: float, extra: Array) -> Array:
-    start = max(lo, _DECADES * hi)
+    start = lo if lo > _ZERO * hi else _DECADES * hi
     inside = extra[(extra >= start) & (extra <= hi)]
     return np.unique(np.concatenate([np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2), inside]))
 
@@ -42,7 +43,7 @@ def bound_curves(spec: Spec, solution: LeastCost) -> tuple[Table, BoundCurves]:
     requirement = problem.requirements[0]
     assert isinstance(requirement, ModelError)
     information = solution.result.information
-    active = np.array([w for _, w in solution.result.active if w is not None])
+    active = solution.result.active_frequencies
     peaks = np.array([v.frequency for v in requirement.violations(information, above=0.5)])
     w = _axis(*requirement.band, np.concatenate([active, peaks]))
     r_u = requirement.error_bound(information, w)
@@ -58,7 +59,7 @@ def bound_curves(spec: Spec, solution: LeastCost) -> tuple[Table, BoundCurves]:
         G_abs=G,
         r_adm=r_adm,
         r_u_white=requirement.error_bound(problem.information(white), w),
-        active=_distinct(active) / spec.sample_time,
+        active=distinct(np.maximum(active, w[0])) / spec.sample_time,
     )
     return table, curves
 
@@ -71,7 +72,8 @@ def optimality_curves(spec: Spec, solution: LeastCost) -> OptimalityCurves:
     support = lines[anything.x > 1e-3 * anything.x.sum()]
     w = _axis(0.0, np.pi, support)
     ratio = value.density(w) / problem.price.density(w)
-    return OptimalityCurves(w / spec.sample_time, ratio, _distinct(support) / spec.sample_time)
+    marks = distinct(np.maximum(support, w[0]))
+    return OptimalityCurves(w / spec.sample_time, ratio, marks / spec.sample_time)
 
 
 def signal_curves(spec: Spec, samples: Array) -> tuple[Table, SignalCurves]:
@@ -81,7 +83,7 @@ def signal_curves(spec: Spec, samples: Array) -> tuple[Table, SignalCurves]:
     return Table({f"time_{spec.time_unit}": time, channel: samples}), SignalCurves(time, {channel: samples})
 
 
-def _distinct(w: Array) -> Array:
-    """Frequencies that differ by more than a millionth; the exchange polishes some of them twice."""
+def distinct(w: Array) -> Array:
+    """One frequency for each cluster within a thousandth: the exchange visits an optimum several times."""
     ordered = np.sort(w)
-    return ordered[np.diff(ordered, prepend=-1.0) > 1e-6]
+    return ordered[np.diff(ordered, prepend=-1.0) > 1e-3 * ordered]

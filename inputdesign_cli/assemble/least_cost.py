@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
-from inputdesign_cli.assemble.curves import bound_curves, optimality_curves, signal_curves, spectrum_curves
+from inputdesign_cli.assemble.curves import (
+    bound_curves,
+    distinct,
+    optimality_curves,
+    signal_curves,
+    spectrum_curves,
+)
 from inputdesign_cli.assemble.experiment import build_cost, build_experiment
 from inputdesign_cli.assemble.requirements import build_model_error
 from inputdesign_cli.design.least_cost import LeastCost, least_cost, whitened_problem
@@ -166,7 +172,7 @@ def _result(spec: Spec, task: Task, solution: LeastCost, how: dict[str, Any]) ->
         result["model_error"] |= {
             "worst_ratio": worst.ratio,
             "worst_frequency": worst.frequency / spec.sample_time,
-            "active_frequencies": sorted({w / spec.sample_time for _, w in found.active if w is not None}),
+            "active_frequencies": distinct(found.active_frequencies) / spec.sample_time,
         }
         result["information"]["covariance"] = experiment.raw_covariance(found.information)
     return result

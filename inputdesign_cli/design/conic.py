@@ -13,8 +13,8 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from inputdesign_cli.spectrum import svec_length
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import svec_length
 
 ConeKind = Literal["zero", "nonnegative", "psd"]
 

@@ -50,6 +50,11 @@ class ExchangeResult:
     cuts: int
 
     @property
+    def active_frequencies(self) -> Array:
+        """Frequencies (rad/sample) of the requirements that bind."""
+        return np.array([w for _, w in self.active if w is not None])
+
+    @property
     def gap(self) -> float:
         """(cost - bound) / cost."""
         return max(self.cost - self.certificate.bound, 0.0) / self.cost if self.cost > 0 else 0.0

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.svec import smat, svec_layout
 from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing, pointwise_scale
+from inputdesign_cli.spectrum.svec import smat, svec_layout
 
 _FIRST_ORDER = 11        # spectra up to this order are designed whole, in one face
 _DIRECTIONS = 8

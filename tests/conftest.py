@@ -1,0 +1,25 @@
+"""Plants that several tests share."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from inputdesign_cli import load_spec
+from inputdesign_cli.assemble.experiment import build_experiment
+
+SPECS = Path(__file__).parent.parent / "specs"
+
+
+@pytest.fixture
+def flexible():
+    """The flexible transmission in its (reconstructed) loop, N = 500."""
+    return build_experiment(load_spec(SPECS / "flexible_transmission.yaml"))
+
+
+@pytest.fixture
+def first_order():
+    """The first-order Box-Jenkins system, N = 500."""
+    return build_experiment(load_spec(SPECS / "first_order.yaml"))

@@ -1,0 +1,42 @@
+"""Grids see resonances; maxima are found where calculus puts them."""
+
+import numpy as np
+
+from inputdesign_cli.plant import graded_grid, local_maxima, logarithmic_distance
+
+
+def test_grid_resolves_a_lightly_damped_pole():
+    radius, angle = 0.99999, 1.234
+    grid = graded_grid(logarithmic_distance([radius * np.exp(1j * angle)]), 0.0, np.pi)
+    near = grid[np.abs(grid - angle) < 1e-5]
+    assert near.size > 20
+    assert grid[0] == 0.0
+    assert grid[-1] == np.pi
+
+
+def test_maxima_of_a_known_function():
+    def function(w):
+        return np.cos(7 * w) + 0.2 * w
+
+    grid = np.linspace(0, np.pi, 60)
+    w, values = local_maxima(function, grid, function(grid))
+    # -7 sin(7 w) + 0.2 = 0 next to each maximum of the cosine, and the right end, where it still rises
+    exact = [(2 * np.pi * k + np.arcsin(0.2 / 7)) / 7 for k in range(4)]
+    np.testing.assert_allclose(w[:4], exact, atol=1e-6)
+    np.testing.assert_allclose(values[:4], function(np.array(exact)), rtol=1e-12)
+
+
+def test_twin_peaks_between_neighbouring_grid_points_are_parted():
+    def function(w):
+        return 1 / (1 + ((w - 1.000) / 2e-3) ** 2) + 1.01 / (1 + ((w - 1.009) / 2e-3) ** 2)
+
+    grid = np.linspace(0, 2, 401)
+    w, _ = local_maxima(function, grid, function(grid), above=0.9)
+    assert len(w) == 2
+
+
+def test_kinks_are_found():
+    grid = np.linspace(0, 1, 11)
+    w, values = local_maxima(lambda w: -np.abs(w - 0.3333), grid, -np.abs(grid - 0.3333))
+    np.testing.assert_allclose(w, [0.3333], atol=1e-6)
+    assert values[0] > -1e-6
