@@ -28,12 +28,12 @@ class Table:
 class SpectrumCurves:
     """The designed spectrum over frequency, as a density, as lines, or both."""
 
-    frequency: Array                      # (n,) rad per time unit
-    density: Array | None = None          # (n,) Phi(frequency)
-    white: float | None = None            # the flat level of the white baseline, for comparison
-    line_frequency: Array | None = None   # (L,)
-    line_power: Array | None = None       # (L,) mean square of each sinusoid
-    symbol: str = "u"                     # which signal: "u" in open loop, "r" in closed loop
+    frequency: Array  # (n,) rad per time unit
+    density: Array | None = None  # (n,) Phi(frequency)
+    white: float | None = None  # the flat level of the white baseline, for comparison
+    line_frequency: Array | None = None  # (L,)
+    line_power: Array | None = None  # (L,) mean square of each sinusoid
+    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class BoundCurves:
     r_u: Array
     G_abs: Array
     r_adm: Array | None = None
-    r_u_white: Array | None = None        # of white excitation at the cost that it needs
-    active: Array = field(default_factory=lambda: np.zeros(0))   # frequencies where r_u touches r_adm
+    r_u_white: Array | None = None  # of white excitation at the cost that it needs
+    active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class SignalCurves:
     """The record to be applied: `time` (n,), one array (n,) a channel."""
 
     time: Array
-    channels: Mapping[str, Array]         # "u1" -> samples (closed loop: "r1")
+    channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Outcome:
     """One run: the result and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
 
     result: Mapping[str, Any]
-    resolved_spec: str                    # YAML text of the spec with all overrides applied
+    resolved_spec: str  # YAML text of the spec with all overrides applied
     time_unit: str = "s"
     tables: Mapping[str, Table] = field(default_factory=dict)
     curves: Mapping[str, SpectrumCurves | BoundCurves | OptimalityCurves | SignalCurves] = field(

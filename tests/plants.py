@@ -31,7 +31,9 @@ def random_model(rng: np.random.Generator, structure: str, order: int) -> Polyno
     noise = monic(rng, rng.integers(1, 3), radius=(0.1, 0.9))
     extra = monic(rng, rng.integers(1, 3), radius=(0.1, 0.9))
     delay = int(rng.integers(1, 4))
-    B = np.concatenate([np.zeros(delay), rng.normal() * monic(rng, rng.integers(0, max(order, 1)), radius=(0.1, 0.9))])
+    B = np.concatenate(
+        [np.zeros(delay), rng.normal() * monic(rng, rng.integers(0, max(order, 1)), radius=(0.1, 0.9))]
+    )
     one = np.ones(1)
     A, C, D, F = {
         "oe": (one, one, one, plant_poles),

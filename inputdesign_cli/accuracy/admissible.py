@@ -70,8 +70,8 @@ class Table:
     At frequency zero, and below the first point if that stands at zero, the first value holds.
     """
 
-    frequency: Array   # (n,) ascending, rad/sample
-    value: Array       # (n,) positive
+    frequency: Array  # (n,) ascending, rad/sample
+    value: Array  # (n,) positive
     singularities = _NOWHERE.astype(complex)
 
     @property

@@ -46,14 +46,16 @@ class ModelError:
 
     def check_positive(self) -> None:
         """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 on the whole band."""
-        w, negative = local_maxima(lambda w: -self.admissible.at(w), self.grid, -self.admissible.at(self.grid))
+        w, negative = local_maxima(
+            lambda w: -self.admissible.at(w), self.grid, -self.admissible.at(self.grid)
+        )
         scale = np.median(np.abs(self.admissible.at(self.grid)))
         bad = negative >= -1e-9 * scale
         if np.any(bad):
             at = w[bad][int(np.argmax(negative[bad]))]
             raise bad_spec(
                 "admissible-not-positive",
-                f"the admissible error is not positive at {at:.6g} rad/sample: no model can be accurate enough there",
+                f"the admissible error is not positive at {at:.6g} rad/sample: no model can be that good",
                 hint="restrict `band` to the frequencies that matter, or loosen the requirement there "
                 "(a relative bound vanishes where G does; a sensitivity bound where |W S| already reaches 1)",
                 key="accuracy.model_error",

@@ -20,7 +20,9 @@ _ZERO = 1e-5
 def _axis(lo: float, hi: float, extra: Array) -> Array:
     start = lo if lo > _ZERO * hi else _DECADES * hi
     inside = extra[(extra >= start) & (extra <= hi)]
-    return np.unique(np.concatenate([np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2), inside]))
+    return np.unique(
+        np.concatenate([np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2), inside])
+    )
 
 
 def _frequency_header(spec: Spec) -> str:
@@ -78,7 +80,7 @@ def optimality_curves(spec: Spec, solution: LeastCost) -> OptimalityCurves:
 
 def signal_curves(spec: Spec, samples: Array) -> tuple[Table, SignalCurves]:
     """signal.csv and its plot."""
-    time = spec.sample_time * np.arange(samples.size)
+    time = spec.sample_time * np.arange(samples.size, dtype=np.float64)
     channel = "r1" if spec.closed_loop else "u1"
     return Table({f"time_{spec.time_unit}": time, channel: samples}), SignalCurves(time, {channel: samples})
 

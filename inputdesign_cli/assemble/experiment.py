@@ -33,7 +33,7 @@ def build_model(spec: Spec) -> PolynomialModel:
     if plant.inputs > 1 or plant.outputs > 1:
         raise spec.complain(
             "not-supported",
-            f"this version designs for one input and one output; this plant has {plant.inputs} and {plant.outputs}",
+            f"this version designs for one input and one output, not {plant.inputs} and {plant.outputs}",
             hint="design for one channel at a time",
             key="plant.B",
         )

@@ -59,7 +59,7 @@ def build_task(spec: Spec) -> Task:
     spectrum = spec.spectrum
     kind = "fir" if spectrum is None else getattr(spectrum, "type", "given")
     order = 0 if kind == "white" else getattr(spectrum, "order", _DEFAULT_ORDER)
-    experiment.whitened(1.0)   # says which parameters cannot be told apart
+    experiment.whitened(1.0)  # says which parameters cannot be told apart
     return Task(experiment, requirement, FirBasis(order), build_cost(spec))
 
 
@@ -119,9 +119,7 @@ def _by_grid(spec: Spec, task: Task) -> tuple[LeastCost, dict[str, Any]]:
     )
     lo, hi = task.requirement.band
     frequencies = np.geomspace(max(lo, 1e-3 * hi), hi, spec.solver.grid)
-    answer = solve_on_grid(
-        problem, frequencies, power * task.basis.white, positivity=spec.solver.positivity
-    )
+    answer = solve_on_grid(problem, frequencies, power * task.basis.white, positivity=spec.solver.positivity)
     on_grid = replace(
         solution.result,
         basis=task.basis,
@@ -157,7 +155,10 @@ def _result(spec: Spec, task: Task, solution: LeastCost, how: dict[str, Any]) ->
         "samples": experiment.samples,
         "power": _powers(problem, found.x),
         "model_error": {"alpha": task.requirement.alpha},
-        "information": {"parameters": list(experiment.model.names), "matrix": experiment.to_raw(found.information)},
+        "information": {
+            "parameters": list(experiment.model.names),
+            "matrix": experiment.to_raw(found.information),
+        },
         "spectrum": {"type": "fir", "order": task.basis.order, "coefficients": found.x},
         "baseline": {
             "white": {
@@ -234,17 +235,26 @@ def _check_supported(spec: Spec) -> None:
         return spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
 
     if spec.goal != "least_cost":
-        raise refuse("objective" if spec.objective else "accuracy", f"design for {spec.goal}", "ask for objective: least_cost with model_error")
+        raise refuse(
+            "objective" if spec.objective else "accuracy",
+            f"design for {spec.goal}",
+            "ask for objective: least_cost with model_error",
+        )
     for name in (*spec.accuracy.requirements, *spec.accuracy.goals):
         if name != "model_error":
             raise refuse(f"accuracy.{name}", f"handle {name}", "state the accuracy as model_error")
     if spec.accuracy.model_error is None:
         raise spec.complain(
-            "missing-key", "nothing is asked of the model", hint="add accuracy: {model_error: {relative: 0.05}}", key="accuracy"
+            "missing-key",
+            "nothing is asked of the model",
+            hint="add accuracy: {model_error: {relative: 0.05}}",
+            key="accuracy",
         )
     for name in type(spec.limits).model_fields:
         if getattr(spec.limits, name) is not None:
-            raise refuse(f"limits.{name}", f"enforce limits.{name}", "remove it, and check the powers in the result")
+            raise refuse(
+                f"limits.{name}", f"enforce limits.{name}", "remove it, and check the powers in the result"
+            )
     kind = "fir" if spec.spectrum is None else getattr(spec.spectrum, "type", "given")
     if kind not in ("fir", "white"):
         raise refuse("spectrum", f"design spectra of type {kind}", "use type: fir or type: white")

@@ -29,9 +29,13 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
         if path.stat().st_size > _MOST_BYTES:
             raise _unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))]
+            rows = [
+                (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
+            ]
     except FileNotFoundError:
-        raise _unreadable(path, key, "does not exist", "paths are relative to the folder of the spec") from None
+        raise _unreadable(
+            path, key, "does not exist", "paths are relative to the folder of the spec"
+        ) from None
     except IsADirectoryError:
         raise _unreadable(path, key, "is a folder", "name a CSV file") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -48,7 +52,9 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
                     "data-missing-column",
                     f"{path.name} has {'no column' if not found else 'several columns'} for {role} "
                     f"(its header is: {', '.join(rows[0][1])})",
-                    f"name one column {start}, such as {start}_rad_per_s" if role == "frequency" else f"name one column {start}",
+                    f"name one column {start}, such as {start}_rad_per_s"
+                    if role == "frequency"
+                    else f"name one column {start}",
                     key,
                     Location(str(path), 1, 1, ",".join(rows[0][1])),
                 )

@@ -15,8 +15,8 @@ import typer
 
 from inputdesign_cli.errors import EXIT_INTERRUPTED, IdesignError
 
-EXIT_INTERNAL = 70   # EX_SOFTWARE of sysexits.h
-EXIT_PIPE = 141      # what a shell reports for a command that SIGPIPE ended
+EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
+EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
 CLEAR_LINE = "\r\x1b[K"
 
 

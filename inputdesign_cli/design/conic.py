@@ -56,7 +56,9 @@ _STATUS: dict[str, Literal["solved", "almost_solved", "infeasible", "unbounded",
 }
 
 
-def solve_conic(q: Array, blocks: Sequence[Block], *, tolerance: float = 1e-9, max_iterations: int = 200) -> ConicSolution:
+def solve_conic(
+    q: Array, blocks: Sequence[Block], *, tolerance: float = 1e-9, max_iterations: int = 200
+) -> ConicSolution:
     """Solve by Clarabel's interior-point method.
 
     Args:

@@ -45,7 +45,7 @@ class ExchangeResult:
     cost: float
     information: Array
     certificate: Certificate
-    active: tuple[tuple[int, float | None], ...]   # (requirement, frequency) with a positive multiplier
+    active: tuple[tuple[int, float | None], ...]  # (requirement, frequency) with a positive multiplier
     rounds: int
     cuts: int
 
@@ -116,7 +116,7 @@ class _State:
     certificate: Certificate
     active: tuple[tuple[int, float | None], ...] = ()
     multipliers: list[Array] = field(default_factory=list)
-    solved: tuple[Face, Array] | None = None   # the face and y of the latest finite program
+    solved: tuple[Face, Array] | None = None  # the face and y of the latest finite program
 
     @property
     def gap(self) -> float:
@@ -200,9 +200,7 @@ def _smallest_factor(problem: Problem, x: Array, at: set[tuple[int, float | None
 
     def excess(f: float) -> float:
         information = problem.baseline_information + f * excited
-        ratios = [
-            float(problem.requirements[i].ratios(information, np.array([w]))[0]) for i, w in at
-        ]
+        ratios = [float(problem.requirements[i].ratios(information, np.array([w]))[0]) for i, w in at]
         return max(ratios, default=0.0) ** 2 - 1.0
 
     value = excess(factor)
@@ -223,7 +221,9 @@ def _most_violated(
     return [(i, v.frequency) for i, v in ranked if (i, v.frequency) not in known][:most]
 
 
-def _active(keys: list[tuple[int, float | None]], multipliers: list[Array]) -> tuple[tuple[int, float | None], ...]:
+def _active(
+    keys: list[tuple[int, float | None]], multipliers: list[Array]
+) -> tuple[tuple[int, float | None], ...]:
     weights = np.array([np.trace(m) for m in multipliers])
     return tuple(key for key, weight in zip(keys, weights, strict=True) if weight > 1e-4 * weights.sum())
 

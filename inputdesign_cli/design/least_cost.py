@@ -1,4 +1,4 @@
-"""Least-cost design: the cheapest spectrum that meets the requirements, beside white and beside any spectrum."""
+"""Least-cost design: the cheapest spectrum that meets the requirements, beside white and any spectrum."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def least_cost(
     """
     power = least_white_power(experiment, factories)
     problem = whitened_problem(experiment, basis, cost, factories, power)
-    anything = replace(problem, basis=LinesBasis.anywhere(problem.grid))
+    lines = LinesBasis.anywhere(problem.grid)
+    anything = replace(problem, basis=lines)
     if power == 0.0:
         return LeastCost(problem, 0.0, _nothing(problem), _nothing(anything))
     return LeastCost(
@@ -54,7 +55,7 @@ def least_cost(
         white_power=power,
         result=exchange(problem, power * basis.white, tolerance=tolerance),
         any_spectrum=exchange(
-            anything, power * anything.basis.flat, tolerance=max(tolerance, _ANY_SPECTRUM_TOLERANCE)
+            anything, power * lines.flat, tolerance=max(tolerance, _ANY_SPECTRUM_TOLERANCE)
         ),
     )
 

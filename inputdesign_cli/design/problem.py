@@ -60,6 +60,7 @@ class Problem:
 
     def power(self, kind: PowerKind) -> Functional:
         """The power of input, output or excitation as a functional of the spectrum."""
+
         def density(w: Array) -> Array:
             return self.experiment.power_density(kind, w)
 

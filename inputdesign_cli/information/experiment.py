@@ -104,9 +104,10 @@ class Experiment:
         """
         rule = graded_quadrature(self.singularities)
         raw = replace(self, factor=None)
-        excited = raw.excitation_gradient(rule.nodes) * np.sqrt(
-            rule.weights * (power * self.samples / self.model.variance)
-        )[:, None]
+        excited = (
+            raw.excitation_gradient(rule.nodes)
+            * np.sqrt(rule.weights * (power * self.samples / self.model.variance))[:, None]
+        )
         noise = raw.noise_gradient(rule.nodes) * np.sqrt(rule.weights * self.samples)[:, None]
         rows = [excited.real, excited.imag, noise.real, noise.imag]
         if self.prior is not None:
@@ -115,7 +116,7 @@ class Experiment:
         stacked = np.concatenate(rows)
         scale = np.linalg.norm(stacked, axis=0)
         scale[scale == 0.0] = 1.0
-        triangle = np.linalg.qr(stacked / scale, mode="r")
+        triangle = np.asarray(np.linalg.qr(stacked / scale, mode="r"))
         self._check_rank(triangle)
         return replace(self, factor=(triangle * scale).T)
 

@@ -35,7 +35,11 @@ def graded_grid(
     """
     span = hi - lo
     floor = max(lo, hi * 1e-6)
-    parts = [np.linspace(lo, hi, points), np.geomspace(floor, hi, points // 3), np.asarray(knots, dtype=float)]
+    parts = [
+        np.linspace(lo, hi, points),
+        np.geomspace(floor, hi, points // 3),
+        np.asarray(knots, dtype=float),
+    ]
     near = np.linspace(0.0, 2.0, 81)
     for s in np.unique(np.round(np.asarray(singularities, dtype=complex), 12)):
         width = max(s.imag, 1e-8)

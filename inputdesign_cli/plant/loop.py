@@ -85,8 +85,8 @@ class Loop:
                 "unstable-loop",
                 f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
                 f"angle {abs(np.angle(worst)):.4g} rad/sample",
-                hint="check the signs (feedback is negative: u = r - C y), the delay in B, and that numerator "
-                "and denominator of the controller are in q^-1, ascending",
+                hint="check the signs (feedback is negative: u = r - C y), the delay in B, and that "
+                "numerator and denominator of the controller are in q^-1, ascending",
                 key="experiment.controller",
             )
 

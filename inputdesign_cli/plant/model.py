@@ -26,10 +26,10 @@ from inputdesign_cli.plant.polynomial import (
 class Response:
     """G, H and their gradients at n frequencies: p outputs, r inputs, k parameters."""
 
-    G: ComplexArray    # (n, p, r)
-    H: ComplexArray    # (n, p, p)
-    dG: ComplexArray   # (n, k, p, r)
-    dH: ComplexArray   # (n, k, p, p)
+    G: ComplexArray  # (n, p, r)
+    H: ComplexArray  # (n, p, p)
+    dG: ComplexArray  # (n, k, p, r)
+    dH: ComplexArray  # (n, k, p, p)
 
 
 def _one() -> Array:

@@ -20,7 +20,9 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    return np.polynomial.polynomial.polyval(q, np.asarray(coefficients, dtype=float))
+    return np.asarray(
+        np.polynomial.polynomial.polyval(q, np.asarray(coefficients, dtype=float)), dtype=complex
+    )
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
@@ -29,7 +31,7 @@ def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
     Trailing zeros are roots at the origin and are left out: they neither resonate nor destabilise.
     """
     trimmed = np.trim_zeros(np.asarray(coefficients, dtype=float))
-    return np.roots(trimmed) if trimmed.size > 1 else np.zeros(0, dtype=complex)
+    return np.asarray(np.roots(trimmed), dtype=complex) if trimmed.size > 1 else np.zeros(0, dtype=complex)
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from inputdesign_cli.outcome import Array, SignalCurves
 from inputdesign_cli.report.style import BLUE, GREY, figure
 
-SHOWN = 1000    # samples that a figure of this width can show one by one
+SHOWN = 1000  # samples that a figure of this width can show one by one
 STEPS_TO = 300  # up to here the hold between samples is visible
-ROWS = 4        # channels that fit
+ROWS = 4  # channels that fit
 
 
 def draw_signal(curves: SignalCurves, path: Path, time_unit: str) -> None:

@@ -13,7 +13,7 @@ from inputdesign_cli.outcome import Array, SpectrumCurves
 from inputdesign_cli.report.style import BLUE, GREY, ORANGE, figure, frequency_axis, legend_above
 
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
-DECADES = 5.0     # shown below the peak: the zeros of a spectrum would stretch the axis without end
+DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
 
 
 def draw_spectrum(curves: SpectrumCurves, path: Path, time_unit: str) -> None:

@@ -46,7 +46,7 @@ def prediction_gradient(experiment: Experiment, excitation: Array) -> NDArray[np
 
 
 def input_and_output(experiment: Experiment, excitation: Array) -> tuple[Array, Array]:
-    """u_x and y_x (n,): what the excitation causes at the plant's input and output, from rest, without noise."""
+    """u_x and y_x (n,): what the excitation alone causes at input and output, from rest."""
     loop = experiment.loop
     model, controller = loop.model, loop.controller
     if controller is None:

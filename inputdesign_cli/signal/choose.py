@@ -64,7 +64,7 @@ def realise(
         record = record * np.sqrt(x[0] / np.mean(record**2))
         try:
             ratio = worst_ratio(record_information(experiment, record))
-        except np.linalg.LinAlgError:   # too short to excite every parameter
+        except np.linalg.LinAlgError:  # too short to excite every parameter
             ratio = np.inf
         if best is None or ratio < best.worst_ratio:
             best = Record(record, method, ratio, None if factor is None else factor.residual)

@@ -42,8 +42,8 @@ def spectral_factor(autocovariances: Array) -> SpectralFactor:
         toeplitz = scipy.linalg.toeplitz(np.concatenate([taps[:1], np.zeros(m)]), taps)
         hankel = scipy.linalg.hankel(taps)
         try:
-            taps = scipy.linalg.solve(toeplitz + hankel, c + autocorrelation(taps), check_finite=False)
-        except scipy.linalg.LinAlgError:
+            taps = np.linalg.solve(toeplitz + hankel, c + autocorrelation(taps))
+        except np.linalg.LinAlgError:
             break
         residual = _residual(taps, c)
         if not np.isfinite(residual):

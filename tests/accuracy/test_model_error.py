@@ -71,7 +71,7 @@ def test_sensitivity_bound_keeps_its_promise(flexible):
     phases = np.exp(2j * np.pi * np.linspace(0, 1, 721))
     worst = np.max(np.abs(W / (1 + C * (G + r * phases[:, None]))), axis=0)
     assert worst.max() <= 1 + 1e-6
-    assert worst.min() >= 1 - 1e-3      # and no larger r_adm would do
+    assert worst.min() >= 1 - 1e-3  # and no larger r_adm would do
 
 
 def test_table_interpolates_in_logarithms():

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve, validate
-from inputdesign_cli.errors import DataError, IdesignError, SpecError
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.golden import compare, execute, load_golden
 
 ROOT = Path(__file__).parent.parent.parent
@@ -30,7 +30,7 @@ def test_golden_files(path):
     golden = load_golden(path)
     rows = compare(golden, {run.name: execute(golden, run) for run in golden.runs})
     assert rows
-    assert [row for row in rows if not row.ok] == []
+    assert [row for row in rows if not row.passed] == []
 
 
 def test_result_is_consistent():
@@ -38,7 +38,7 @@ def test_result_is_consistent():
     result = outcome.result
     c = np.asarray(result["spectrum"]["coefficients"])
     assert result["status"] == "optimal"
-    assert result["objective"]["value"] == pytest.approx(c[0])          # input power alone costs
+    assert result["objective"]["value"] == pytest.approx(c[0])  # input power alone costs
     assert result["objective"]["relative_gap"] <= 1e-7
     bounds = [result["objective"][key] for key in ("any_spectrum_bound", "lower_bound", "value")]
     assert bounds == sorted(bounds)
@@ -57,7 +57,10 @@ def test_sample_time_scales_frequencies_and_nothing_else():
     """The same discrete plant sampled ten times as fast: frequencies times ten, costs unchanged."""
     slow, fast = solve(spec_of(SMALL)), solve(spec_of(SMALL, sample_time=0.1))
     assert fast.result["cost"] == pytest.approx(slow.result["cost"], rel=1e-9)
-    ratio = fast.tables["bound"].columns["frequency_rad_per_s"] / slow.tables["bound"].columns["frequency_rad_per_s"]
+    ratio = (
+        fast.tables["bound"].columns["frequency_rad_per_s"]
+        / slow.tables["bound"].columns["frequency_rad_per_s"]
+    )
     np.testing.assert_allclose(ratio, 10.0)
     assert fast.tables["signal"].columns["time_s"][1] == pytest.approx(0.1)
 
@@ -69,7 +72,9 @@ def test_confidence_sets_alpha():
 
 
 def test_equal_seeds_give_equal_signals():
-    one, two, other = (solve(spec_of(SMALL, signal__seed=seed)).tables["signal"].columns["u1"] for seed in (4, 4, 5))
+    one, two, other = (
+        solve(spec_of(SMALL, signal__seed=seed)).tables["signal"].columns["u1"] for seed in (4, 4, 5)
+    )
     np.testing.assert_array_equal(one, two)
     assert not np.array_equal(one, other)
 
@@ -91,7 +96,11 @@ CLOSED = SMALL.replace("{samples: 500}", "{samples: 500, controller: {numerator:
 BAD = [
     (CLOSED.replace("CNUM", "-2"), "unstable-loop", "experiment.controller"),
     (SMALL.replace("B: [0, 3.6]", "B: [0, 1, 1]"), "admissible-not-positive", "accuracy.model_error"),
-    (SMALL.replace("B: [0, 3.6], F: [1, -0.7]", "B: [0, 1, -0.7], F: [1, -0.7]"), "not-identifiable", "plant"),
+    (
+        SMALL.replace("B: [0, 3.6], F: [1, -0.7]", "B: [0, 1, -0.7], F: [1, -0.7]"),
+        "not-identifiable",
+        "plant",
+    ),
     (SMALL.replace("type: fir, order: 3", "type: free"), "not-supported", "spectrum"),
     (SMALL + "limits: {input_power: 1}\n", "not-supported", "limits.input_power"),
     (SMALL.replace("{seed: 1}", "{type: binary}"), "not-supported", "signal.type"),
@@ -99,7 +108,9 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("text", "code", "key"), BAD, ids=[f"{code}-{i}" for i, (_, code, _) in enumerate(BAD)])
+@pytest.mark.parametrize(
+    ("text", "code", "key"), BAD, ids=[f"{code}-{i}" for i, (_, code, _) in enumerate(BAD)]
+)
 def test_bad_specs_name_the_key_and_the_line(text, code, key):
     with pytest.raises(SpecError) as error:
         validate(parse_spec(text, file="plant.yaml"))
@@ -119,7 +130,9 @@ TABLES = [
 ]
 
 
-@pytest.mark.parametrize(("content", "code", "words"), TABLES, ids=[code + str(i) for i, (_, code, _) in enumerate(TABLES)])
+@pytest.mark.parametrize(
+    ("content", "code", "words"), TABLES, ids=[code + str(i) for i, (_, code, _) in enumerate(TABLES)]
+)
 def test_bad_tables(tmp_path, content, code, words):
     table = tmp_path / "r.csv"
     table.write_text(content, encoding="utf-8")
@@ -146,11 +159,6 @@ def test_table_equal_to_a_relative_bound_gives_its_design(tmp_path):
     assert tabulated.result["cost"] == pytest.approx(solve(parse_spec(SMALL)).result["cost"], rel=1e-5)
 
 
-def test_every_shipped_spec_validates_or_says_what_is_missing():
-    for path in sorted((ROOT / "specs").glob("*.yaml")):
-        from inputdesign_cli import load_spec
-
-        try:
-            validate(load_spec(path))
-        except IdesignError as error:
-            assert {c.code for c in error.complaints} == {"not-supported"}
+@pytest.mark.parametrize("path", sorted((ROOT / "specs").glob("*.yaml")), ids=lambda p: p.stem)
+def test_shipped_specs_validate(path):
+    validate(load_spec(path))

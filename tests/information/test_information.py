@@ -71,9 +71,10 @@ def test_information_of_an_arx_model_with_white_input():
     model = PolynomialModel(A=np.array([1.0, a]), B=np.array([0.0, b]), variance=variance)
     experiment = Experiment(Loop(model), N)
     basis = FirBasis(0)
-    M = experiment.baseline_information + power * basis.integrals(
-        experiment.information_density, experiment.singularities
-    )[0]
+    M = (
+        experiment.baseline_information
+        + power * basis.integrals(experiment.information_density, experiment.singularities)[0]
+    )
     y_power = (b * b * power + variance) / (1 - a * a)
     np.testing.assert_allclose(M, N / variance * np.diag([y_power, power]), rtol=1e-10, atol=1e-8)
 
@@ -122,4 +123,4 @@ def test_parameters_that_cannot_be_told_apart_are_named():
         Experiment(Loop(model), 100).whitened(1.0)
     complaint = error.value.complaints[0]
     assert complaint.code == "not-identifiable"
-    assert "b2, f1, f2" in complaint.message   # moving the common root changes just these
+    assert "b2, f1, f2" in complaint.message  # moving the common root changes just these

@@ -46,7 +46,10 @@ def test_gradients_equal_finite_differences(structure):
     h = 1e-6
     for k in range(len(model.names)):
         step = h * np.eye(len(model.names))[k]
-        up, down = bode(with_theta(model, model.theta + step), W), bode(with_theta(model, model.theta - step), W)
+        up, down = (
+            bode(with_theta(model, model.theta + step), W),
+            bode(with_theta(model, model.theta - step), W),
+        )
         for analytic, plus, minus in ((response.dG, up[0], down[0]), (response.dH, up[1], down[1])):
             difference = (plus - minus) / (2 * h)
             np.testing.assert_allclose(
@@ -84,7 +87,7 @@ def test_unstable_plant_in_a_stable_loop_has_finite_gradients():
     loop = Loop(model, Rational.build([0.5]))
     loop.check_stability()
     t = loop.responses(np.array([0.0]))
-    assert t.y_x[0] == pytest.approx(2.0)          # 1 / C at DC
+    assert t.y_x[0] == pytest.approx(2.0)  # 1 / C at DC
     assert abs(t.u_x[0]) == pytest.approx(0.0)
     assert np.all(np.isfinite(model.prediction_gradient(np.array([0.0]), t.y_x, t.u_x, np.zeros(1))))
 

@@ -70,7 +70,7 @@ def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
     den, nc = (controller.denominator_polynomial, controller.numerator) if controller else ([1.0], [0.0])
     plant = np.convolve(model.A, model.F)
     feedback = np.zeros(50)
-    for t in range(50):        # the loop, sample by sample
+    for t in range(50):  # the loop, sample by sample
         y[t] = sum(model.B[i] * u[t - i] for i in range(1, len(model.B)) if t >= i) - sum(
             plant[i] * y[t - i] for i in range(1, len(plant)) if t >= i
         )
@@ -93,7 +93,7 @@ def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
     h = 1e-6
     for k in range(len(model.names)):
         if model.names[k][0] in "cd":
-            continue               # the noise parameters act on epsilon, which is zero here
+            continue  # the noise parameters act on epsilon, which is zero here
         step = h * np.eye(len(model.names))[k]
         difference = -(residual(model.theta + step) - residual(model.theta - step)) / (2 * h)
         np.testing.assert_allclose(found[:, k], difference, rtol=1e-4, atol=1e-6 * np.abs(found).max())
