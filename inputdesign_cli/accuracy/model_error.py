@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.admissible import AdmissibleError
@@ -90,9 +89,7 @@ class ModelError:
 
 def _inverse_factor(information: Array) -> Array:
     """K (k, k) with K^T K = M^-1."""
-    return scipy.linalg.solve_triangular(
-        np.linalg.cholesky(information), np.eye(len(information)), lower=True, check_finite=False
-    )
+    return np.linalg.inv(np.linalg.cholesky(information))
 
 
 def _norms(factor: Array, rows: NDArray[np.float64]) -> Array:

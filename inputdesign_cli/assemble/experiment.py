@@ -99,7 +99,7 @@ def _prior(spec: Spec, model: PolynomialModel) -> np.ndarray | None:
             )
     if len(matrix) != len(names):
         raise spec.complain(
-            "wrong-size",
+            "wrong-shape",
             f"the prior information is {len(matrix)} x {len(matrix)}, but there are {len(names)} parameters",
             hint=f"order its rows as {', '.join(model.names)}, or name its parameters",
             key=f"{key}.information",

@@ -76,6 +76,7 @@ def solve_conic(
             cones.append(clarabel.PSDTriangleConeT(block.order))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.max_threads = 1  # these programs are small: threads cost more than they gain
     settings.max_iter = max_iterations
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     n = q.size

@@ -30,6 +30,8 @@ _WORTH_REPAIRING = 1.5
 _MEETS = 1e-12
 _FIRST_CUTS = 0.3
 _MORE_CUTS = 6
+_HALVINGS = 6
+_BINDS = 1e-5
 _STAGE_TOLERANCE = 1e-2
 _STAGE_ROUNDS = 10
 # Rounds without a tenth of progress after which rounding has the last word.
@@ -69,7 +71,7 @@ def exchange(problem: Problem, start: Array, *, tolerance: float) -> ExchangeRes
         tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
             when the solver makes no more progress: its `gap` says so.
     """
-    stages = [replace(problem, basis=coarse) for coarse in problem.basis.coarser()] + [problem]
+    stages = [problem.coarsened(coarse) for coarse in problem.basis.coarser()] + [problem]
     state = _first_state(stages[0], start)
     rounds = 0
     for stage in stages:
@@ -133,7 +135,8 @@ class _State:
         if proved.bound > self.certificate.bound:
             self.certificate = proved
             self.active = _active(self.keys, multipliers)
-        x = self.face.columns @ y
+        x = self._definite(self.face.columns @ y)
+        self._prune(multipliers)
         found = problem.violations(problem.information(x), above=1.0)
         if max((v.ratio for _, v in found), default=1.0) <= _WORTH_REPAIRING:
             candidate = _scaled(problem, x, [(i, v.frequency) for i, v in found])
@@ -144,6 +147,25 @@ class _State:
             self.problem = replace(problem, basis=basis)
             self.best = replace(self.best, x=np.pad(self.best.x, (0, basis.size - self.best.x.size)))
         return True
+
+    def _prune(self, multipliers: list[Array]) -> None:
+        """Drop the cuts that do not bind; each costs the solver a k x k cone, and can come back."""
+        weights = np.array([np.trace(m) for m in multipliers])
+        kept = np.flatnonzero(weights > _BINDS * weights.sum())
+        self.keys = [self.keys[i] for i in kept]
+        self.cuts = [self.cuts[i] for i in kept]
+        self.multipliers = [multipliers[i] for i in kept]
+
+    def _definite(self, x: Array) -> Array:
+        """`x`, or a point halfway to the best spectrum when x leaves some parameter without information."""
+        for _ in range(_HALVINGS):
+            try:
+                np.linalg.cholesky(self.problem.information(x))
+            except np.linalg.LinAlgError:
+                x = 0.5 * (x + self.best.x)
+            else:
+                return x
+        return self.best.x
 
     def moved_to(self, problem: Problem) -> _State:
         """The same knowledge for a richer family of spectra: its first face comes from the prices so far."""
@@ -197,11 +219,14 @@ def _scaled(problem: Problem, x: Array, found: list[tuple[int, float | None]]) -
 
 def _smallest_factor(problem: Problem, x: Array, at: set[tuple[int, float | None]], factor: float) -> float:
     excited = problem.information(x) - problem.baseline_information
+    places: dict[int, list[float | None]] = {}
+    for index, frequency in at:
+        places.setdefault(index, []).append(frequency)
 
     def excess(f: float) -> float:
         information = problem.baseline_information + f * excited
-        ratios = [float(problem.requirements[i].ratios(information, np.array([w]))[0]) for i, w in at]
-        return max(ratios, default=0.0) ** 2 - 1.0
+        ratios = [problem.requirements[i].ratios(information, np.array(w)).max() for i, w in places.items()]
+        return float(max(ratios, default=0.0)) ** 2 - 1.0
 
     value = excess(factor)
     while value > _MEETS:

@@ -7,7 +7,7 @@ M(x) = M0 + sum_i x_i M_i meeting every requirement.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,17 +27,25 @@ class Problem:
     """A least-cost design.
 
     `cost` weighs the powers of input, output and excitation (least-costly paper, (18)).
-    `requirements` are made for the coordinates of `experiment`.
+    `requirements` are made for the coordinates of `experiment`. `finer` is the same problem for a
+    larger basis, of whose integrals those of this basis are the head.
     """
 
     experiment: Experiment
     basis: Basis
     cost: Mapping[PowerKind, float]
     requirements: tuple[Requirement, ...]
+    finer: Problem | None = None
+
+    def coarsened(self, basis: Basis) -> Problem:
+        """The same problem for a smaller basis of the same family (see `Basis.coarser`)."""
+        return replace(self, basis=basis, finer=self)
 
     @cached_property
     def information_map(self) -> NDArray[np.float64]:
         """(size, k, k): M_i, the information of each basis function."""
+        if self.finer is not None:
+            return self.finer.information_map[: self.basis.size]
         return self.basis.integrals(self.experiment.information_density, self.experiment.singularities)
 
     @property
@@ -52,6 +60,8 @@ class Problem:
     @cached_property
     def price(self) -> Functional:
         """The cost as a functional of the spectrum."""
+        if self.finer is not None:
+            return Functional(self.finer.price.vector[: self.basis.size], self.finer.price.density)
         parts = [self.power(kind) * weight for kind, weight in self.cost.items() if weight > 0]
         total = parts[0]
         for part in parts[1:]:

@@ -124,6 +124,10 @@ class Experiment:
         """An information matrix (k, k) of raw parameters in these coordinates."""
         return self.whiten_rows(self.whiten_rows(information).T)
 
+    @cached_property
+    def _inverse_factor(self) -> Array:
+        return scipy.linalg.solve_triangular(self.factor, np.eye(self.size), lower=True)
+
     def to_raw(self, information: Array) -> Array:
         """An information matrix of these coordinates in raw parameters."""
         if self.factor is None:
@@ -141,7 +145,7 @@ class Experiment:
         """Gradients (n, k) of raw parameters in these coordinates."""
         if self.factor is None:
             return rows
-        return scipy.linalg.solve_triangular(self.factor, rows.T, lower=True).T
+        return rows @ self._inverse_factor.T
 
     def _check_rank(self, triangle: Array) -> None:
         _, singular, vectors = np.linalg.svd(triangle)
