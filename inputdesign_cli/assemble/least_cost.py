@@ -159,7 +159,11 @@ def _result(spec: Spec, task: Task, solution: LeastCost, how: dict[str, Any]) ->
             "parameters": list(experiment.model.names),
             "matrix": experiment.to_raw(found.information),
         },
-        "spectrum": {"type": "fir", "order": task.basis.order, "coefficients": found.x},
+        "spectrum": {
+            "type": "fir" if task.basis.order else "white",
+            "order": task.basis.order,
+            "coefficients": found.x,
+        },
         "baseline": {
             "white": {
                 "cost": white_cost,
