@@ -386,6 +386,11 @@ CODES: dict[str, Explanation] = {
         "The design and the proved lower bound stayed further apart than 100 solver.tolerance.",
         "Loosen solver.tolerance, lower the order, or rescale a nearly unidentifiable model.",
     ),
+    "numerically-singular": Explanation(
+        "The information matrix is singular to working precision",
+        "Some parameters are so nearly indistinguishable that double precision cannot tell them apart.",
+        "Lower the orders, or look for poles and zeros that nearly cancel.",
+    ),
     "solver-failed": Explanation(
         "The solver failed",
         "The grid program of solver.method lmi ended without an answer.",

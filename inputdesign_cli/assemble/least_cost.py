@@ -90,9 +90,20 @@ def solve_least_cost(spec: Spec) -> Outcome:
 
 
 def _by_exchange(spec: Spec, task: Task) -> tuple[LeastCost, dict[str, Any]]:
-    solution = least_cost(
-        task.experiment, task.basis, task.cost, task.factories, tolerance=spec.solver.tolerance
-    )
+    try:
+        solution = least_cost(
+            task.experiment, task.basis, task.cost, task.factories, tolerance=spec.solver.tolerance
+        )
+    except np.linalg.LinAlgError as error:
+        raise InaccurateError(
+            Complaint(
+                "numerically-singular",
+                "the information matrix is singular to working precision: the parameters are nearly "
+                "indistinguishable",
+                hint="lower the orders, or look for poles and zeros that nearly cancel",
+                key="plant",
+            )
+        ) from error
     result = solution.result
     gap = result.gap
     if gap > _ALMOST * spec.solver.tolerance:

@@ -76,7 +76,7 @@ def exchange(problem: Problem, start: Array, *, tolerance: float) -> ExchangeRes
     rounds = 0
     for stage in stages:
         if stage is not stages[0]:
-            state = state.moved_to(stage)
+            state = state.moved_to(stage) if state.solved else _first_state(stage, start)
         goal = tolerance if stage is problem else max(_STAGE_TOLERANCE, tolerance)
         gaps: list[float] = []
         for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
@@ -169,8 +169,7 @@ class _State:
 
     def moved_to(self, problem: Problem) -> _State:
         """The same knowledge for a richer family of spectra: its first face comes from the prices so far."""
-        if self.solved is None:
-            raise ValueError("a stage is left only after it was solved")
+        assert self.solved is not None
         x = np.pad(self.best.x, (0, problem.basis.size - self.best.x.size))
         proved = certify(problem, self.cuts[: len(self.multipliers)], self.multipliers)
         _, face = problem.basis.enlarge(*self.solved, proved.directions, problem.price)
