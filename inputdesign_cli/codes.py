@@ -320,6 +320,12 @@ CODES: dict[str, Explanation] = {
         "The current folder has no golden/*.yaml, and the package installs none.",
         "Name golden files, or work in a checkout.",
     ),
+    "needs-band": Explanation(
+        "The band of the excitation is missing",
+        "A sampled system has frequencies up to pi/sample_time; in continuous time they have no end, and an "
+        "excitation of limited power must be told where it may be.",
+        "Add limits.band, or choose a polynomial spectrum with its band.",
+    ),
     # The plant, its loop and its parameters
     "unstable-loop": Explanation(
         "The loop is unstable",
@@ -347,6 +353,36 @@ CODES: dict[str, Explanation] = {
         "The controller is zero",
         "Without feedback the sensitivity is one whatever the model, so it asks nothing of the model.",
         "Give the controller of the loop that is to be kept.",
+    ),
+    # The loop that the model will serve
+    "not-square": Explanation(
+        "A plant or a loop that is not square",
+        "The controller is computed with the inverse of the plant, so it needs as many inputs as outputs, "
+        "and the desired loop from reference to output has that size too.",
+        "Choose as many inputs as outputs; write t for t I, or a square matrix.",
+    ),
+    "singular-plant": Explanation(
+        "A plant without an inverse",
+        "Its determinant vanishes at every frequency: some combination of the outputs cannot be moved.",
+        "Check the gains in B, or leave out an input and an output.",
+    ),
+    "non-minimum-phase": Explanation(
+        "A plant whose inverse is unstable",
+        "Model-reference and minimum-variance control cancel the zeros of the plant. A zero outside the unit "
+        "circle becomes an unstable pole of the controller.",
+        "Use internal_model, which keeps such zeros and the delay in the loop.",
+    ),
+    "infinite-criterion": Explanation(
+        "A zero of the plant on the unit circle",
+        "The controller would have a pole there, and any error of the model at that frequency an infinite "
+        "effect on the loop.",
+        "Let the desired loop vanish there too by choosing another plant model or control law.",
+    ),
+    "delay-too-short": Explanation(
+        "A desired loop that is not strictly proper enough",
+        "The loop from reference to output cannot be faster than the plant: the desired loop needs at least "
+        "the delay of the plant, or else the controller would use future outputs.",
+        "Begin the numerator in q^-1 with as many zeros as the message says, or use internal_model.",
     ),
     # Accuracy and its data
     "admissible-not-positive": Explanation(
@@ -393,8 +429,212 @@ CODES: dict[str, Explanation] = {
     ),
     "solver-failed": Explanation(
         "The solver failed",
-        "The grid program of solver.method lmi ended without an answer.",
-        "Use solver.method exchange.",
+        "The grid program of solver.method lmi, or that of a parametric closed_loop_error, ended without an "
+        "answer.",
+        "Use solver.method exchange, or covariance: asymptotic.",
+    ),
+    "infeasible": Explanation(
+        "The requirements cannot be met within the limits",
+        "A certificate proves it: multipliers of the requirements and limits that no spectrum of this type "
+        "can satisfy together. The message says how much power would be needed with the other limits kept, "
+        "and how much the accuracy would have to be loosened instead.",
+        "Raise the limit that the message names, loosen the requirement, take more samples, or use a richer "
+        "spectrum (a higher order, or type: free).",
+    ),
+    "contradictory-limits": Explanation(
+        "Lower limits that upper limits exclude",
+        "No spectrum of this type reaches the lower limits (min) while it keeps to the upper ones (max), "
+        "whatever the accuracy.",
+        "Lower min or raise max of the limits that the message names.",
+    ),
+    "too-long": Explanation(
+        "The shortest experiment is longer than limits.samples",
+        "Within the limits on power, no experiment of limits.samples samples reaches the accuracy; the "
+        "message gives the length that does, and the proved lower bound.",
+        "Allow more samples or more power, or ask for less accuracy.",
+    ),
+    "bad-limit": Explanation(
+        "A limit that this family of spectra cannot keep",
+        "A FIR spectrum never vanishes over a whole band; sinusoids have no density; an upper bound that "
+        "vanishes, or a lower bound above the upper one, leaves no spectrum at all.",
+        "Choose a family that can keep the limit, or change the limit as the message says.",
+    ),
+    "too-few-lines": Explanation(
+        "Sinusoids that cannot tell the parameters apart",
+        "Each sinusoid determines at most two parameters (one at frequency zero or pi), so that fewer lines "
+        "than half the number of parameters leave some of them undetermined at any power.",
+        "Give more frequencies or lines, widen limits.band, or use type: free.",
+    ),
+    "not-exciting": Explanation(
+        "The given excitation leaves parameters undetermined",
+        "The information matrix is singular: some combination of parameters does not influence the predicted "
+        "output at all under this excitation, so that its variance is infinite.",
+        "Excite more frequencies, or drop parameters.",
+    ),
+    "data-wrong-unit": Explanation(
+        "The times of the data are in another unit",
+        "The name of the column of times ends with its unit (time_ms); the spec has another time_unit.",
+        "Set time_unit and sample_time of the spec in that unit, or convert the column.",
+    ),
+    "nothing-to-assess": Explanation(
+        "The spec states no target",
+        "idesign assess compares what data give with what accuracy asks for; a criterion alone can be "
+        "neither met nor missed.",
+        "State model_error, standard_deviation or another requirement under accuracy.",
+    ),
+    "nothing-to-simulate": Explanation(
+        "There is no experiment to simulate",
+        "What is asked is known already without any excitation, so that the design is to do nothing.",
+        "Ask for more accuracy, or give an excitation under spectrum.given.",
+    ),
+    "too-few-samples": Explanation(
+        "There are too few samples for the number of parameters",
+        "An estimate from hardly more samples than parameters follows the noise, and its covariance means "
+        "nothing.",
+        "Record more samples, or lower the orders of the polynomials.",
+    ),
+    "constant-input": Explanation(
+        "The input never changes",
+        "A constant input excites the static gain at most; dynamics cannot be identified from it.",
+        "Check that the right column is named u, and that the signal reached the plant.",
+    ),
+    "constant-output": Explanation(
+        "The output never changes",
+        "A constant output shows neither the input nor noise: most often the logger was stuck or the column "
+        "is another one.",
+        "Check that the right column is named y.",
+    ),
+    "noise-free-data": Explanation(
+        "The data have no noise",
+        "The model reproduces the output to rounding, so that the variance of the noise, and with it every "
+        "confidence region, is zero.",
+        "Use recorded data, or add noise to simulated ones.",
+    ),
+    "data-not-uniform": Explanation(
+        "The samples are not taken at the sample time of the spec",
+        "The column of times must advance by sample_time from row to row; a model of sampled data has no "
+        "meaning otherwise.",
+        "Correct sample_time (or time_unit), fill the gaps, or resample.",
+    ),
+    "nothing-given": Explanation(
+        "There is no excitation to analyse",
+        "idesign analyse evaluates an excitation that stands under spectrum.given; this spec asks for a "
+        "design.",
+        "Write spectrum: {given: {type: white, power: 1}}, {given: {type: multisine, ..}} or "
+        "{given: {signal: u.csv}}, or run idesign solve.",
+    ),
+    "not-sampled": Explanation(
+        "A transfer function in s where one in q^-1 is needed",
+        "The experiment is in discrete time; a weight in s must say how it is sampled.",
+        "Write sample: zoh beside continuous, or give numerator and denominator in q^-1.",
+    ),
+    "zero-parameter": Explanation(
+        "A relative error of a parameter that is zero",
+        "scale: relative measures each parameter by its nominal value, and one of them is zero.",
+        "Use scale: absolute, or drop the parameter from the model.",
+    ),
+    # Sweeps and clusters
+    "bad-range": Explanation(
+        "A range of a sweep is not one",
+        "A range is low:high:step; the step leads from the first number to the second and is not 0.",
+        "Write 0:40:5, or list the values: 0,5,10.",
+    ),
+    "sweep-empty": Explanation(
+        "A sweep that varies nothing",
+        "Neither the spec has a `sweep` block nor does any --set name several values.",
+        "Write --set experiment.samples=250,500,1000, or use `idesign solve` for a single run.",
+    ),
+    "sweep-lengths": Explanation(
+        "Values side by side are not equally many",
+        "With --zip the first values of all keys make the first point, the second the second, and so on.",
+        "Give each key as many values, or leave out --zip for every combination.",
+    ),
+    "sweep-twice": Explanation(
+        "A key is swept twice",
+        "Two --set of one command name several values for the same key.",
+        "Give all values at once: --set key=v1,v2,v3.",
+    ),
+    "sweep-too-large": Explanation(
+        "The sweep has too many points",
+        "Every combination of all values is a point; more than a million are refused.",
+        "Vary fewer keys at once, or take their values side by side with --zip.",
+    ),
+    "sweep-locked": Explanation(
+        "Another sweep is at work in the directory",
+        "One process writes into the directory of a sweep at a time. The lock is that of a living process: "
+        "it ends with it, however it ends.",
+        "Wait for the other sweep, or write into another directory with -o.",
+    ),
+    "output-not-a-sweep": Explanation(
+        "The directory holds something else",
+        "A sweep is written into a new directory, an empty one, or one of an earlier sweep.",
+        "Choose another directory with -o.",
+    ),
+    "worker-lost": Explanation(
+        "A worker ended in the middle of its work",
+        "The process that computed a point, or a batch of simulated runs, was killed, twice: the system may "
+        "have run out of memory.",
+        "Run it again with fewer processes; such points of a sweep are always tried again.",
+    ),
+    "internal-error": Explanation(
+        "An error inside idesign",
+        "The point met an error that idesign did not foresee: a mistake of idesign, not of the spec.",
+        "Please report it with the spec.yaml of the sweep; the other points are not concerned.",
+    ),
+    "cluster-extra": Explanation(
+        "Dask is not installed",
+        "Computing on a cluster needs packages that are not installed by default.",
+        "pip install 'inputdesign-cli[cluster]', on the workers too.",
+    ),
+    "cluster-unreachable": Explanation(
+        "There is no cluster to compute on",
+        "Nothing answers at the address, or the scheduler there has no workers.",
+        "Start `dask scheduler` and `dask worker ADDRESS --nthreads 1`, or compute here with --jobs.",
+    ),
+    "cluster-version": Explanation(
+        "The cluster has another version of idesign",
+        "Every worker must run the same version as the caller: points of one sweep must be comparable.",
+        "Install the same version everywhere.",
+    ),
+    # Regressions
+    "zero-weights": Explanation(
+        "The quantity of interest does not depend on the model",
+        "All weights of the estimated parameters are zero, so its error is the same for every experiment.",
+        "Give accuracy.mean_squared_error.estimated a weight other than 0.",
+    ),
+    "target-out-of-reach": Explanation(
+        "The bias alone exceeds the target",
+        "With delayed copies of one input the regressors cannot be correlated as the bias would need it. "
+        "More energy reduces the variance, not the bias. The message tells the energy up to which this is "
+        "proved, the smallest target and the largest norm of the neglected parameters that can be met.",
+        "Raise the target, bound the neglected parameters more tightly, or estimate more of them.",
+    ),
+    "target-undecided": Explanation(
+        "The target is neither met nor refuted",
+        "The search found no moments that meet it, and the proof that there are none did not close.",
+        "Raise the target, bound the neglected parameters more tightly, or estimate more of them.",
+    ),
+    "bad-period": Explanation(
+        "The periods do not fit the record",
+        "A record consists of a whole number of equal periods, each long enough for the moments.",
+        "Choose a divisor of the number of samples, or change signal.samples.",
+    ),
+    "limits-too-tight": Explanation(
+        "No record within the limits on single samples meets the accuracy",
+        "The spectrum exists, but its records would exceed limits.amplitude or limits.rate. Candidates were "
+        "compressed, clipped and raised as far as the limits allow, and their own information falls short.",
+        "The hint names a length that was found to suffice. Or raise the limits, or loosen the accuracy.",
+    ),
+    "no-sample-rate": Explanation(
+        "The sampling rate does not fit the file format",
+        "A WAV file states its rate as a whole number of samples a second.",
+        "Choose a sample time whose inverse is one, or take signal.mat or signal.csv.",
+    ),
+    "coarse-converter": Explanation(
+        "The converter is too coarse for the signal",
+        "One step of signal.quantisation, 2 range / 2^bits, is larger than a limit on the signal, or the "
+        "offset lies at the end of its range.",
+        "Take more bits or a smaller range, raise the limit, or move the offset.",
     ),
     "not-supported": Explanation(
         "Not in this version",

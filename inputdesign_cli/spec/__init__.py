@@ -9,18 +9,27 @@ from inputdesign_cli.spec.accuracy import (
     Sensitivity,
     WeightedVariance,
 )
-from inputdesign_cli.spec.control import ClosedLoopError, Control, Reference
+from inputdesign_cli.spec.control import (
+    ClosedLoopError,
+    ContinuousMatrixTransfer,
+    Control,
+    DiscreteMatrix,
+    Reference,
+)
+from inputdesign_cli.spec.draft import Draft, read_draft
 from inputdesign_cli.spec.experiment import Cost, Experiment, Noise, Prior, SimulationNoise
 from inputdesign_cli.spec.limits import Limits, PowerLimit, SpectrumLimit, TableFile
 from inputdesign_cli.spec.loading import load_spec, parse_spec
 from inputdesign_cli.spec.model import Spec
 from inputdesign_cli.spec.plant import (
+    ContinuousMatrix,
     ContinuousPlant,
     PolynomialPlant,
     RegressionPlant,
     TrueParameters,
 )
 from inputdesign_cli.spec.realisation import Signal, Simulation, Solver
+from inputdesign_cli.spec.report import Report
 from inputdesign_cli.spec.schema import json_schema
 from inputdesign_cli.spec.spectrum import (
     FirSpectrum,
@@ -36,18 +45,23 @@ from inputdesign_cli.spec.spectrum import (
     PolynomialSpectrum,
     WhiteSpectrum,
 )
+from inputdesign_cli.spec.sweep import Sweep
 from inputdesign_cli.spec.transfer import ContinuousRatio, ContinuousTransfer, DiscreteTransfer
 
 __all__ = [
     "Accuracy",
     "Application",
     "ClosedLoopError",
+    "ContinuousMatrix",
+    "ContinuousMatrixTransfer",
     "ContinuousPlant",
     "ContinuousRatio",
     "ContinuousTransfer",
     "Control",
     "Cost",
+    "DiscreteMatrix",
     "DiscreteTransfer",
+    "Draft",
     "Experiment",
     "FirSpectrum",
     "FreeSpectrum",
@@ -70,6 +84,7 @@ __all__ = [
     "Prior",
     "Reference",
     "RegressionPlant",
+    "Report",
     "Sensitivity",
     "Signal",
     "Simulation",
@@ -77,6 +92,7 @@ __all__ = [
     "Solver",
     "Spec",
     "SpectrumLimit",
+    "Sweep",
     "TableFile",
     "TrueParameters",
     "WeightedVariance",
@@ -84,4 +100,5 @@ __all__ = [
     "json_schema",
     "load_spec",
     "parse_spec",
+    "read_draft",
 ]

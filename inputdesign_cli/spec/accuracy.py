@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
@@ -13,9 +14,9 @@ from inputdesign_cli.spec.fields import (
     Band,
     Denominator,
     FileName,
+    Flag,
     Fraction,
     Names,
-    NonNegative,
     Numbers,
     Numerator,
     Positive,
@@ -139,6 +140,27 @@ class WeightedVariance(Section):
     weight: Transfer | None = Field(default=None, description="The weight W (default 1).")
     max: Positive = Field(description="Largest admissible weighted variance.")
     band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
+    relative: Flag = Field(
+        default=False, description="Whether the variance is of G relative to its nominal value."
+    )
+
+
+Norm = Annotated[
+    float,
+    PlainValidator(partial(number, least=0.0, hint="a norm is not negative; 0 stands for no bias at all")),
+    WithJsonSchema({"type": "number", "minimum": 0}),
+]
+ErrorTarget = Annotated[
+    float,
+    PlainValidator(
+        partial(
+            number,
+            above=0.0,
+            hint="every estimate has some error; remove the key for the least that limits.energy allows",
+        )
+    ),
+    WithJsonSchema({"type": "number", "exclusiveMinimum": 0}),
+]
 
 
 class MeanSquaredError(Section):
@@ -146,8 +168,8 @@ class MeanSquaredError(Section):
 
     estimated: Numbers = Field(description="Weights of the estimated parameters in the quantity of interest.")
     neglected: Numbers | None = Field(default=None, description="Weights of the neglected ones (default 0).")
-    neglected_norm: NonNegative = Field(description="Bound on the norm of the neglected parameters.")
-    target: Positive | None = Field(
+    neglected_norm: Norm = Field(description="Bound on the norm of the neglected parameters.")
+    target: ErrorTarget | None = Field(
         default=None, description="Largest admissible error; absent: the least that limits.energy allows."
     )
 

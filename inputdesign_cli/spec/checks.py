@@ -21,6 +21,7 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (checks_plant.spectrum_fits, ("plant", "spectrum.type")),
     (checks_plant.regression_fits, ("plant", "accuracy.mean_squared_error")),
     (checks_plant.weights_fit, ("plant.sample", "plant.continuous")),
+    (checks_plant.control_fits, ("plant", "accuracy.closed_loop_error")),
     (checks_size.channels, ("plant",)),
     (checks_size.bands, ("plant.sample", "sample_time", "plant.continuous")),
     (checks_size.frequencies, ("plant.sample", "sample_time", "limits.band")),

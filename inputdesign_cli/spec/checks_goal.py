@@ -57,13 +57,11 @@ def goals_agree(spec: Spec) -> Iterator[Finding]:
             f"remove accuracy.{accuracy.goals[0]}, or write objective: best_accuracy",
             path,
         )
-    elif objective == "best_accuracy" and not accuracy.goals:
+    elif objective == "best_accuracy" and not accuracy.goals and accuracy.mean_squared_error is not None:
         yield Finding(
             "contradictory-objective",
-            "best_accuracy needs to know what is best: accuracy holds no criterion",
-            "remove the target of mean_squared_error, or write objective: least_cost"
-            if accuracy.mean_squared_error
-            else "add accuracy.criterion: D (or A, E, T), or write objective: least_cost",
+            "best_accuracy asks for the least mean-squared error, but a target for it is given",
+            "remove the target of mean_squared_error, or write objective: least_cost",
             path,
         )
 
@@ -72,14 +70,15 @@ def limits_present(spec: Spec) -> Iterator[Finding]:
     """Without a limit on power the best experiment has no end, and the shortest is one sample."""
     if not spec.designs or spec.limits.bounds_power:
         return
-    if spec.goal == "best_accuracy" and spec.accuracy.goals:
+    if spec.goal == "best_accuracy" and (spec.accuracy.goals or spec.accuracy.requirements):
+        asked = (*spec.accuracy.goals, *spec.accuracy.requirements)[0]
         regression = isinstance(spec.plant, RegressionPlant)
         key = "limits.energy" if regression else "limits.input_power"
         yield Finding(
             "needs-limits",
-            f"accuracy.{spec.accuracy.goals[0]} asks for the best experiment, but nothing limits its power",
+            f"accuracy.{asked} is to be the best that limits allow, but nothing limits its power",
             f"add {key}" + ("" if regression else ", limits.output_power or limits.excitation_power"),
-            ("limits",) if "limits" in spec.model_fields_set else ("accuracy", spec.accuracy.goals[0]),
+            ("limits",) if "limits" in spec.model_fields_set else ("accuracy", asked),
         )
     if spec.goal == "shortest_experiment":
         yield Finding(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from inputdesign_cli.spec.control import ContinuousMatrixTransfer, DiscreteMatrix
 from inputdesign_cli.spec.experiment import NoiseShape
 from inputdesign_cli.spec.findings import Finding
 from inputdesign_cli.spec.model import Spec
 from inputdesign_cli.spec.places import Path
-from inputdesign_cli.spec.plant import PolynomialPlant, RegressionPlant, TrueParameters
+from inputdesign_cli.spec.plant import ContinuousMatrix, PolynomialPlant, RegressionPlant, TrueParameters
 from inputdesign_cli.spec.polynomials import check_delay_stable
 from inputdesign_cli.spec.spectrum import FirSpectrum, GivenSpectrum, MomentsSpectrum
 from inputdesign_cli.spec.transfer import DiscreteTransfer
@@ -212,6 +213,36 @@ def regression_fits(spec: Spec) -> Iterator[Finding]:
                 "write one weight per regressor; plant.regression says how many there are",
                 (*path, name),
             )
+
+
+def control_fits(spec: Spec) -> Iterator[Finding]:
+    """The controller inverts the plant, so that plant and desired loop are square and of one size."""
+    error, plant = spec.accuracy.closed_loop_error, spec.plant
+    if error is None or isinstance(plant, RegressionPlant):
+        return
+    if plant.inputs != plant.outputs:
+        yield Finding(
+            "not-square",
+            f"{{key}} designs a controller that inverts the plant, but the plant has "
+            f"{_count(plant.outputs, 'output')} and {_count(plant.inputs, 'input')}",
+            "choose as many inputs as outputs",
+            ("accuracy", "closed_loop_error", "control"),
+        )
+        return
+    target = error.control.model_reference
+    inside = target.continuous if isinstance(target, ContinuousMatrixTransfer) else target
+    if not isinstance(inside, ContinuousMatrix | DiscreteMatrix):
+        return
+    rows = inside.numerator_matrix
+    if (len(rows), len(rows[0])) != (plant.outputs, plant.outputs):
+        step = ("continuous",) if isinstance(target, ContinuousMatrixTransfer) else ()
+        yield Finding(
+            "not-square",
+            f"{{key}} is {len(rows)} x {len(rows[0])}: the loop from reference to output is square, "
+            f"{plant.outputs} x {plant.outputs}",
+            "write one transfer function t for t I, or a square matrix",
+            ("accuracy", "closed_loop_error", "control", "model_reference", *step, "numerator"),
+        )
 
 
 def weights_fit(spec: Spec) -> Iterator[Finding]:

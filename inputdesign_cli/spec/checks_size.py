@@ -32,11 +32,13 @@ def channels(spec: Spec) -> Iterator[Finding]:
         (cost.input_power, ("cost", "input_power"), inputs, "inputs"),
         (cost.output_power, ("cost", "output_power"), outputs, "outputs"),
         (cost.excitation_power, ("cost", "excitation_power"), inputs, "inputs"),
-        (limits.amplitude, ("limits", "amplitude"), inputs, "inputs"),
         (limits.rate, ("limits", "rate"), inputs, "inputs"),
         (signal.amplitudes, ("signal", "amplitudes"), inputs, "inputs"),
         (signal.offset, ("signal", "offset"), inputs, "inputs"),
     ]
+    if limits.amplitude is not None:
+        sized.append((limits.amplitude.input, ("limits", "amplitude", "input"), inputs, "inputs"))
+        sized.append((limits.amplitude.output, ("limits", "amplitude", "output"), outputs, "outputs"))
     for key, size, noun in (
         ("input_power", inputs, "inputs"),
         ("output_power", outputs, "outputs"),

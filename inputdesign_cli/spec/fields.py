@@ -14,7 +14,9 @@ from inputdesign_cli.spec.values import (
     PolynomialMatrix,
     band,
     denominator,
+    flag,
     fraction,
+    harmonics,
     matrix,
     name,
     not_zero,
@@ -52,6 +54,7 @@ _CONTINUOUS = {1: _ONE, 2: "a list of factors", 3: "rows (outputs) of columns (i
 
 Number = Annotated[float, PlainValidator(number), WithJsonSchema(_NUMBER)]
 Positive = Annotated[float, PlainValidator(_POSITIVE), WithJsonSchema(_POSITIVE_SCHEMA)]
+Cap = Annotated[float, PlainValidator(_CAP), WithJsonSchema(_POSITIVE_SCHEMA)]
 NonNegative = Annotated[float, PlainValidator(_WEIGHT), WithJsonSchema(_WEIGHT_SCHEMA)]
 Fraction = Annotated[
     float, PlainValidator(fraction), WithJsonSchema({**_POSITIVE_SCHEMA, "exclusiveMaximum": 1})
@@ -67,6 +70,22 @@ Count = Annotated[
 Index = Annotated[
     int, PlainValidator(partial(whole, least=0)), WithJsonSchema({"type": "integer", "minimum": 0})
 ]
+RegisterLength = Annotated[
+    int,
+    PlainValidator(partial(whole, least=2, most=32)),
+    WithJsonSchema({"type": "integer", "minimum": 2, "maximum": 32}),
+]
+Harmonics = Annotated[
+    int | str | tuple[int, ...],
+    PlainValidator(harmonics),
+    _any(
+        {"type": "integer", "minimum": 1},
+        {"const": "odd"},
+        {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1},
+    ),
+]
+"""How many harmonics of a period, "odd", or which."""
+Flag = Annotated[bool, PlainValidator(flag), WithJsonSchema({"type": "boolean"})]
 Text = Annotated[str, PlainValidator(text), WithJsonSchema({"type": ["string", "number", "boolean"]})]
 FileName = Annotated[
     str,
@@ -141,6 +160,12 @@ GainMatrix = Annotated[
     PlainValidator(partial(polynomials, depths=_MATRIX)),
     _any(_NUMBERS, _ROWS),
 ]
+RowsMatrix = Annotated[
+    PolynomialMatrix,
+    PlainValidator(partial(polynomials, depths={3: _MATRIX[3]})),
+    WithJsonSchema(_ROWS),
+]
+"""A matrix of polynomials, never a single one."""
 ContinuousDenominator = Annotated[
     Polynomial | PolynomialList | PolynomialMatrix,
     PlainValidator(partial(denominator, depths=_CONTINUOUS)),

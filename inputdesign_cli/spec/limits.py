@@ -8,10 +8,10 @@ from pydantic import Discriminator, Field, model_validator
 
 from inputdesign_cli.spec.fields import (
     Band,
+    Cap,
     Count,
     FileName,
     NonNegative,
-    Positive,
     PositivePerChannel,
     WeightPerChannel,
 )
@@ -101,6 +101,27 @@ class SpectrumLimit(Section):
 Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 
 
+class AmplitudeLimit(Section):
+    """Bounds on single samples of what the excitation causes, noise and operating point not counted."""
+
+    input: PositivePerChannel | None = Field(
+        default=None, description="Largest |u|; a number or one per input."
+    )
+    output: PositivePerChannel | None = Field(
+        default=None, description="Largest |y| of the simulated output; a number or one per output."
+    )
+
+    @model_validator(mode="after")
+    def _some(self) -> AmplitudeLimit:
+        findings = Findings()
+        if self.input is None and self.output is None:
+            hint = "write a number, or {input: 1, output: 2}"
+            finding = Finding("missing-key", "{key} needs input or output", hint, keys=("input", "output"))
+            findings.append(finding)
+        findings.stop()
+        return self
+
+
 class Limits(Section):
     """What the experiment may not exceed; all are optional."""
 
@@ -112,14 +133,14 @@ class Limits(Section):
     )
     excitation_power: Power | None = Field(default=None, description="Power of r: number, list, {min, max}.")
     samples: Count | None = Field(default=None, description="Largest number of samples.")
-    amplitude: PositivePerChannel | None = Field(
-        default=None, description="Largest |u|; a number or one per input."
+    amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = Field(
+        default=None, description="Largest |u|: a number or one per input; or {input, output}."
     )
     rate: PositivePerChannel | None = Field(
         default=None,
         description="Largest change of u from one sample to the next; a number or one per input.",
     )
-    energy: Positive | None = Field(default=None, description="Power summed over the samples (trace R).")
+    energy: Cap | None = Field(default=None, description="Power summed over the samples (trace R).")
     band: Band | None = Field(default=None, description="The excitation vanishes outside these frequencies.")
     spectrum: Annotated[SpectrumLimit, Shorthand("max", {"type": "number", "exclusiveMinimum": 0})] | None = (
         Field(default=None, description="Bounds on the density at every frequency: a number, or {max, min}.")

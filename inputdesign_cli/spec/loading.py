@@ -45,9 +45,17 @@ def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Sp
     return _parse(read_text(path), os.fspath(path), overrides, FilePath(path).parent)
 
 
-def parse_spec(text: str, file: str = "<spec>", overrides: Sequence[str] = ()) -> Spec:
-    """Read a spec from its text; `file` is the name in complaints. Raises `SpecError` as `load_spec` does."""
-    return _parse(text.removeprefix("\ufeff"), file, overrides, FilePath())
+def parse_spec(
+    text: str, file: str = "<spec>", overrides: Sequence[str] = (), *, folder: FilePath | None = None
+) -> Spec:
+    """Read a spec from its text. Raises `SpecError` as `load_spec` does.
+
+    Parameters
+    ----------
+    file : the name in complaints.
+    folder : what the paths in the spec are relative to (default: the current folder).
+    """
+    return _parse(text.removeprefix("\ufeff"), file, overrides, folder or FilePath())
 
 
 def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> Spec:

@@ -17,9 +17,11 @@ from inputdesign_cli.spec.limits import Limits
 from inputdesign_cli.spec.places import parse_key
 from inputdesign_cli.spec.plant import Plant
 from inputdesign_cli.spec.realisation import Signal, Simulation, Solver
+from inputdesign_cli.spec.report import Report
 from inputdesign_cli.spec.section import Section
 from inputdesign_cli.spec.source import Source
 from inputdesign_cli.spec.spectrum import GivenSpectrum, Spectrum
+from inputdesign_cli.spec.sweep import Sweep
 from inputdesign_cli.spec.writer import fingerprint, to_yaml
 
 Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
@@ -64,6 +66,8 @@ class Spec(Section):
     signal: Signal = Field(default=Signal(), description="The time series that realises the spectrum.")
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")
     simulation: Simulation | None = Field(default=None, description="Monte Carlo study on the true system.")
+    report: Report = Field(default=Report(), description="What the figures show.")
+    sweep: Sweep | None = Field(default=None, description="What `idesign sweep` varies.")
 
     _source: Source = PrivateAttr(default_factory=Source)
 

@@ -107,17 +107,8 @@ class ContinuousMatrix(Section):
     def _shapes(self) -> ContinuousMatrix:
         findings = Findings()
         numerators = as_matrix(self.numerator)
-        _check_gain(findings, numerators, "numerator")
-        entrywise = depth(self.denominator) == 3
-        if entrywise and _size(self.denominator) != _size(numerators):
-            findings.add(
-                "wrong-shape",
-                "{key} must have the shape of the numerator: " + _shape_words(self.numerator),
-                "or write one polynomial, a denominator common to all entries",
-                "denominator",
-            )
-            findings.stop()
-        for path, factor in _with_paths(self.denominator):
+        check_shapes(findings, self.numerator, self.denominator)
+        for path, factor in with_paths(self.denominator):
             if finding := check_left_half_plane(factor):
                 findings.add(finding.code, finding.message, finding.hint, "denominator", *path)
         for i, row in enumerate(numerators):
@@ -135,10 +126,7 @@ class ContinuousMatrix(Section):
     @property
     def denominator_matrix(self) -> PolynomialMatrix:
         """The denominators in the same form, factors multiplied out."""
-        if depth(self.denominator) == 3:
-            return as_matrix(self.denominator)
-        common = product(factor for _, factor in _with_paths(self.denominator))
-        return tuple(tuple(common for _ in row) for row in self.numerator_matrix)
+        return denominators_of(self.numerator, self.denominator)
 
 
 class ContinuousPlant(Section, family="plant", phrase=_CONTINUOUS):
@@ -235,10 +223,32 @@ def per_output(value: tuple, outputs: int) -> tuple[Polynomial, ...]:
     return value if depth(value) == 2 else (value,) * outputs
 
 
-def _with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
+def check_shapes(findings: Findings, numerator: tuple, denominator: tuple) -> None:
+    """The numerator is not zero, and denominators for each entry have its shape; stops if not."""
+    _check_gain(findings, as_matrix(numerator), "numerator")
+    if depth(denominator) == 3 and _size(denominator) != _size(as_matrix(numerator)):
+        findings.add(
+            "wrong-shape",
+            "{key} must have the shape of the numerator: " + _shape_words(numerator),
+            "or write one polynomial, a denominator common to all entries",
+            "denominator",
+        )
+        findings.stop()
+
+
+def denominators_of(numerator: tuple, denominator: tuple) -> PolynomialMatrix:
+    """Denominators as rows of columns, those that are common repeated and factors multiplied out."""
+    if depth(denominator) == 3:
+        return as_matrix(denominator)
+    common = product(factor for _, factor in with_paths(denominator))
+    return tuple(tuple(common for _ in row) for row in as_matrix(numerator))
+
+
+def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
+    """Every polynomial of a nested value with the indices that lead to it."""
     if depth(value) == 1:
         return [((), value)]
-    return [((i, *path), p) for i, part in enumerate(value) for path, p in _with_paths(part)]
+    return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
 
 
 def _check_gain(findings: Findings, entries: PolynomialMatrix, name: str) -> None:

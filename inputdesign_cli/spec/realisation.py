@@ -7,7 +7,16 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from inputdesign_cli.spec.experiment import SimulationNoise
-from inputdesign_cli.spec.fields import Count, Index, PerChannel, PositivePerChannel, Tolerance
+from inputdesign_cli.spec.fields import (
+    Count,
+    Harmonics,
+    Index,
+    PerChannel,
+    Positive,
+    PositivePerChannel,
+    RegisterLength,
+    Tolerance,
+)
 from inputdesign_cli.spec.findings import Findings
 from inputdesign_cli.spec.plant import TruePlant
 from inputdesign_cli.spec.section import Section
@@ -15,7 +24,22 @@ from inputdesign_cli.spec.section import Section
 SignalType = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
 
 # Settings that mean something for some types of signal only.
-_ONLY_FOR = {"phases": ("multisine",), "lines": ("multisine",), "bits": ("prbs",)}
+_ONLY_FOR = {
+    "phases": ("multisine",),
+    "lines": ("multisine", "binary", "ternary"),
+    "ramp": ("filtered_noise", "multisine", "white"),
+    "bits": ("prbs",),
+    "order": ("filtered_noise",),
+}
+
+
+class Quantisation(Section):
+    """The digital-to-analogue converter that applies the signal."""
+
+    bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
+    range: Positive = Field(
+        description="They span [-range, range), in the unit of u, the offset included.", examples=[10.0]
+    )
 
 
 class Signal(Section):
@@ -31,15 +55,37 @@ class Signal(Section):
     )
     periods: Count | None = Field(default=None, description="Number of equal periods.")
     hold: Count | None = Field(default=None, description="Samples for which each value is held.")
-    lines: Count | None = Field(default=None, description="Number of sinusoids of a multisine.")
+    lines: Harmonics | None = Field(
+        default=None, description="Harmonics of a period that are used: their number, odd, or a list."
+    )
     amplitudes: PositivePerChannel | None = Field(
-        default=None, description="Amplitude (level) to scale to; a number or one per input."
+        default=None,
+        description="Amplitude (level) to scale to, whatever it buys; a number or one per input.",
     )
     offset: PerChannel | None = Field(
         default=None, description="Operating point added; a number or one per input."
     )
     ramp: Index | None = Field(default=None, description="Samples over which the signal fades in and out.")
-    bits: Count | None = Field(default=None, description="Length of the shift register of a prbs.")
+    order: Count | None = Field(
+        default=None,
+        description="States for each input of a rational filter for filtered_noise (default: a long filter).",
+    )
+    start: Literal["steady", "zero"] | None = Field(
+        default=None,
+        description="Past of a regression's input: its periodic continuation (default), or zero.",
+    )
+    bits: RegisterLength | None = Field(
+        default=None, description="Length of the shift register of a prbs (default: no repetition)."
+    )
+    quantisation: Quantisation | None = Field(default=None, description="The converter: {bits, range}.")
+    scale: Literal["target", "design"] | None = Field(
+        default=None,
+        description="target: the least power with which the record itself meets the accuracy (default); "
+        "design: the power of the design.",
+    )
+    also: tuple[Literal["mat", "wav"], ...] | None = Field(
+        default=None, description="Other files of the signal beside signal.csv: mat, wav."
+    )
     candidates: Count | None = Field(
         default=None, description="Number of random realisations to choose the best of."
     )
@@ -80,6 +126,11 @@ class Simulation(Section):
     plant: TruePlant | None = Field(default=None, description="The true system (default: the nominal plant).")
     noise: SimulationNoise | None = Field(
         default=None, description="The true noise (default: the nominal noise)."
+    )
+    excitation: Literal["new", "record"] = Field(
+        default="new",
+        description="new: each run realises the spectrum anew (default); record: all runs apply the one "
+        "record that is delivered.",
     )
     compare: tuple[Literal["white", "prbs", "multisine", "binary"], ...] = Field(
         default=(), description="Other inputs to compare with, at equal power."

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 from pydantic_core import PydanticCustomError
@@ -85,6 +86,13 @@ def text(value: Any) -> str:
     return str(value)
 
 
+def flag(value: Any) -> bool:
+    """true or false."""
+    if isinstance(value, bool):
+        return value
+    raise fail("unknown-word", f"{{key}} must be true or false, not {describe(value)}", "write true or false")
+
+
 def name(value: Any, *, what: str) -> str:
     """A non-empty text that names something: `what` says what."""
     if not isinstance(value, str) or not value.strip():
@@ -117,6 +125,24 @@ def collect(findings: Findings, check: Callable[[Any], Any], value: Any, *path: 
 def one_or_several(value: Any, item: Callable[[Any], Any], what: str) -> Any:
     """One value, or a list with one per channel."""
     return several(value, item, what) if isinstance(value, list | tuple) else item(value)
+
+
+def harmonics(value: Any) -> int | str | tuple[int, ...]:
+    """A number of harmonics, the word odd, or a rising list of harmonic numbers."""
+    if isinstance(value, list | tuple):
+        listed: tuple[int, ...] = several(value, partial(whole, least=0), "harmonic numbers")
+        if any(b <= a for a, b in pairwise(listed)):
+            raise fail("not-increasing", "{key} must increase", "sort the harmonics, remove repetitions")
+        return listed
+    if isinstance(value, str):
+        if value != "odd":
+            raise fail(
+                "unknown-word",
+                f"{{key}} has no word {value!r}",
+                "write odd, a number of harmonics, or a list of them",
+            )
+        return value
+    return whole(value, least=1)
 
 
 def polynomial(value: Any, *, check: tuple[Callable[[Polynomial], Finding | None], ...] = ()) -> Polynomial:

@@ -252,8 +252,8 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
         "experiment": "{controller: {numerator: [1], denominator: §[[1e200], [1e200]]}}"}),
     ("contradictory-objective", "objective", "criterion", {
         "accuracy": BEST, "limits": "{input_power: 1}", "objective": "§least_cost"}),
-    ("contradictory-objective", "objective", "criterion", {
-        "limits": "{input_power: 1}", "objective": "§best_accuracy"}),
+    ("needs-limits", "accuracy.model_error", "limits its power", {
+        "accuracy": "{§model_error: {relative: 0.01}}", "objective": "best_accuracy"}),
     ("conflicting-keys", "experiment.samples", "limits.samples (100)", {
         "experiment": "{samples: §500}", "limits": "{samples: 100}"}),
     ("out-of-range", "limits.input_power", "remove the key", {"limits": "{input_power: §0}"}),
@@ -296,6 +296,10 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
     ("conflicting-keys", "simulation.noise.relative_std", "variance", {
         "simulation": "{noise: {variance: 1, §relative_std: 0.1}}"}),
     ("missing-key", "simulation.noise", "variance or relative_std", {"simulation": "{§noise: {C: [1]}}"}),
+    # report
+    ("wrong-shape", "report.ellipses[0]", "two different parameters", {"report": "{ellipses: [§[b1]]}"}),
+    ("wrong-shape", "report.ellipses[1]", "two different", {"report": "{ellipses: [[b1, f1], §[b1, b1]]}"}),
+    ("not-a-text", "report.ellipses[0][1]", "a parameter name", {"report": "{ellipses: [[b1, §2]]}"}),
     # YAML that is read but not wanted
     ("yaml-tag", "plant.B", "remove the tag", {"plant": "{B: §!!python/tuple [0, 1]}"}),
     ("yaml-tag", "sample_time", "float", {"sample_time": "§!!float 1"}),

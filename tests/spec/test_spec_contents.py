@@ -209,6 +209,7 @@ def test_requirements_of_the_contract(accuracy):
         "{criterion: E, scale: relative}",
         "{criterion: A, model_error: {relative: 0.1}}",
         "{closed_loop_error: {control: {internal_model: {numerator: [0.5], denominator: [1, -0.5]}}}}",
+        "{closed_loop_error: {control: {model_reference: {numerator: [[[0, 1]]]}}}}",
         "{closed_loop_error: {control: {minimum_variance: true}, reference: {variance: 2}}}",
     ],
 )
