@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.accuracy.continuous_weight import ContinuousWeight, weight_singularities
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z
 
@@ -125,7 +126,7 @@ class Weighted:
     """r_adm / |W|, so that |W| r_u stays below r_adm."""
 
     inner: AdmissibleError
-    weight: Rational
+    weight: Rational | ContinuousWeight
 
     @property
     def knots(self) -> Array:
@@ -133,8 +134,7 @@ class Weighted:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        own = logarithmic_distance(join_roots([self.weight.poles, self.weight.zeros]))
-        return np.concatenate([self.inner.singularities, own])
+        return np.concatenate([self.inner.singularities, weight_singularities(self.weight)])
 
     def at(self, w: ArrayLike) -> Array:
         return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from inputdesign_cli.accuracy.cuts import Cut
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -18,27 +19,17 @@ class Violation:
     frequency: float | None = None
 
 
-@dataclass(frozen=True)
-class Cut:
-    """One cone that every admissible information matrix satisfies: M >= V V^T, V = `root` (k, q)."""
+class Requirement(Protocol):
+    """A convex condition on the information matrix M (k, k) in the coordinates of the experiment.
 
-    root: Array
-    frequency: float | None = None
+    Its `ratio` is measured as an error is, in standard deviations: with ratio r, the matrix r^2 M just
+    meets the requirement (and no smaller multiple does).
+    """
 
     @property
-    def matrix(self) -> Array:
-        """(k, k): V V^T."""
-        return self.root @ self.root.T
-
-    def proof(self, multiplier: Array) -> tuple[Array, float]:
-        """(Y, r) with tr(Y M) >= r for every admissible M, from a multiplier (k, k) >= 0."""
-        return multiplier, float(np.sum(multiplier * self.matrix))
-
-
-class Requirement(Protocol):
-    """A convex condition on the information matrix M (k, k) in the coordinates of the experiment."""
-
-    name: str
+    def name(self) -> str:
+        """How the spec calls it, for reports."""
+        ...
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """Every local maximum over frequency of the ratio that must not exceed one, if above `above`."""
@@ -51,6 +42,32 @@ class Requirement(Protocol):
     def cut(self, frequency: float | None) -> Cut:
         """The cone that enforces the requirement at this frequency."""
         ...
+
+
+class OneCondition:
+    """The part of a requirement without a frequency: its single ratio stands for all."""
+
+    def ratio(self, information: Array) -> float:
+        """The ratio, see `Requirement`."""
+        raise NotImplementedError
+
+    def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
+        """The one ratio, if above `above`."""
+        ratio = self.ratio(information)
+        return [Violation(ratio)] if ratio > above else []
+
+    def ratios(self, information: Array, frequencies: Array) -> Array:
+        """The one ratio, as often as there are frequencies."""
+        return np.full(np.shape(frequencies), self.ratio(information))
+
+
+def inverse_factor(information: Array) -> Array:
+    """K (k, k) with K^T K = M^-1.
+
+    Raises:
+        LinAlgError: M is singular, that is, some parameter is not excited.
+    """
+    return np.linalg.inv(np.linalg.cholesky(information))
 
 
 def worst(violations: list[Violation]) -> Violation:

@@ -7,35 +7,33 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.information.coordinates import Coordinates, factor_of
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature, integrate
-from inputdesign_cli.plant import Loop, PolynomialModel, logarithmic_distance
+from inputdesign_cli.plant import Fraction, Loop, PolynomialModel, logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 PowerKind = Literal["input", "output", "excitation"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
-_RANK_TOLERANCE = 1e-11
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(Coordinates):
     """N samples of a model in a loop; `prior` (k, k) is information already at hand, in raw parameters.
 
     The excitation x is u in open loop and r in closed loop (u = r - C y).
 
-    `factor` L (k, k), lower triangular, sets the coordinates of every gradient and information
-    matrix: gradients are L^-1 F and M = L M~ L^T. Raw parameters correspond to L = I; there the
-    information matrix easily has a condition number of 1e12, which no solver survives, so designs
-    are computed in the coordinates of `whitened`.
+    `factor` sets its `Coordinates`; designs are computed in those of `whitened`.
     """
 
     loop: Loop
     samples: int
     prior: Array | None = None
     factor: Array | None = None
+
+    band = (0.0, np.pi)
+    inputs = 1
 
     @property
     def model(self) -> PolynomialModel:
@@ -69,29 +67,49 @@ class Experiment:
         """Lambda_G (n, k): the gradient of G, in these coordinates."""
         return self.whiten_rows(self.model.plant_gradient(w))
 
+    def plant_fraction(self, w: ArrayLike) -> Fraction:
+        """G as numerator over denominator, their gradients (n, k) in these coordinates."""
+        part = self.model.fraction(w)
+        return replace(
+            part,
+            numerator_gradient=self.whiten_rows(part.numerator_gradient),
+            denominator_gradient=self.whiten_rows(part.denominator_gradient),
+        )
+
     def information_density(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, k, k): D with M = M0 + (1/2 pi) integral D(w) Phi_x(w) dw, for all N samples."""
         return (self.samples / self.model.variance) * _real_outer(self.excitation_gradient(w))
 
-    def power_density(self, kind: PowerKind, w: ArrayLike) -> Array:
-        """(n,): the factor on Phi_x that gives the spectrum of u_x, y_x or x itself."""
+    def value_density(self, weight: Array, w: ArrayLike) -> Array:
+        """(n,): the density of tr(Y (M - M0)) for a fixed Y = `weight` (k, k)."""
+        F = self.excitation_gradient(w)
+        scale = self.samples / self.model.variance
+        return scale * np.einsum("ni,ij,nj->n", F.conj(), weight, F, optimize=True).real
+
+    def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> Array:
+        """(n,): the factor on Phi_x that gives the spectrum of u_x, y_x or x itself.
+
+        `channel` is for plants with several channels; here the sum over the channels is the only one.
+        """
         if kind == "excitation":
             return np.ones_like(np.asarray(w, dtype=float))
         t = self.loop.responses(w)
         return np.abs(t.u_x if kind == "input" else t.y_x) ** 2
 
     @cached_property
-    def baseline_information(self) -> Array:
-        """(k, k): what is known without any excitation, by the noise in the loop and by `prior`."""
+    def noise_information(self) -> Array:
+        """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
             F = self.noise_gradient(rule.nodes)
             return np.einsum("n,nij->ij", rule.weights, _real_outer(F), optimize=True)
 
-        from_noise = self.samples * integrate(moments, self.singularities)
-        if self.prior is None:
-            return from_noise
-        return from_noise + self.whiten_matrix(self.prior)
+        return self.samples * integrate(moments, self.singularities)
+
+    @property
+    def baseline_information(self) -> Array:
+        """(k, k): what is known without any excitation, by the noise in the loop and by `prior`."""
+        return self.noise_information + self.prior_information
 
     def whitened(self, power: float) -> Experiment:
         """The same experiment in coordinates where white excitation of this power gives M = I.
@@ -114,52 +132,7 @@ class Experiment:
             eigenvalues, vectors = np.linalg.eigh(self.prior)
             rows.append(np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T)
         stacked = np.concatenate(rows)
-        scale = np.linalg.norm(stacked, axis=0)
-        scale[scale == 0.0] = 1.0
-        triangle = np.asarray(np.linalg.qr(stacked / scale, mode="r"))
-        self._check_rank(triangle)
-        return replace(self, factor=(triangle * scale).T)
-
-    def whiten_matrix(self, information: Array) -> Array:
-        """An information matrix (k, k) of raw parameters in these coordinates."""
-        return self.whiten_rows(self.whiten_rows(information).T)
-
-    @cached_property
-    def _inverse_factor(self) -> Array:
-        return scipy.linalg.solve_triangular(self.factor, np.eye(self.size), lower=True)
-
-    def to_raw(self, information: Array) -> Array:
-        """An information matrix of these coordinates in raw parameters."""
-        if self.factor is None:
-            return information
-        return self.factor @ information @ self.factor.T
-
-    def raw_covariance(self, information: Array) -> Array:
-        """P = M^-1 in raw parameters, from an information matrix of these coordinates."""
-        half = scipy.linalg.solve_triangular(np.linalg.cholesky(information), np.eye(self.size), lower=True)
-        if self.factor is not None:
-            half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
-        return half.T @ half
-
-    def whiten_rows(self, rows: NDArray) -> NDArray:
-        """Gradients (n, k) of raw parameters in these coordinates."""
-        if self.factor is None:
-            return rows
-        return rows @ self._inverse_factor.T
-
-    def _check_rank(self, triangle: Array) -> None:
-        _, singular, vectors = np.linalg.svd(triangle)
-        if singular[-1] > _RANK_TOLERANCE * singular[0]:
-            return
-        involved = np.abs(vectors[-1]) > 0.05 * np.abs(vectors[-1]).max()
-        names = ", ".join(name for name, member in zip(self.model.names, involved, strict=True) if member)
-        raise bad_spec(
-            "not-identifiable",
-            f"no excitation can tell these parameters apart: {names}",
-            hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
-            "order too high, and take it out",
-            key="plant",
-        )
+        return replace(self, factor=factor_of(stacked, self.model.names, excitation="excitation"))
 
 
 def _real_outer(F: ComplexArray) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -23,6 +24,7 @@ RELATIVE_ERROR = 1e-11
 _PHASE_PER_PANEL = 16.0
 _MAX_REFINEMENTS = 4
 _ROUNDING = 1e-7
+_NONE = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,11 @@ class Quadrature:
     weights: Array
 
 
-def _edges(lo: float, hi: float, singularities: ComplexArray, longest: float, grading: float) -> Array:
+def _edges(
+    lo: float, hi: float, singularities: ComplexArray, longest: float, grading: float, knots: Array
+) -> Array:
     panels = np.linspace(lo, hi, max(int(np.ceil((hi - lo) / longest)), 1) + 1)
+    panels = np.union1d(panels, knots[(knots > lo) & (knots < hi)])
     left, right = panels[:-1], panels[1:]
     done: list[Array] = []
     near = np.asarray(singularities, dtype=complex)
@@ -49,8 +54,19 @@ def _edges(lo: float, hi: float, singularities: ComplexArray, longest: float, gr
     return np.append(np.sort(starts), hi)
 
 
+@cache
+def _rule() -> tuple[Array, Array]:
+    return leggauss(NODES)
+
+
 def graded_quadrature(
-    singularities: ComplexArray, *, lo: float = 0.0, hi: float = np.pi, highest_lag: int = 0, refine: int = 0
+    singularities: ComplexArray,
+    *,
+    lo: float = 0.0,
+    hi: float = np.pi,
+    highest_lag: int = 0,
+    refine: int = 0,
+    knots: Array = _NONE,
 ) -> Quadrature:
     """Panels on [lo, hi] for integrands with the given singularities times cos(highest_lag w).
 
@@ -58,10 +74,11 @@ def graded_quadrature(
         singularities: complex points (angle + j damping) of the frequency plane, see
             `plant.frequencies.logarithmic_distance`.
         refine: how often every panel is halved, for the check by doubling.
+        knots: frequencies at which the integrand has a kink; panels end there.
     """
     longest = min(0.5, _PHASE_PER_PANEL / max(highest_lag, 1)) / 2**refine
-    edges = _edges(lo, hi, singularities, longest, 1.0 / 2**refine)
-    x, weight = leggauss(NODES)
+    edges = _edges(lo, hi, singularities, longest, 1.0 / 2**refine, knots)
+    x, weight = _rule()
     half = 0.5 * np.diff(edges)[:, None]
     middle = 0.5 * (edges[:-1] + edges[1:])[:, None]
     return Quadrature((middle + half * x).ravel(), (half * weight / np.pi).ravel())
@@ -74,6 +91,7 @@ def integrate(
     lo: float = 0.0,
     hi: float = np.pi,
     highest_lag: int = 0,
+    knots: Array = _NONE,
 ) -> NDArray[np.float64]:
     """`moments(rule)` on a rule that is fine enough, proved by halving every panel.
 
@@ -85,11 +103,16 @@ def integrate(
         InaccurateError: `integral-inaccurate` when refinement does not settle the integrals
             to 1e-11 of the largest entry (a pole on the axis itself).
     """
-    coarse = moments(graded_quadrature(singularities, lo=lo, hi=hi, highest_lag=highest_lag))
+
+    def rule_of(refine: int) -> Quadrature:
+        return graded_quadrature(
+            singularities, lo=lo, hi=hi, highest_lag=highest_lag, refine=refine, knots=knots
+        )
+
+    coarse = moments(rule_of(0))
     earlier = np.inf
     for refine in range(1, _MAX_REFINEMENTS + 1):
-        rule = graded_quadrature(singularities, lo=lo, hi=hi, highest_lag=highest_lag, refine=refine)
-        fine = moments(rule)
+        fine = moments(rule_of(refine))
         scale = np.abs(fine).max(initial=0.0)
         change = np.abs(fine - coarse).max(initial=0.0)
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
@@ -103,3 +126,33 @@ def integrate(
             hint="move the pole inside the unit circle (integrators belong into a stable closed loop)",
         )
     )
+
+
+def integrate_band(
+    moments: Callable[[Quadrature], NDArray[np.float64]],
+    singularities: ComplexArray,
+    band: tuple[float, float],
+    *,
+    highest_lag: int = 0,
+    knots: Array = _NONE,
+) -> NDArray[np.float64]:
+    """The same over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
+
+    The band is stretched to the length of the half circle, for which the panels are laid out.
+    """
+    unit = (band[1] - band[0]) / np.pi
+    near: ComplexArray = np.asarray(singularities, dtype=complex) * (1.0 / unit + 0j)
+
+    def stretched(rule: Quadrature) -> NDArray[np.float64]:
+        return moments(Quadrature(rule.nodes * unit, rule.weights * unit))
+
+    lo, hi = band[0] / unit, band[1] / unit
+    return integrate(stretched, near, lo=lo, hi=hi, highest_lag=highest_lag, knots=knots / unit)
+
+
+def band_quadrature(singularities: ComplexArray, band: tuple[float, float]) -> Quadrature:
+    """One graded rule on the band in any unit of frequency."""
+    unit = (band[1] - band[0]) / np.pi
+    near: ComplexArray = np.asarray(singularities, dtype=complex) * (1.0 / unit + 0j)
+    rule = graded_quadrature(near, lo=band[0] / unit, hi=band[1] / unit)
+    return Quadrature(rule.nodes * unit, rule.weights * unit)

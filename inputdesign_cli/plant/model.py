@@ -32,6 +32,16 @@ class Response:
     dH: ComplexArray  # (n, k, p, p)
 
 
+@dataclass(frozen=True)
+class Fraction:
+    """G = numerator / denominator at n frequencies, both affine in theta: (n,), their gradients (n, k)."""
+
+    numerator: ComplexArray
+    denominator: ComplexArray
+    numerator_gradient: ComplexArray
+    denominator_gradient: ComplexArray
+
+
 def _one() -> Array:
     return np.ones(1)
 
@@ -112,6 +122,24 @@ class PolynomialModel:
         G = evaluate(self.B, q) / (A * F)
         zero = np.zeros_like(G)
         return self._stack(q, {"a": -G / A, "b": 1 / (A * F), "c": zero, "d": zero, "f": -G / F})
+
+    def fraction(self, w: ArrayLike) -> Fraction:
+        """G as a fraction of two polynomials that are affine in theta, at `w` (n,).
+
+        Raises:
+            ValueError: both A and F have free coefficients, so that the denominator is a product.
+        """
+        if len(self.A) > 1 and len(self.F) > 1:
+            raise ValueError("the denominator A F is not affine in the parameters")
+        q = unit_circle(w)
+        one, zero = np.ones_like(q), np.zeros_like(q)
+        none = {"a": zero, "b": zero, "c": zero, "d": zero, "f": zero}
+        return Fraction(
+            numerator=evaluate(self.B, q),
+            denominator=evaluate(self.A, q) * evaluate(self.F, q),
+            numerator_gradient=self._stack(q, {**none, "b": one}),
+            denominator_gradient=self._stack(q, {**none, "a": one, "f": one}),
+        )
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """dH/dtheta at normalised frequencies `w` (n,): (n, k)."""

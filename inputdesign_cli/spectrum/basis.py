@@ -20,16 +20,22 @@ class Functional:
     """A linear functional of the spectrum, (1 / 2 pi) integral of density(w) Phi(w) dw.
 
     `vector` (n,) are its values on the n basis functions; `density` maps frequencies to (number,).
+    A `concentrated` functional also picks up Phi at single frequencies, which its density leaves out.
     """
 
     vector: Array
     density: Density
+    concentrated: bool = False
 
     def __add__(self, other: Functional) -> Functional:
-        return Functional(self.vector + other.vector, lambda w: self.density(w) + other.density(w))
+        return Functional(
+            self.vector + other.vector,
+            lambda w: self.density(w) + other.density(w),
+            self.concentrated or other.concentrated,
+        )
 
     def __mul__(self, factor: float) -> Functional:
-        return Functional(factor * self.vector, lambda w: factor * self.density(w))
+        return Functional(factor * self.vector, lambda w: factor * self.density(w), self.concentrated)
 
     __rmul__ = __mul__
 
@@ -100,7 +106,8 @@ class Basis(Protocol):
 def pointwise_scale(price: Functional, value: Functional, grid: Array) -> tuple[float, Array, Array]:
     """The largest s for which price(w) >= s value(w) at every frequency.
 
-    Valid for every spectrum whatever, since every spectrum is a mixture of sinusoids.
+    Valid for every spectrum whatever, since every spectrum is a mixture of sinusoids. What a price picks
+    up at single frequencies only adds to it and is left out; a value that does proves nothing (s = 0).
 
     Returns:
         s, and the local maxima of value / price over [grid[0], grid[-1]]: frequencies and ratios.
@@ -116,4 +123,6 @@ def pointwise_scale(price: Functional, value: Functional, grid: Array) -> tuple[
 
     peaks, heights = local_maxima(ratio, grid, ratio(grid))
     top = heights.max(initial=0.0)
+    if value.concentrated:
+        return 0.0, peaks, heights
     return (np.inf if top <= 0 else 1.0 / top), peaks, heights

@@ -6,7 +6,7 @@ reaches is reached by finitely many sinusoids (Caratheodory).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,18 +23,19 @@ class LinesBasis:
     """The unknowns are the powers (mean squares) of sinusoids at `frequencies` (L,) in rad/sample.
 
     With `free` the basis grows by the frequencies at which a sinusoid would pay, so that prices
-    hold for every spectrum; without, the frequencies are all there is.
+    hold for every spectrum on `band`; without, the frequencies are all there is.
     """
 
     frequencies: Array
     free: bool = False
+    band: tuple[float, float] = (0.0, np.pi)
 
     @classmethod
     def anywhere(cls, grid: Array) -> LinesBasis:
         """Free frequencies on [grid[0], grid[-1]], to begin with some spread linearly and logarithmically."""
         lo, hi = max(grid[0], 1e-3 * grid[-1]), grid[-1]
         start = np.concatenate([np.linspace(lo, hi, _FIRST_LINES), np.geomspace(lo, hi, _FIRST_LINES)])
-        return cls(np.unique(start), free=True)
+        return cls(np.unique(start), free=True, band=(float(grid[0]), float(grid[-1])))
 
     @property
     def size(self) -> int:
@@ -62,7 +63,8 @@ class LinesBasis:
         if not self.free:
             top = float(np.max(value.vector / price.vector))
             return Pricing(1.0 / top if top > 0 else np.inf, np.zeros(0))
-        scale, peaks, heights = pointwise_scale(price, value, grid)
+        inside = np.union1d(grid[(grid >= self.band[0]) & (grid <= self.band[1])], self.band)
+        scale, peaks, heights = pointwise_scale(price, value, inside)
         return Pricing(scale, peaks[np.argsort(-heights)][:_MOST_NEW])
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
@@ -70,6 +72,6 @@ class LinesBasis:
         new = np.array([w for w in directions if np.min(np.abs(w - self.frequencies)) > 1e-10])
         if new.size == 0:
             return self, face
-        grown = LinesBasis(np.concatenate([self.frequencies, new]), free=True)
+        grown = replace(self, frequencies=np.concatenate([self.frequencies, new]))
         costs = np.concatenate([price.vector, price.density(new)])
         return grown, grown.first_face(Functional(costs, price.density))

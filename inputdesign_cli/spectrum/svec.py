@@ -39,3 +39,30 @@ def smat(vector: Array) -> Array:
     matrix[rows, columns] = vector / scale
     matrix[columns, rows] = vector / scale
     return matrix
+
+
+@lru_cache(maxsize=64)
+def hvec_layout(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, NDArray[np.bool_]]:
+    """Row, column, scale and whether imaginary of each entry of hvec of an (order, order) matrix."""
+    columns, rows = np.tril_indices(order)
+    copies = np.where(rows == columns, 1, 2)
+    imaginary = np.zeros(int(copies.sum()), dtype=bool)
+    imaginary[np.cumsum(copies)[copies == 2] - 1] = True
+    rows, columns = np.repeat(rows, copies), np.repeat(columns, copies)
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0)), imaginary
+
+
+def hvec(matrix: NDArray[np.complex128]) -> Array:
+    """(..., k, k) Hermitian -> (..., k^2) real, by columns; tr(A B) = hvec(A) . hvec(B)."""
+    rows, columns, scale, imaginary = hvec_layout(matrix.shape[-1])
+    entries = matrix[..., rows, columns] * scale
+    return np.where(imaginary, entries.imag, entries.real)
+
+
+def hmat(vector: Array) -> NDArray[np.complex128]:
+    """The inverse of `hvec` for a single vector."""
+    order = round(np.sqrt(vector.size))
+    rows, columns, scale, imaginary = hvec_layout(order)
+    upper = np.zeros((order, order), dtype=complex)
+    np.add.at(upper, (rows, columns), vector / scale * np.where(imaginary, 1j, 1.0))
+    return upper + np.triu(upper, 1).conj().T

@@ -1,0 +1,75 @@
+"""The classical criteria as requirements: D, A, E and T of the information matrix reach the level one.
+
+The best criterion within limits and the least multiple of the limits at which the criterion reaches one
+are the same problem, since all four grow in proportion when M does (in the forms below).
+
+The criterion is that of G M G^T with G = `scaling` (k, k), nonsingular: raw parameters, or parameters
+relative to their nominal values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.linalg
+
+from inputdesign_cli.accuracy.cuts import Cut, DeterminantCut, MatrixCut, TraceCut, VarianceCut
+from inputdesign_cli.accuracy.requirement import OneCondition
+from inputdesign_cli.plant.polynomial import Array
+
+Letter = Literal["D", "A", "E", "T"]
+
+
+@dataclass(frozen=True)
+class Criterion(OneCondition):
+    """(det M)^{1/k} >= 1, 1 / tr(M^-1) >= 1, lambda_min(M) >= 1 or tr(M) >= 1, M standing for G M G^T."""
+
+    letter: Letter
+    scaling: Array
+
+    @property
+    def name(self) -> str:
+        return f"criterion {self.letter}"
+
+    @cached_property
+    def _inverse(self) -> Array:
+        return np.asarray(np.linalg.inv(self.scaling), dtype=float)
+
+    def level(self, information: Array) -> float:
+        """The quantity that must reach one; 0 where M is singular, except for T."""
+        if self.letter == "T":
+            return float(np.sum(self.scaling * (self.scaling @ information)))
+        try:
+            half = scipy.linalg.solve_triangular(np.linalg.cholesky(information), self._inverse, lower=True)
+        except np.linalg.LinAlgError:
+            return 0.0
+        singular = np.linalg.svd(half, compute_uv=False)
+        if self.letter == "D":
+            return float(np.exp(-2.0 * np.log(singular).mean()))
+        return float(1.0 / np.sum(singular**2) if self.letter == "A" else 1.0 / singular[0] ** 2)
+
+    def value(self, level: float) -> float:
+        """What the level stands for: log det M, -tr M^-1, lambda_min(M) or tr M."""
+        if self.letter == "D":
+            return len(self.scaling) * float(np.log(level))
+        return -1.0 / level if self.letter == "A" else level
+
+    def ratio(self, information: Array) -> float:
+        """1 / sqrt(level)."""
+        level = self.level(information)
+        return float(1.0 / np.sqrt(level)) if level > 0 else np.inf
+
+    def cut(self, frequency: float | None) -> Cut:
+        """The criterion itself, as a cone."""
+        if self.letter == "D":
+            return DeterminantCut(
+                float(np.exp(-2.0 * np.linalg.slogdet(self.scaling)[1] / len(self.scaling)))
+            )
+        if self.letter == "A":
+            return VarianceCut(self._inverse)
+        if self.letter == "E":
+            return MatrixCut(self._inverse @ self._inverse.T)
+        return TraceCut(self.scaling.T @ self.scaling)

@@ -1,0 +1,249 @@
+"""The cones that requirements are made of, for a solver, and the linear inequalities that they prove.
+
+Every cone here holds for M whenever it holds for a smaller M, and has the form h * constant + linear
+map of (M, auxiliary unknowns), with h = 1 for a plain requirement. A design that scales M by an
+unknown h scales the constants with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import smat, svec, svec_layout, svec_length
+
+CutKind = Literal["nonnegative", "psd", "exponential"]
+
+
+@dataclass(frozen=True)
+class CutBlock:
+    """h * constant + information svec(M) + auxiliary z in a cone (see `design.conic.Block` for the kinds)."""
+
+    kind: CutKind
+    order: int
+    constant: Array
+    information: sp.csc_matrix
+    auxiliary: sp.csc_matrix
+
+
+class Cut(Protocol):
+    """A convex set of information matrices (k, k) that contains every admissible one.
+
+    `frequency` (rad/sample) is where the requirement asks for it, None when it has no frequency.
+    """
+
+    @property
+    def frequency(self) -> float | None: ...
+
+    def moved(self, congruence: Array) -> Cut:
+        """The same set for K M K^T, K = `congruence` (k, k) nonsingular."""
+        ...
+
+    def blocks(self, size: int) -> list[CutBlock]:
+        """Its cones, all with the same number of auxiliary unknowns; `size` is k."""
+        ...
+
+    def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """(Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.
+
+        Args:
+            multipliers: one array a block, suggestions of a solver; the inequality holds whatever they are.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class MatrixCut:
+    """M >= `matrix` (k, k)."""
+
+    matrix: Array
+    frequency: float | None = None
+
+    def moved(self, congruence: Array) -> MatrixCut:
+        return replace(self, matrix=congruence @ self.matrix @ congruence.T)
+
+    def blocks(self, size: int) -> list[CutBlock]:
+        rows = svec_length(size)
+        return [CutBlock("psd", size, -svec(self.matrix), sp.eye_array(rows, format="csc"), _none(rows))]
+
+    def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        Y = positive_part(smat(multipliers[0]))
+        return Y, float(np.sum(Y * self.matrix))
+
+
+@dataclass(frozen=True)
+class VarianceCut:
+    """tr(V^T M^-1 V) <= 1, V = `directions` (k, q): a sum of variances.
+
+    By a Schur complement [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The inequality is that of Cauchy and
+    Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear norm.
+    """
+
+    directions: Array
+    frequency: float | None = None
+
+    def moved(self, congruence: Array) -> VarianceCut:
+        return replace(self, directions=congruence @ self.directions)
+
+    def blocks(self, size: int) -> list[CutBlock]:
+        q = self.directions.shape[1]
+        order, aux = size + q, svec_length(q)
+        corner = np.zeros((order, order))
+        corner[:size, size:] = self.directions
+        corner[size:, :size] = self.directions.T
+        rows, columns, _ = svec_layout(order)
+        in_corner = np.flatnonzero((rows >= size) & (columns >= size))
+        unknown = sp.csc_matrix((np.ones(aux), (in_corner, np.arange(aux))), (rows.size, aux))
+        information = sp.eye_array(rows.size, svec_length(size), format="csc")
+        trace = sp.csc_matrix(-svec(np.eye(q))[None, :])
+        return [
+            CutBlock("psd", order, svec(corner), information, unknown),
+            CutBlock("nonnegative", 1, np.ones(1), sp.csc_matrix((1, svec_length(size))), trace),
+        ]
+
+    def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        size = self.directions.shape[0]
+        Y = positive_part(smat(multipliers[0])[:size, :size])
+        return Y, float(np.linalg.svd(_root(Y) @ self.directions, compute_uv=False).sum() ** 2)
+
+
+@dataclass(frozen=True)
+class DeterminantCut:
+    """(det M)^{1/k} >= `level`.
+
+    M >= T diag(T)^-1 T^T with T lower triangular, so that log det M >= sum of log diag(T), each bounded
+    from below by an exponential cone. The inequality is that of the arithmetic and geometric means,
+    tr(Y M) >= k (det Y)^{1/k} (det M)^{1/k}.
+    """
+
+    level: float = 1.0
+    frequency: float | None = None
+
+    def moved(self, congruence: Array) -> DeterminantCut:
+        _, logarithm = np.linalg.slogdet(congruence)
+        return replace(self, level=self.level * float(np.exp(2.0 * logarithm / len(congruence))))
+
+    def blocks(self, size: int) -> list[CutBlock]:
+        triangle, entries = svec_length(size), []
+        rows, columns, scale = svec_layout(2 * size)
+        # Entry (j, i) of T stands at (i, size + j) of the block [[M, T], [T^T, diag T]], j >= i.
+        number = {(int(i), int(j)): n for n, (i, j) in enumerate(zip(*np.triu_indices(size), strict=True))}
+        for at, (r, c, weight) in enumerate(zip(rows.tolist(), columns.tolist(), scale, strict=True)):
+            if r < size <= c and r <= c - size:
+                entries.append((at, number[(r, c - size)], weight))
+            elif r == c >= size:
+                entries.append((at, number[(r - size, r - size)], 1.0))
+        at_rows, of, weights = (np.array(part) for part in zip(*entries, strict=True))
+        aux = triangle + size  # T, then the logarithms
+        unknown = sp.csc_matrix((weights, (at_rows, of)), (rows.size, aux))
+        diagonal = [number[(i, i)] for i in range(size)]
+        each = np.arange(size)
+        logarithms = sp.csc_matrix(
+            (np.ones(2 * size), (np.r_[3 * each, 3 * each + 2], np.r_[triangle + each, diagonal])),
+            (3 * size, aux),
+        )
+        total = sp.csc_matrix((np.ones(size), (np.zeros(size, dtype=int), triangle + each)), (1, aux))
+        none = sp.csc_matrix((3 * size, triangle))
+        return [
+            CutBlock(
+                "psd",
+                2 * size,
+                np.zeros(rows.size),
+                sp.eye_array(rows.size, triangle, format="csc"),
+                unknown,
+            ),
+            CutBlock("exponential", size, np.tile([0.0, 1.0, 0.0], size), none, logarithms),
+            CutBlock(
+                "nonnegative", 1, np.array([-size * np.log(self.level)]), sp.csc_matrix((1, triangle)), total
+            ),
+        ]
+
+    def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        block = smat(multipliers[0])
+        size = len(block) // 2
+        Y = positive_part(block[:size, :size])
+        sign, logarithm = np.linalg.slogdet(Y)
+        mean = float(np.exp(logarithm / size)) if sign > 0 else 0.0
+        return Y, size * mean * self.level
+
+
+@dataclass(frozen=True)
+class TraceCut:
+    """tr(W M) >= 1, W = `weight` (k, k) positive semidefinite."""
+
+    weight: Array
+    frequency: float | None = None
+
+    def moved(self, congruence: Array) -> TraceCut:
+        inverse = np.linalg.inv(congruence)
+        return replace(self, weight=inverse.T @ self.weight @ inverse)
+
+    def blocks(self, size: int) -> list[CutBlock]:
+        row = sp.csc_matrix(svec(self.weight)[None, :])
+        return [CutBlock("nonnegative", 1, -np.ones(1), row, _none(1))]
+
+    def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        y = max(float(multipliers[0][0]), 0.0)
+        return y * self.weight, y
+
+
+@dataclass(frozen=True)
+class EllipsoidCut:
+    """x^T Q x <= 0 for every x = (d, 1) with d^T M d <= alpha^2, Q = `form` (k + 1, k + 1).
+
+    By the S-procedure this holds exactly when [[M / alpha^2, 0], [0, -1]] >= nu Q for some nu >= 0
+    (Yakubovich; the ellipsoid has an interior point, so nothing is lost). With a multiplier Z >= 0 of
+    tr(Z Q) >= 0, tr(Z_11 M) / alpha^2 >= Z_22.
+    """
+
+    form: Array
+    alpha: float
+    frequency: float | None = None
+
+    def moved(self, congruence: Array) -> EllipsoidCut:
+        corner = np.eye(len(self.form))
+        corner[:-1, :-1] = congruence
+        return replace(self, form=corner @ self.form @ corner.T)
+
+    def blocks(self, size: int) -> list[CutBlock]:
+        order, entries = size + 1, svec_length(size)
+        corner = np.zeros((order, order))
+        corner[-1, -1] = -1.0
+        information = sp.eye_array(svec_length(order), entries, format="csc") / self.alpha**2
+        unknown = sp.csc_matrix(-svec(self.form)[:, None])
+        return [
+            CutBlock("psd", order, svec(corner), information, unknown),
+            CutBlock("nonnegative", 1, np.zeros(1), sp.csc_matrix((1, entries)), sp.csc_matrix(np.eye(1))),
+        ]
+
+    def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        Z = positive_part(smat(multipliers[0]))
+        missing = -float(np.sum(Z * self.form))
+        if missing > 0.0:
+            # Rounding: a little more of the direction in which the form is largest restores tr(Z Q) >= 0.
+            values, vectors = np.linalg.eigh(self.form[:-1, :-1])
+            if values[-1] <= 0.0:
+                return np.zeros_like(self.form[:-1, :-1]), 0.0
+            Z[:-1, :-1] += missing / values[-1] * np.outer(vectors[:, -1], vectors[:, -1])
+        return Z[:-1, :-1] / self.alpha**2, float(Z[-1, -1])
+
+
+def positive_part(matrix: Array) -> Array:
+    """The nearest positive semidefinite matrix."""
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    kept = eigenvalues > 0
+    return (vectors[:, kept] * eigenvalues[kept]) @ vectors[:, kept].T
+
+
+def _root(matrix: Array) -> Array:
+    eigenvalues, vectors = np.linalg.eigh(matrix)
+    return np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T
+
+
+def _none(rows: int) -> sp.csc_matrix:
+    return sp.csc_matrix((rows, 0))

@@ -1,0 +1,109 @@
+"""Model error over the whole confidence ellipsoid, without linearisation.
+
+For every theta with (theta - theta_0)^T M (theta - theta_0) <= alpha^2, at every frequency of a band:
+|W (G(theta) - G_0) / G(theta)| <= bound ("relative"), or |G(theta) - G_0| <= r_adm ("absolute"). With
+G = B / D both are |z^T d| <= |c_0 + c^T d| in d = theta - theta_0, an indefinite quadratic inequality,
+and the S-procedure turns it into one matrix inequality without loss.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.accuracy.admissible import AdmissibleError
+from inputdesign_cli.accuracy.cuts import EllipsoidCut
+from inputdesign_cli.accuracy.model_error import real_rows
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Fraction
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_BISECTIONS = 80
+_FLOOR = 1e-150  # its square is a number still
+
+
+@dataclass(frozen=True)
+class EllipsoidError(OverFrequency):
+    """The requirement for one plant (SISO) whose free denominator is A or F, not both.
+
+    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself.
+    `band` in rad/sample.
+    """
+
+    experiment: Experiment
+    admissible: AdmissibleError
+    alpha: float
+    against: Literal["relative", "absolute"] = "relative"
+    band: tuple[float, float] = (0.0, np.pi)
+
+    name = "model_error"
+
+    @property
+    def knots(self) -> Array:  # type: ignore[override]
+        return self.admissible.knots
+
+    @property
+    def own_singularities(self) -> ComplexArray:
+        return self.admissible.singularities
+
+    def _fraction(self, w: ArrayLike) -> Fraction:
+        return self.experiment.plant_fraction(w)
+
+    def _forms(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """z (n, k), c (n, k), c_0 (n,)."""
+        part = self._fraction(w)
+        G = part.numerator / part.denominator
+        z = (part.numerator_gradient - G[:, None] * part.denominator_gradient) / self.admissible.at(w)[
+            :, None
+        ]
+        if self.against == "relative":
+            # r_adm = bound |G_0|, while the error is compared with bound |G(theta)|.
+            return z * np.abs(G)[:, None], part.numerator_gradient, part.numerator
+        return z, part.denominator_gradient, part.denominator
+
+    def rows(self, w: ArrayLike) -> NDArray[np.float64]:
+        """(n, 4, k): real and imaginary parts of z, then of c, over |c_0|."""
+        z, c, start = self._forms(w)
+        turned = np.conj(start) / np.abs(start) ** 2  # c_0 becomes 1
+        return np.concatenate([real_rows(z * turned[:, None]), real_rows(c * turned[:, None])], axis=1)
+
+    def measure(self, half: NDArray[np.float64], w: Array) -> Array:
+        """alpha over the radius at which the ellipsoid first touches |z^T d| = |1 + c^T d|.
+
+        That squared radius is the minimum of |y|^2 subject to a quadratic inequality in t = half y, and
+        equals the maximum of its concave dual in one multiplier, which is found by bisection.
+        """
+        left, scale, _ = np.linalg.svd(half, full_matrices=False)
+        root = left * scale[:, None, :]
+        curve, turn = np.linalg.eigh(np.einsum("nai,a,naj->nij", root, [-1.0, -1.0, 1.0, 1.0], root))
+        offset = np.einsum("nij,ni->nj", turn, root[:, 2, :]) ** 2
+        reach = np.where(curve[:, 0] < 0, -1.0 / np.minimum(curve[:, 0], -1e-300), np.inf)
+        never = ~np.isfinite(reach) | (curve[:, 0] > -1e-30)
+        low, high = np.zeros(len(reach)), np.where(never, 1.0, reach)
+
+        def slope(mu: Array) -> Array:
+            left_over = np.maximum(1.0 + mu[:, None] * curve, _FLOOR)
+            return 1.0 - np.sum(offset * (2 * mu[:, None] + mu[:, None] ** 2 * curve) / left_over**2, axis=1)
+
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            rising = slope(middle) > 0
+            low, high = np.where(rising, middle, low), np.where(rising, high, middle)
+        left_over = np.maximum(1.0 + low[:, None] * curve, 1e-300)
+        squared = low - np.sum(offset * low[:, None] ** 2 / left_over, axis=1)
+        with np.errstate(divide="ignore"):
+            return np.where(never, 0.0, self.alpha / np.sqrt(np.maximum(squared, 1e-300)))
+
+    def cut(self, frequency: float | None) -> EllipsoidCut:
+        """The matrix inequality of the S-procedure at this frequency."""
+        rows = self.rows(np.array([frequency]))[0]
+        k = rows.shape[1]
+        form = np.zeros((k + 1, k + 1))
+        form[:k, :k] = rows[:2].T @ rows[:2] - rows[2:].T @ rows[2:]
+        form[:k, k] = form[k, :k] = -rows[2]
+        form[k, k] = -1.0
+        return EllipsoidCut(form, self.alpha, frequency)

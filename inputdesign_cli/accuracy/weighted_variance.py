@@ -1,0 +1,60 @@
+"""A weighted variance over frequency: |W|^2 Lambda^* P Lambda <= max at every frequency of a band.
+
+Lambda (k,) is the gradient of G, so that Lambda^* P Lambda is the variance of the complex frequency
+response, to first order (the weighted trace and variance bounds of Jansson and Hjalmarsson, IEEE
+Trans. Automat. Contr. 50 (2005) 1534-1549).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.accuracy.cuts import Cut, MatrixCut, VarianceCut
+from inputdesign_cli.accuracy.model_error import real_rows
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Rational, logarithmic_distance
+from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots
+
+_REAL = 1e-12
+
+
+@dataclass(frozen=True)
+class WeightedVariance(OverFrequency):
+    """The requirement for one plant (SISO); `band` in rad/sample.
+
+    With `relative` the variance is that of G relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
+    """
+
+    experiment: Experiment
+    weight: Rational
+    limit: float
+    band: tuple[float, float] = (0.0, np.pi)
+    relative: bool = False
+
+    name = "weighted_variance"
+
+    @property
+    def own_singularities(self) -> ComplexArray:
+        return logarithmic_distance(join_roots([self.weight.poles, self.weight.zeros]))
+
+    def rows(self, w: ArrayLike) -> NDArray[np.float64]:
+        """(n, 2, k): |W| / sqrt(max) times the real and imaginary parts of Lambda."""
+        size = np.abs(self.weight.at(w)) / np.sqrt(self.limit)
+        if self.relative:
+            size = size / np.abs(self.experiment.model.plant_at(w))
+        return real_rows(self.experiment.plant_gradient(w)) * size[:, None, None]
+
+    def measure(self, half: NDArray[np.float64], w: Array) -> Array:
+        """The weighted standard deviation over its limit."""
+        return np.sqrt(np.einsum("nqi,nqi->n", half, half))
+
+    def cut(self, frequency: float | None) -> Cut:
+        """tr(V^T M^-1 V) <= 1 at this frequency."""
+        rows = self.rows(np.array([frequency]))[0]
+        if np.abs(rows[1]).max() <= _REAL * np.abs(rows[0]).max():  # a real gradient, at 0 and pi
+            return MatrixCut(np.outer(rows[0], rows[0]), frequency)
+        return VarianceCut(rows.T, frequency)

@@ -1,0 +1,165 @@
+"""Experiments with several inputs and outputs, and those in continuous time.
+
+The measure is (1 / 2 pi) dw over the circle (w in rad/sample) or the line (rad per time unit): the
+power of a signal is the integral of its spectrum, its mean square. In continuous time the N samples of
+the outputs are taken fast enough to see the whole band; each carries noise of the model's covariance.
+Criteria do not depend on the measure, as long as powers and information share it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.information.coordinates import Coordinates, factor_of
+from inputdesign_cli.information.experiment import PowerKind
+from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, integrate
+from inputdesign_cli.plant.channels import ChannelModel
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_NODES_AT_ONCE = 256
+
+
+@dataclass(frozen=True)
+class ChannelExperiment(Coordinates):
+    """N samples of a model with r inputs and p outputs in open loop, excited within `band`.
+
+    A density D over frequency stands for the functional (1 / 2 pi) integral of tr(D(w) Phi(w)) dw of
+    the input spectrum Phi. Its values are (n,) for one input, and Hermitian (n, r, r) for several.
+
+    `prior` (k, k) is information already at hand, in raw parameters; `factor` sets the `Coordinates`.
+    """
+
+    model: ChannelModel
+    samples: int
+    band: tuple[float, float] = (0.0, np.pi)
+    prior: Array | None = None
+    factor: Array | None = None
+
+    @property
+    def inputs(self) -> int:
+        return self.model.inputs
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        """Poles of all densities below, as points frequency + j damping of the frequency plane."""
+        return self.model.singularities
+
+    @cached_property
+    def _noise_whitener(self) -> Array:
+        """K (p, p) with K^T K the inverse of the noise covariance."""
+        return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
+
+    def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
+        """(n, k, p, r): what u contributes to the gradient of the prediction, noise whitened to I."""
+        return self._whiten(np.einsum("pq,nkqr->nkpr", self._noise_whitener, self.model.input_gradient(w)))
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
+        K = self._noise_whitener
+        gradient = self.model.noise_gradient(w)
+        return self._whiten(np.einsum("pq,nkqs,st->nkpt", K, gradient, np.linalg.inv(K), optimize=True))
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r), in these coordinates."""
+        return self._whiten(self.model.plant_gradient(w))
+
+    def _whiten(self, gradient: ComplexArray) -> ComplexArray:
+        if self.factor is None:
+            return gradient
+        return np.tensordot(gradient, self._inverse_factor, axes=(1, 1)).transpose(0, 3, 1, 2)
+
+    def information_density(self, w: ArrayLike) -> NDArray:
+        """D (n, k, k) or (n, k, k, r, r) with M = M0 + (1/2 pi) integral tr(D Phi) dw, for all N samples.
+
+        Spectral design paper, (3), made Hermitian in the channels and symmetric in the parameters.
+        """
+        F = self.excitation_gradient(w)
+        if self.inputs == 1:
+            return self.samples * _real_products(F)
+        half = np.einsum("nmpa,nlpb->nlmab", F.conj(), F, optimize=True)
+        return (0.5 * self.samples) * (half + half.swapaxes(1, 2))
+
+    def value_density(self, weight: Array, w: ArrayLike) -> NDArray:
+        """(n,) or (n, r, r): the density of tr(Y (M - M0)), Y = `weight` (k, k) symmetric."""
+        F = self.excitation_gradient(w)
+        weighted = np.tensordot(F, weight, axes=(1, 1))  # (n, p, r, k)
+        value = self.samples * np.einsum("nkpa,npbk->nab", F.conj(), weighted, optimize=True)
+        return self._squeezed(value)
+
+    def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
+        """(n,) or (n, r, r): tr(D Phi) is the power of input or output, of all channels or of one."""
+        if kind == "output":
+            G = self.model.plant_at(w)
+            rows = G if channel is None else G[:, channel : channel + 1]
+            return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
+        unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
+        return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
+
+    def _squeezed(self, density: NDArray) -> NDArray:
+        return density[:, 0, 0].real if self.inputs == 1 else density
+
+    @cached_property
+    def noise_information(self) -> Array:
+        """(k, k): what N samples tell without any excitation, by the noise alone (A, C, D)."""
+        if self.model.continuous or np.all(self._silent):
+            return np.zeros((self.size, self.size))
+
+        def moments(rule: Quadrature) -> NDArray[np.float64]:
+            total = np.zeros((self.size, self.size))
+            for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
+                part = slice(start, start + _NODES_AT_ONCE)
+                products = _real_products(self.noise_gradient(rule.nodes[part]))
+                total += np.tensordot(rule.weights[part], products, axes=1)
+            return total
+
+        return self.samples * integrate(moments, self.singularities)
+
+    @property
+    def baseline_information(self) -> Array:
+        """(k, k): what is known without any excitation, by the noise and by `prior`."""
+        return self.noise_information + self.prior_information
+
+    @cached_property
+    def _silent(self) -> NDArray[np.bool_]:
+        """(k,): the parameters of which noise alone says nothing."""
+        probe = np.abs(self.model.noise_gradient(np.array([0.3, 1.1, 2.3])))
+        return ~np.any(probe > 0, axis=(0, 2, 3))
+
+    def whitened(self, power: float) -> ChannelExperiment:
+        """The same experiment in coordinates where M = I by this power, even over band and channels.
+
+        Raises:
+            SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
+        """
+        rule = band_quadrature(self.singularities, self.band)
+        raw = replace(self, factor=None)
+        width = (self.band[1] - self.band[0]) / np.pi
+        level = power * self.samples / (self.inputs * width)
+        rows = [_rows(raw.excitation_gradient(rule.nodes), rule.weights * level)]
+        if not self.model.continuous and not np.all(self._silent):
+            around = band_quadrature(self.singularities, (0.0, np.pi))
+            rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))
+        if self.prior is not None:
+            eigenvalues, vectors = np.linalg.eigh(self.prior)
+            rows.append(np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T)
+        whole = not self.model.continuous and self.band == (0.0, np.pi)
+        excitation = "excitation" if whole else "excitation within the band"
+        return replace(self, factor=factor_of(np.concatenate(rows), self.model.names, excitation=excitation))
+
+
+def _real_products(F: ComplexArray) -> NDArray[np.float64]:
+    """Re sum over channels of F_l F_m^*: (n, k, p, r) -> (n, k, k)."""
+    flat = F.reshape(*F.shape[:2], -1)
+    real = np.concatenate([flat.real, flat.imag], axis=2)
+    return real @ real.swapaxes(1, 2)
+
+
+def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
+    """sqrt(weight) F as real rows: (n, k, p, r) -> (2 n p r, k)."""
+    flat = np.moveaxis(F, 1, -1) * np.sqrt(weights)[:, None, None, None]
+    flat = flat.reshape(-1, F.shape[1])
+    return np.concatenate([flat.real, flat.imag])

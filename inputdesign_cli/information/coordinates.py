@@ -1,0 +1,120 @@
+"""Coordinates of the parameter space in which information matrices are well conditioned.
+
+`factor` L (k, k), lower triangular, sets the coordinates of every gradient and information matrix:
+gradients are L^-1 F and M = L M~ L^T. Raw parameters correspond to L = None; there the information
+matrix easily has a condition number of 1e12, which no solver survives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant.polynomial import Array
+
+_RANK_TOLERANCE = 1e-11
+
+
+class Named(Protocol):
+    """A model, as far as its parameters go."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def theta(self) -> Array: ...
+
+
+class Coordinates:
+    """What every experiment does with its `factor`, its `prior` and the `names` and `theta` of its model."""
+
+    factor: Array | None
+    prior: Array | None
+
+    if TYPE_CHECKING:  # a field or a property of the experiment; a default here would become the field's
+
+        @property
+        def model(self) -> Named: ...
+
+    @property
+    def size(self) -> int:
+        """Number of parameters k."""
+        return len(self.model.names)
+
+    @cached_property
+    def prior_information(self) -> Array:
+        """(k, k): `prior` in these coordinates, zero when there is none."""
+        if self.prior is None:
+            return np.zeros((self.size, self.size))
+        return self.whiten_matrix(self.prior)
+
+    def whiten_matrix(self, information: Array) -> Array:
+        """An information matrix (k, k) of raw parameters in these coordinates."""
+        return self.whiten_rows(self.whiten_rows(information).T)
+
+    @cached_property
+    def _inverse_factor(self) -> Array:
+        return scipy.linalg.solve_triangular(self.factor, np.eye(self.size), lower=True)
+
+    def to_raw(self, information: Array) -> Array:
+        """An information matrix of these coordinates in raw parameters."""
+        if self.factor is None:
+            return information
+        return self.factor @ information @ self.factor.T
+
+    def raw_covariance(self, information: Array) -> Array:
+        """P = M^-1 in raw parameters, from an information matrix of these coordinates."""
+        half = scipy.linalg.solve_triangular(np.linalg.cholesky(information), np.eye(self.size), lower=True)
+        if self.factor is not None:
+            half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
+        return half.T @ half
+
+    def whiten_rows(self, rows: NDArray) -> NDArray:
+        """Gradients (n, k) of raw parameters in these coordinates."""
+        if self.factor is None:
+            return rows
+        return rows @ self._inverse_factor.T
+
+    def unexcited(self, direction: Array) -> str:
+        """The names of the parameters that make up a `direction` (k,) of these coordinates."""
+        raw = direction if self.factor is None else self._inverse_factor.T @ direction
+        size = np.abs(self.model.theta)
+        return _involved(self.model.names, raw / np.maximum(size, 1e-3 * size.max()))
+
+
+def _involved(names: Sequence[str], direction: Array) -> str:
+    members = np.abs(direction) > 0.05 * np.abs(direction).max()
+    return ", ".join(name for name, member in zip(names, members, strict=True) if member)
+
+
+def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: str) -> Array:
+    """L (k, k), lower triangular, with rows^T rows = L L^T, by a QR factorisation of the rows (number, k).
+
+    The matrix itself is never formed: that halves the digits lost to an ill-conditioned parametrisation.
+
+    Args:
+        excitation: what excites, for the complaint ("excitation", "excitation within [0, 2]").
+
+    Raises:
+        SpecError: `not-identifiable`, with the names of parameters that cannot be told apart.
+    """
+    scale = np.linalg.norm(rows, axis=0)
+    scale[scale == 0.0] = 1.0
+    triangle = np.asarray(np.linalg.qr(rows / scale, mode="r"))
+    _, singular, vectors = np.linalg.svd(triangle)
+    if singular.size < len(names) or singular[-1] <= _RANK_TOLERANCE * singular[0]:
+        listed = _involved(names, vectors[-1])
+        raise bad_spec(
+            "not-identifiable",
+            f"no {excitation} can tell these parameters apart: {listed}",
+            hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
+            "order too high, and take it out",
+            key="plant",
+        )
+    return (triangle * scale).T

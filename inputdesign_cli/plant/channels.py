@@ -1,0 +1,267 @@
+"""Plants with several inputs and outputs: what every model of them answers, and the polynomial model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.model import Fraction
+from inputdesign_cli.plant.polynomial import (
+    Array,
+    ComplexArray,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
+
+Rows = tuple[tuple[Array, ...], ...]
+
+
+class ChannelModel(Protocol):
+    """y = G(theta) u + H(theta) e with p outputs, r inputs, k parameters and e of a full covariance.
+
+    Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
+    plane are frequency + j damping (see `logarithmic_distance`).
+    """
+
+    continuous: bool
+
+    @property
+    def inputs(self) -> int: ...
+
+    @property
+    def outputs(self) -> int: ...
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def theta(self) -> Array: ...
+
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
+        ...
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        ...
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        ...
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Whether numerator and denominator of an entry of G are affine in theta."""
+        ...
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as such a fraction, where `is_fraction`."""
+        ...
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
+        ...
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
+        ...
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dtheta (n, k, p, r): the gradient of the one-step prediction that u causes."""
+        ...
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
+        ...
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
+
+    letter: str
+    power: int
+    places: tuple[tuple[int, int], ...]  # (output, input); (output, output) for noise polynomials
+    label: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.letter}{self.power}{self.label}"
+
+
+def entry_label(output: int, input: int, *, single: bool) -> str:
+    """The channels of a parameter as they stand in its name, counted from one: `[2,1]`."""
+    return "" if single else f"[{output + 1},{input + 1}]"
+
+
+@dataclass(frozen=True)
+class PolynomialChannels:
+    """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
+
+    A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. An
+    entry B_ij = 0 has no parameters. Otherwise the rules and names are those of `PolynomialModel`, with
+    output and input in brackets: `b1[2,1]`, `a1[2]`; common coefficients go without: `a1`.
+    """
+
+    B: Rows
+    A: tuple[Array, ...]
+    F: Rows
+    C: tuple[Array, ...]
+    D: tuple[Array, ...]
+    covariance: Array
+
+    continuous = False
+
+    @property
+    def outputs(self) -> int:
+        return len(self.B)
+
+    @property
+    def inputs(self) -> int:
+        return len(self.B[0])
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All free coefficients: those of A, B, C, D, F in turn."""
+        found: list[Parameter] = []
+        for letter in "abcdf":
+            if letter in "bf":
+                found += self._entry_parameters(letter)
+            else:
+                found += self._row_parameters(letter, {"a": self.A, "c": self.C, "d": self.D}[letter])
+        return tuple(found)
+
+    def _entry_parameters(self, letter: str) -> list[Parameter]:
+        found = []
+        single = self.outputs == self.inputs == 1
+        for i in range(self.outputs):
+            for j in range(self.inputs):
+                if not np.any(self.B[i][j]):
+                    continue
+                first = int(np.flatnonzero(self.B[i][j])[0]) if letter == "b" else 1
+                values = self.B[i][j] if letter == "b" else self.F[i][j]
+                label = entry_label(i, j, single=single)
+                found += [
+                    Parameter(letter, lag, ((i, j),), label, float(values[lag]))
+                    for lag in range(first, len(values))
+                ]
+        return found
+
+    def _row_parameters(self, letter: str, rows: Sequence[Array]) -> list[Parameter]:
+        found = []
+        for i, values in enumerate(rows):
+            common = len(rows) == 1
+            outputs = range(self.outputs) if common else [i]
+            places = (
+                tuple((o, j) for o in outputs for j in range(self.inputs))
+                if letter == "a"
+                else tuple((o, o) for o in outputs)
+            )
+            label = "" if common else f"[{i + 1}]"
+            found += [
+                Parameter(letter, lag, places, label, float(values[lag])) for lag in range(1, len(values))
+            ]
+        return found
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def theta(self) -> Array:
+        return np.array([parameter.value for parameter in self.parameters])
+
+    @cached_property
+    def in_plant(self) -> NDArray[np.bool_]:
+        return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
+
+    def _row(self, rows: Sequence[Array], output: int) -> Array:
+        return rows[0] if len(rows) == 1 else rows[output]
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        polynomials = [*self.A, *self.C, *self.D, *(p for row in self.F for p in row)]
+        return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        polynomials = (self._row(self.A, output), self.F[output][input], self.B[output][input])
+        return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        q = unit_circle(w)
+        return self._entries(q, lambda i, j: evaluate(self.B[i][j], q) / self._denominator(q, i, j))
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Whether an entry is a fraction of two polynomials that are affine in theta."""
+        return len(self._row(self.A, output)) == 1 or len(self.F[output][input]) == 1
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as such a fraction, gradients (n, k), where `is_fraction`."""
+        q = unit_circle(w)
+        above = np.zeros((q.size, len(self.parameters)), dtype=complex)
+        below = np.zeros_like(above)
+        for index, parameter in enumerate(self.parameters):
+            if parameter.letter in "abf" and (output, input) in parameter.places:
+                gradient = above if parameter.letter == "b" else below
+                gradient[:, index] = q**parameter.power
+        numerator = evaluate(self.B[output][input], q)
+        return Fraction(numerator, self._denominator(q, output, input), above, below)
+
+    def _denominator(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
+        return evaluate(self._row(self.A, i), q) * evaluate(self.F[i][j], q)
+
+    def _entries(self, q: ComplexArray, entry: Callable[[int, int], ComplexArray]) -> ComplexArray:
+        rows = [[entry(i, j) for j in range(self.inputs)] for i in range(self.outputs)]
+        return np.moveaxis(np.array(rows, dtype=complex), -1, 0)
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self._input_gradient(w, predictor=False)
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self._input_gradient(w, predictor=True)
+
+    def _input_gradient(self, w: ArrayLike, *, predictor: bool) -> ComplexArray:
+        """dG/dtheta, times H_i^-1 = A_i D_i / C_i for the `predictor`."""
+        q = unit_circle(w)
+        gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        for index, parameter in enumerate(self.parameters):
+            if parameter.letter in "cd":
+                continue
+            for i, j in parameter.places:
+                A, F = evaluate(self._row(self.A, i), q), evaluate(self.F[i][j], q)
+                B = evaluate(self.B[i][j], q)
+                factor = {"a": -B / (A * F), "b": 1.0 / F, "f": -B / (F * F)}[parameter.letter]
+                if predictor:
+                    factor = factor * evaluate(self._row(self.D, i), q) / evaluate(self._row(self.C, i), q)
+                else:
+                    factor = factor / A
+                gradient[:, index, i, j] = factor * q**parameter.power
+        return gradient
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        q = unit_circle(w)
+        gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.outputs), dtype=complex)
+        rows = {"a": self.A, "c": self.C, "d": self.D}
+        for index, parameter in enumerate(self.parameters):
+            if parameter.letter not in rows:
+                continue
+            sign = 1.0 if parameter.letter == "c" else -1.0
+            for i in {place[0] for place in parameter.places}:
+                polynomial = evaluate(self._row(rows[parameter.letter], i), q)
+                gradient[:, index, i, i] = sign * q**parameter.power / polynomial
+        return gradient

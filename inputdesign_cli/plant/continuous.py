@@ -1,0 +1,252 @@
+"""Transfer matrices in s, in continuous time or sampled with a zero-order hold.
+
+Spectral design paper, (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import polynomial as ascending
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.channels import Parameter, Rows, entry_label
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
+from inputdesign_cli.plant.model import Fraction
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+
+@dataclass(frozen=True)
+class ContinuousChannels:
+    """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
+
+    `numerator` and `denominator` hold ascending coefficients, those of s^0 first; denominators are
+    monic. With `common` all entries share one denominator and its parameters.
+
+    Parameters are named after their power of s: `b0[2,1]` is the constant of the numerator of entry
+    (2, 1), `a1[2,1]` the coefficient of s in its denominator; `a1` of a common one, and without
+    brackets for one input and output. Numerator coefficients are free up to the highest nonzero one; an
+    entry that is zero has no parameters.
+    """
+
+    numerator: Rows
+    denominator: Rows
+    covariance: Array
+    common: bool = False
+
+    continuous = True
+
+    @classmethod
+    def monic(
+        cls, numerator: Rows, denominator: Rows, covariance: Array, *, common: bool = False
+    ) -> ContinuousChannels:
+        """From any coefficients: trailing zeros dropped, each entry divided by its leading coefficient."""
+        low, high = [], []
+        for top, bottom in zip(numerator, denominator, strict=True):
+            bottoms = [np.trim_zeros(np.asarray(b, dtype=float), "b") for b in bottom]
+            high.append(tuple(b / b[-1] for b in bottoms))
+            low.append(
+                tuple(
+                    np.trim_zeros(np.asarray(t, dtype=float), "b") / b[-1] if np.any(t) else np.zeros(1)
+                    for t, b in zip(top, bottoms, strict=True)
+                )
+            )
+        return cls(tuple(low), tuple(high), covariance, common)
+
+    @property
+    def outputs(self) -> int:
+        return len(self.numerator)
+
+    @property
+    def inputs(self) -> int:
+        return len(self.numerator[0])
+
+    @cached_property
+    def active(self) -> tuple[tuple[int, int], ...]:
+        """The entries that are not zero."""
+        places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
+        return tuple((i, j) for i, j in places if np.any(self.numerator[i][j]))
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Numerator coefficients entry by entry, then those of the denominators."""
+        single = self.outputs == self.inputs == 1
+        found = [
+            Parameter("b", power, ((i, j),), entry_label(i, j, single=single), float(value))
+            for i, j in self.active
+            for power, value in enumerate(self.numerator[i][j])
+        ]
+        groups = [self.active] if self.common else [(place,) for place in self.active]
+        for places in groups:
+            i, j = places[0]
+            label = "" if self.common else entry_label(i, j, single=single)
+            found += [
+                Parameter("a", power, places, label, float(value))
+                for power, value in enumerate(self.denominator[i][j][:-1])
+            ]
+        return tuple(found)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def theta(self) -> Array:
+        return np.array([parameter.value for parameter in self.parameters])
+
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        return np.ones(len(self.parameters), dtype=bool)
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles in s of all entries."""
+        parts = [polynomial_roots(self.denominator[i][j]) for i, j in self.active]
+        return np.concatenate(parts)
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        return _frequency_plane(self.poles)
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        return _frequency_plane(
+            np.concatenate([polynomial_roots(p[output][input]) for p in (self.numerator, self.denominator)])
+        )
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Whether numerator and denominator of an entry are affine in theta: always."""
+        return True
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as numerator over denominator, gradients (n, k)."""
+        s = 1j * np.asarray(w, dtype=float)
+        above = np.zeros((s.size, len(self.parameters)), dtype=complex)
+        below = np.zeros_like(above)
+        for index, parameter in enumerate(self.parameters):
+            if (output, input) in parameter.places:
+                gradient = above if parameter.letter == "b" else below
+                gradient[:, index] = s**parameter.power
+        numerator = np.asarray(ascending.polyval(s, self.numerator[output][input]), dtype=complex)
+        return Fraction(numerator, self._below(s, output, input), above, below)
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        s = 1j * np.asarray(w, dtype=float)
+        G = np.zeros((s.size, self.outputs, self.inputs), dtype=complex)
+        for i, j in self.active:
+            G[:, i, j] = ascending.polyval(s, self.numerator[i][j]) / self._below(s, i, j)
+        return G
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        s = 1j * np.asarray(w, dtype=float)
+        gradient = np.zeros((s.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        for index, parameter in enumerate(self.parameters):
+            for i, j in parameter.places:
+                below = self._below(s, i, j)
+                factor = 1.0 / below
+                if parameter.letter == "a":
+                    factor = -ascending.polyval(s, self.numerator[i][j]) * factor / below
+                gradient[:, index, i, j] = factor * s**parameter.power
+        return gradient
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self.plant_gradient(w)
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        return np.zeros((np.size(w), len(self.parameters), self.outputs, self.outputs), dtype=complex)
+
+    def _below(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
+        return np.asarray(ascending.polyval(s, self.denominator[i][j]), dtype=complex)
+
+
+@dataclass(frozen=True)
+class SampledChannels:
+    """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay those of s.
+
+    Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
+    dG/da_k = -s^k b / a^2: each entry needs one state-space model of a^2, exact through one exponential.
+    """
+
+    continuous_plant: ContinuousChannels
+    sample_time: float
+
+    continuous = False
+
+    @property
+    def outputs(self) -> int:
+        return self.continuous_plant.outputs
+
+    @property
+    def inputs(self) -> int:
+        return self.continuous_plant.inputs
+
+    @property
+    def covariance(self) -> Array:
+        return self.continuous_plant.covariance
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.continuous_plant.names
+
+    @property
+    def theta(self) -> Array:
+        return self.continuous_plant.theta
+
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        return self.continuous_plant.in_plant
+
+    @cached_property
+    def _entries(self) -> dict[tuple[int, int], HeldEntry]:
+        plant = self.continuous_plant
+        return {
+            (i, j): HeldEntry.of(plant.numerator[i][j], plant.denominator[i][j], self.sample_time)
+            for i, j in plant.active
+        }
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        return logarithmic_distance(np.exp(self.continuous_plant.poles * self.sample_time))
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        entry = self._entries.get((output, input))
+        return np.zeros(0, dtype=complex) if entry is None else logarithmic_distance(entry.roots)
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Never: sampled coefficients depend on those of s through an exponential."""
+        return False
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """There is none."""
+        raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        z = np.exp(1j * np.asarray(w, dtype=float))
+        G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
+        for (i, j), entry in self._entries.items():
+            G[:, i, j] = entry.direct + entry.states(z) @ entry.gain
+        return G
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        z = np.exp(1j * np.asarray(w, dtype=float))
+        parameters = self.continuous_plant.parameters
+        gradient = np.zeros((z.size, len(parameters), self.outputs, self.inputs), dtype=complex)
+        states = {place: entry.states(z) for place, entry in self._entries.items()}
+        for index, parameter in enumerate(parameters):
+            for place in parameter.places:
+                direct, row = self._entries[place].gradient(parameter.letter, parameter.power)
+                gradient[:, index, place[0], place[1]] = direct + states[place] @ row
+        return gradient
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self.plant_gradient(w)
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self.continuous_plant.noise_gradient(w)
+
+
+def _frequency_plane(poles: ComplexArray) -> ComplexArray:
+    """Poles in s as frequency + j damping."""
+    return np.abs(poles.imag) + 1j * np.abs(poles.real)

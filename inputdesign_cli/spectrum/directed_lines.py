@@ -1,0 +1,126 @@
+"""Line spectra of several inputs: sinusoids, each of some direction across the channels.
+
+The power matrix of a line, Hermitian (r, r), is the sum over its directions v of power v v^*.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
+from inputdesign_cli.spectrum.channels import best_directions, directed_scale, matrices
+
+_FIRST_LINES = 24
+_MOST_NEW = 16
+# Two atoms at one frequency are the same when their directions agree this closely.
+_SAME = 1e-12
+
+
+@dataclass(frozen=True)
+class DirectedLines:
+    """The unknowns are the powers of atoms: sinusoids at `frequencies` (L,) along `directions` (L, r).
+
+    Directions have length one, so that the power is the total over the channels. The basis grows by
+    the atoms that would pay: anywhere on the grid when `free`, else at `allowed` frequencies with any
+    direction. Prices then hold for every spectrum, or for every spectrum on those lines.
+    """
+
+    frequencies: Array
+    directions: ComplexArray
+    allowed: Array
+    free: bool = False
+
+    @classmethod
+    def anywhere(cls, lo: float, hi: float, inputs: int) -> DirectedLines:
+        """Free frequencies on [lo, hi], to begin with some spread linearly and logarithmically."""
+        low = max(lo, 1e-3 * hi)
+        start = np.concatenate([np.linspace(low, hi, _FIRST_LINES), np.geomspace(low, hi, _FIRST_LINES)])
+        return replace(cls.at(np.unique(start), inputs), free=True)
+
+    @classmethod
+    def at(cls, frequencies: Array, inputs: int) -> DirectedLines:
+        """Lines at these frequencies, to begin with along each channel and pair of channels."""
+        axes = np.eye(inputs)
+        pairs = [
+            (axes[i] + sign * axes[j]) / np.sqrt(2.0)
+            for i in range(inputs)
+            for j in range(i)
+            for sign in (1.0, -1.0)
+        ]
+        start = np.array([*axes, *pairs], dtype=complex)
+        return cls(np.repeat(frequencies, len(start)), np.tile(start, (frequencies.size, 1)), frequencies)
+
+    @property
+    def size(self) -> int:
+        return self.frequencies.size
+
+    @property
+    def inputs(self) -> int:
+        return self.directions.shape[1]
+
+    @property
+    def flat(self) -> Array:
+        """(L,): power one spread evenly over the lines and channels."""
+        axes = np.max(np.abs(self.directions), axis=1) > 1.0 - _SAME
+        return axes / np.sum(axes)
+
+    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+        """(L, ...): v^* D(w) v, what an atom of power one picks up."""
+        values = density(self.frequencies)
+        if self.inputs == 1:
+            return values
+        return np.einsum("na,n...ab,nb->n...", self.directions.conj(), values, self.directions).real
+
+    def coarser(self) -> list[DirectedLines]:
+        """None: lines are cheap."""
+        return []
+
+    def first_face(self, price: Functional) -> Face:
+        """All atoms, in units of their price."""
+        return Face(np.diag(1.0 / price.vector), "nonnegative", self.size, self.frequencies)
+
+    def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
+        """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction)."""
+        if self.free:
+            scale, where, heights, directions = directed_scale(price, value, grid)
+        else:
+            where = self.allowed
+            heights, directions = best_directions(price.density(where), value.density(where))
+            top = heights.max(initial=0.0)
+            scale = np.inf if top <= 0 else 1.0 / top
+        best = np.argsort(-heights)[:_MOST_NEW]
+        return Pricing(scale, np.column_stack([where[best], directions[best]]))
+
+    def enlarge(
+        self, face: Face, y: Array, directions: Array, price: Functional
+    ) -> tuple[DirectedLines, Face]:
+        """The atoms so far and the new ones; x of the old basis is the head of x of the new."""
+        fresh = [row for row in directions if self._is_new(float(row[0].real), row[1:])]
+        if not fresh:
+            return self, face
+        added = np.array(fresh)
+        grown = replace(
+            self,
+            frequencies=np.concatenate([self.frequencies, added[:, 0].real]),
+            directions=np.concatenate([self.directions, added[:, 1:]]),
+        )
+        at = matrices(price.density(added[:, 0].real))
+        costs = np.einsum("na,nab,nb->n", added[:, 1:].conj(), at, added[:, 1:]).real
+        return grown, grown.first_face(Functional(np.concatenate([price.vector, costs]), price.density))
+
+    def _is_new(self, frequency: float, direction: ComplexArray) -> bool:
+        near = np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300)
+        return not np.any(np.abs(self.directions[near].conj() @ direction) ** 2 > 1.0 - _SAME)
+
+    def lines(self, x: Array) -> tuple[Array, ComplexArray]:
+        """Frequencies (number,) with power, ascending, and their power matrices (number, r, r)."""
+        w, inverse = np.unique(self.frequencies, return_inverse=True)
+        power = np.zeros((w.size, self.inputs, self.inputs), dtype=complex)
+        outer = np.einsum("na,nb->nab", self.directions, self.directions.conj())
+        np.add.at(power, inverse.ravel(), np.maximum(x, 0.0)[:, None, None] * outer)
+        kept = np.trace(power, axis1=1, axis2=2).real > 0
+        return w[kept], power[kept]

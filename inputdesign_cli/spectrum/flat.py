@@ -1,0 +1,83 @@
+"""White excitation: flat over a band, even over the channels, of one unknown power."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.information import ChannelExperiment, Experiment, Quadrature, integrate_band
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
+from inputdesign_cli.spectrum.channels import weighted_sums
+from inputdesign_cli.spectrum.directed_lines import DirectedLines
+from inputdesign_cli.spectrum.fir import FirBasis
+from inputdesign_cli.spectrum.lines import LinesBasis
+
+
+@dataclass(frozen=True)
+class FlatBasis:
+    """The unknown is the total power; Phi = level I on `band`, zero outside."""
+
+    inputs: int
+    band: tuple[float, float]
+
+    size = 1
+
+    @property
+    def white(self) -> Array:
+        """(1,): power one."""
+        return np.ones(1)
+
+    @property
+    def level(self) -> float:
+        """Each diagonal entry of Phi at power one."""
+        return np.pi / ((self.band[1] - self.band[0]) * self.inputs)
+
+    def density(self, x: Array, w: ArrayLike) -> NDArray:
+        """Phi at `w`: (n,) for one input, else (n, r, r)."""
+        at = np.asarray(w, dtype=float)
+        inside = (at >= self.band[0] * (1 - 1e-12)) & (at <= self.band[1] * (1 + 1e-12))
+        level = x[0] * self.level * inside
+        return level if self.inputs == 1 else level[:, None, None] * np.eye(self.inputs, dtype=complex)
+
+    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+        """(1, ...): level times (1 / 2 pi) integral of the trace of the density."""
+
+        def moments(rule: Quadrature) -> NDArray[np.float64]:
+            sums = weighted_sums(np.ones((rule.nodes.size, 1)), density, rule, self.inputs)
+            return self.level * np.trace(sums, axis1=-2, axis2=-1).real
+
+        return integrate_band(moments, singularities, self.band)
+
+    def coarser(self) -> list[FlatBasis]:
+        """None."""
+        return []
+
+    def first_face(self, price: Functional) -> Face:
+        """The whole half line, in units of its price."""
+        return Face(1.0 / price.vector[:, None], "nonnegative", 1, np.zeros(1))
+
+    def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
+        """The ratio of two numbers."""
+        worth = float(value.vector[0])
+        return Pricing(float(price.vector[0]) / worth if worth > 0 else np.inf, np.zeros(0))
+
+    def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[FlatBasis, Face]:
+        """Nothing to add."""
+        return self, face
+
+
+def flat_basis(experiment: Experiment | ChannelExperiment) -> FirBasis | FlatBasis:
+    """White excitation for an experiment: what its coordinates are whitened with."""
+    if isinstance(experiment, Experiment):
+        return FirBasis(0)
+    return FlatBasis(experiment.inputs, experiment.band)
+
+
+def free_lines(experiment: Experiment | ChannelExperiment, grid: Array) -> LinesBasis | DirectedLines:
+    """Sinusoids anywhere on [grid[0], grid[-1]]: every spectrum of the experiment's inputs there."""
+    if experiment.inputs == 1:
+        return LinesBasis.anywhere(grid)
+    return DirectedLines.anywhere(float(grid[0]), float(grid[-1]), experiment.inputs)

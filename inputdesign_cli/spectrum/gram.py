@@ -1,0 +1,121 @@
+"""Spectra with a Gram matrix: Phi(w) = B(w) Q B(w)^*, Q >= 0, for a fixed row of functions B(w).
+
+What such families share: the cone, its faces, and the price of what lies outside of a face.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum.basis import Face, Functional, Pricing
+from inputdesign_cli.spectrum.channels import directed_scale, leading_pairs
+from inputdesign_cli.spectrum.svec import smat
+
+_WHOLE = 28  # Gram matrices up to this order are designed whole, in one face
+_FIRST = 16
+_DIRECTIONS = 8
+_MOST_KEPT = 24
+_KEPT = 1e-10  # share of the largest eigenvalue below which a generator is dropped
+_SINGULAR_PRICE = 1e-12
+
+
+@dataclass(frozen=True)
+class GramBasis(ABC):
+    """A family for `inputs` r, of `order` m; Q has the order n = r (m + 1), degree by degree.
+
+    A face has generators V (n, q): Q = V Y V^* with a real Y >= 0 of order q. Where Q may be complex
+    (`hermitian`) so may V; the whole cone then needs 2 n of them, [I, jI].
+    """
+
+    inputs: int
+    order: int
+
+    hermitian = False
+
+    @property
+    def gram_order(self) -> int:
+        """n = r (m + 1)."""
+        return self.inputs * (self.order + 1)
+
+    @property
+    def _copies(self) -> int:
+        """How many times n generators span the whole cone."""
+        return 2 if self.hermitian else 1
+
+    @abstractmethod
+    def gram(self, vector: Array) -> NDArray:
+        """G (n, n) with tr(G Q) = vector . x for the x of any Gram matrix Q."""
+
+    @abstractmethod
+    def products(self, generators: NDArray) -> Array:
+        """(size, q (q + 1) / 2): x of each pair of generators (n, q), as svec orders and scales pairs."""
+
+    @abstractmethod
+    def of_order(self, order: int) -> Self:
+        """The same family with a lower order; its x is the head of ours."""
+
+    def coarser(self) -> list[Self]:
+        """Lower orders, each about half the next, whose optimum is a good start for this one."""
+        orders = [self.order]
+        while self._copies * self.inputs * (orders[0] + 1) > 2 * _WHOLE:
+            orders.insert(0, orders[0] // 2)
+        return [self.of_order(order) for order in orders[:-1]]
+
+    def first_face(self, price: Functional) -> Face:
+        """The whole cone when it is small, else the spectra of low order."""
+        n = self.gram_order
+        few = self.inputs * max(_FIRST // (self.inputs * self._copies), 1)
+        first = np.eye(n)[:, : n if n * self._copies <= _WHOLE else min(few, n)]
+        return self._face(np.concatenate([first, 1j * first], axis=1) if self.hermitian else first, price)
+
+    def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
+        """The largest s with price - s value >= 0 on the whole cone: a generalised eigenvalue.
+
+        Where the price itself nearly vanishes, rounding spoils that eigenvalue, and the largest ratio
+        over frequency, which is valid too, stands in.
+        """
+        metric, worth = self.gram(price.vector), self.gram(value.vector)
+        spread = np.linalg.eigvalsh(metric)
+        if spread[0] <= _SINGULAR_PRICE * spread[-1]:
+            _, vectors = leading_pairs(worth - metric, np.eye(len(metric)), _DIRECTIONS)
+            return Pricing(directed_scale(price, value, grid)[0], vectors)
+        ratios, vectors = leading_pairs(worth, metric, _DIRECTIONS)
+        return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors)
+
+    def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[Self, Face]:
+        """Keep the generators that the solution uses, add the `directions` (n, number)."""
+        n, (known, number) = self.gram_order, face.generators.shape
+        if known == n and number == n * self._copies:
+            return self, face
+        eigenvalues, vectors = np.linalg.eigh(smat(y))
+        kept = eigenvalues > _KEPT * eigenvalues[-1]
+        kept[:-_MOST_KEPT] = False
+        used = np.pad(face.generators @ vectors[:, kept], ((0, n - known), (0, 0)))
+        return self, self._face(_independent(np.concatenate([used, directions], axis=1)), price)
+
+    def factor(self, face: Face, y: Array) -> NDArray:
+        """H (n, q) with Q = H H^*."""
+        eigenvalues, vectors = np.linalg.eigh(smat(y))
+        return face.generators @ (vectors * np.sqrt(np.maximum(eigenvalues, 0.0)))
+
+    def _face(self, spanning: NDArray, price: Functional) -> Face:
+        """Generators orthonormal in the metric of the price, so that the cost is tr Y."""
+        gram = self.gram(price.vector)[: len(spanning), : len(spanning)]
+        values, vectors = np.linalg.eigh((spanning.conj().T @ gram @ spanning).real)
+        generators = spanning @ (vectors / np.sqrt(np.maximum(values, _SINGULAR_PRICE * values[-1])))
+        return Face(self.products(generators), "psd", generators.shape[1], generators)
+
+
+def _independent(vectors: NDArray) -> NDArray:
+    """The same span over the real numbers, by orthonormal vectors."""
+    if not np.iscomplexobj(vectors):
+        return np.asarray(scipy.linalg.qr(vectors, mode="economic")[0])
+    q = scipy.linalg.qr(np.concatenate([vectors.real, vectors.imag]), mode="economic")[0]
+    return q[: len(vectors)] + 1j * q[len(vectors) :]

@@ -1,0 +1,111 @@
+"""FIR spectra of several inputs: Phi(w) = sum over |t| <= m of c_t e^{-jwt}, c_t = E u(s + t) u(s)^T."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.information import Quadrature, integrate
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.spectrum.basis import Density
+from inputdesign_cli.spectrum.channels import weighted_sums
+from inputdesign_cli.spectrum.gram import GramBasis
+from inputdesign_cli.spectrum.svec import svec_layout, svec_length
+
+
+@dataclass(frozen=True)
+class MatrixFirBasis(GramBasis):
+    """The unknowns are the upper triangle of c_0 by columns, then c_1 .. c_m (r, r) row by row.
+
+    `inputs` r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with
+    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 (matrix Fejer, Riesz); c_t is the sum of the
+    blocks (s + t, s) of Q.
+    """
+
+    @property
+    def size(self) -> int:
+        return svec_length(self.inputs) + self.order * self.inputs**2
+
+    @property
+    def white(self) -> Array:
+        """(size,): white excitation of total power one, even over the channels."""
+        rows, columns, _ = svec_layout(self.inputs)
+        unit = np.zeros(self.size)
+        unit[: rows.size] = (rows == columns) / self.inputs
+        return unit
+
+    def of_order(self, order: int) -> MatrixFirBasis:
+        return MatrixFirBasis(self.inputs, order)
+
+    def autocovariances(self, x: Array) -> NDArray[np.float64]:
+        """(m + 1, r, r): c_0 .. c_m."""
+        r = self.inputs
+        rows, columns, _ = svec_layout(r)
+        first = np.zeros((1, r, r))
+        first[0, rows, columns] = first[0, columns, rows] = x[: rows.size]
+        return np.concatenate([first, x[rows.size :].reshape(-1, r, r)])
+
+    def density(self, x: Array, w: ArrayLike) -> ComplexArray:
+        """(n, r, r): Phi, Hermitian, at normalised frequencies `w`."""
+        c = self.autocovariances(x)
+        turn = np.exp(-1j * np.outer(np.asarray(w, dtype=float), np.arange(1, self.order + 1)))
+        later = np.tensordot(turn, c[1:], axes=1)
+        return c[0] + later + later.conj().swapaxes(1, 2)
+
+    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown."""
+        lags = np.arange(self.order + 1)
+
+        def moments(rule: Quadrature) -> NDArray[np.float64]:
+            turn = np.exp(-1j * np.outer(rule.nodes, lags))
+            sums = weighted_sums(turn, density, rule, self.inputs).real
+            return self._functional(np.moveaxis(sums, (-2, -1), (1, 2)))
+
+        return integrate(moments, singularities, highest_lag=self.order)
+
+    def _functional(self, sums: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(size, ...) from the real parts (m + 1, r, r, ...) of the integrals of D(w) e^{-jwt}.
+
+        tr(D c_t e^{-jwt}) and its mirror image add up to twice the real part; D_ij meets c_ji.
+        """
+        rows, columns, _ = svec_layout(self.inputs)
+        mean = 0.5 * (sums[0] + sums[0].swapaxes(0, 1))
+        twice = np.where(rows == columns, 1.0, 2.0).reshape(-1, *[1] * (mean.ndim - 2))
+        head = mean[rows, columns] * twice
+        tail = 2.0 * sums[1:].swapaxes(1, 2)
+        return np.concatenate([head, tail.reshape(-1, *tail.shape[3:])])
+
+    def gram(self, vector: Array) -> NDArray[np.float64]:
+        """Block Toeplitz: a functional is nonnegative on the cone exactly when this matrix is."""
+        r, m = self.inputs, self.order
+        g = 0.5 * self.autocovariances(vector)
+        g[0] += np.diag(np.diag(g[0]))
+        blocks = np.zeros((m + 1, r, m + 1, r))
+        for lag in range(m + 1):
+            for start in range(m + 1 - lag):
+                blocks[start + lag, :, start] = g[lag]
+                blocks[start, :, start + lag] = g[lag].T
+        return blocks.reshape(r * (m + 1), r * (m + 1))
+
+    def products(self, generators: NDArray) -> Array:
+        """c_t of (v_a v_b^* + v_b v_a^*) / 2, by convolution along the lags."""
+        r, number = self.inputs, generators.shape[1]
+        length = 2 * (self.order + 1)
+        taps = np.zeros((self.order + 1, r, number))
+        taps.reshape(-1, number)[: len(generators)] = generators
+        transform = np.fft.rfft(taps, length, axis=0)
+        left, right, scale = svec_layout(number)
+        rows, columns, _ = svec_layout(r)
+        lags = np.arange(self.order + 1)
+        out = np.zeros((self.size, left.size))
+        tail = out[rows.size :].reshape(self.order, r, r, -1)
+        for i in range(r):
+            for j in range(r):
+                product = transform[:, i][:, left] * transform[:, j][:, right].conj()
+                product = product + transform[:, i][:, right] * transform[:, j][:, left].conj()
+                c = 0.5 * np.fft.irfft(product, length, axis=0)[lags] * scale
+                out[np.flatnonzero((rows == i) & (columns == j))] = c[:1]
+                tail[:, i, j] = c[1:]
+        return out

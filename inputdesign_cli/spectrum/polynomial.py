@@ -1,0 +1,134 @@
+"""Spectra that are polynomials in frequency: Phi(w) = 1/2 W(w) S W(w)^* on a band, zero outside.
+
+Spectral design paper, (8)-(9), with S = H H^T in place of the factor H: only S enters the information
+and the powers, which are linear in it. W = [p_0 I, .., p_m I], and the band is the half band [lo, hi]
+mapped to [-1, 1]: a polynomial on [-w_c, w_c] with real coefficients need not be an even spectrum,
+and what is not even is not the spectrum of any real signal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.polynomial import chebyshev, legendre
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.information import Quadrature, integrate_band
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.spectrum.basis import Density
+from inputdesign_cli.spectrum.channels import weighted_sums
+from inputdesign_cli.spectrum.gram import GramBasis
+from inputdesign_cli.spectrum.svec import hmat, hvec, hvec_layout, smat, svec, svec_layout, svec_length
+
+BasisName = Literal["legendre", "chebyshev", "monomial"]
+
+
+@dataclass(frozen=True)
+class PolynomialBasis(GramBasis):
+    """The unknowns are S (n, n), n = r (m + 1), as svec (real) or hvec (`hermitian`, complex).
+
+    `inputs` r, `order` m <= 40, `band` in the unit of frequency of the experiment. All computing is done
+    in Legendre polynomials orthonormal on the band, (1/2 pi) integral of p_a p_b = 1 if a = b, so that
+    the power of u is tr(S) / 2. Chebyshev polynomials and monomials span the same spectra; bringing
+    their S to this form is the congruence with the Cholesky factor of their Gram matrix, without which
+    monomials (condition 1e9 at m = 13) give wrong answers. `coefficients` converts back.
+    """
+
+    band: tuple[float, float] = (0.0, np.pi)
+    hermitian: bool = False
+
+    @property
+    def size(self) -> int:
+        n = self.gram_order
+        return n * n if self.hermitian else svec_length(n)
+
+    @property
+    def white(self) -> Array:
+        """(size,): the spectrum of total power one, flat over band and channels."""
+        flat = np.zeros((self.gram_order, self.gram_order))
+        flat[: self.inputs, : self.inputs] = 2.0 / self.inputs * np.eye(self.inputs)
+        return hvec(flat.astype(complex)) if self.hermitian else svec(flat)
+
+    def of_order(self, order: int) -> PolynomialBasis:
+        return PolynomialBasis(self.inputs, order, self.band, self.hermitian)
+
+    def functions(self, w: ArrayLike) -> Array:
+        """(n, m + 1): p_0 .. p_m, zero outside of the band."""
+        lo, hi = self.band
+        at = np.asarray(w, dtype=float)
+        scale = np.sqrt((2.0 * np.arange(self.order + 1) + 1.0) * np.pi / (hi - lo))
+        table = legendre.legvander(np.clip(2.0 * (at - lo) / (hi - lo) - 1.0, -1.0, 1.0), self.order) * scale
+        margin = 1e-12 * hi
+        return np.where(((at >= lo - margin) & (at <= hi + margin))[:, None], table, 0.0)
+
+    def matrix(self, x: Array) -> NDArray:
+        """S (n, n) in orthonormal Legendre polynomials."""
+        return hmat(x) if self.hermitian else smat(x)
+
+    def density(self, x: Array, w: ArrayLike) -> NDArray:
+        """Phi at `w`: (n,) for one input, else Hermitian (n, r, r)."""
+        m, r = self.order + 1, self.inputs
+        p = self.functions(w)
+        S = self.matrix(x).reshape(m, r, m, r)
+        phi = 0.5 * np.einsum("na,aibj,nb->nij", p, S, p, optimize=True)
+        return phi[:, 0, 0].real if r == 1 else phi.astype(complex)
+
+    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+        """(size, ...): (1 / 2 pi) integral over the band of tr(density(w) Phi(w)) for each unknown."""
+        first, second = np.triu_indices(self.order + 1)
+        place = np.zeros((self.order + 1, self.order + 1), dtype=np.intp)
+        place[first, second] = place[second, first] = np.arange(first.size)
+        rows, columns, scale, imaginary = self._layout()
+        pairs = place[rows // self.inputs, columns // self.inputs]
+        i, j = rows % self.inputs, columns % self.inputs
+
+        def moments(rule: Quadrature) -> NDArray[np.float64]:
+            p = self.functions(rule.nodes)
+            sums = weighted_sums(p[:, first] * p[:, second], density, rule, self.inputs)
+            # The advanced indices are apart, so that their axis comes first: (size, ...).
+            entries = np.moveaxis(sums, (-2, -1), (1, 2))[pairs, i, j]
+            spread = (slice(None), *[None] * (entries.ndim - 1))
+            chosen = np.where(imaginary[spread], entries.imag, entries.real)
+            return 0.5 * scale[spread] * chosen
+
+        return integrate_band(moments, singularities, self.band, highest_lag=2 * self.order)
+
+    def gram(self, vector: Array) -> NDArray:
+        return self.matrix(vector)
+
+    def products(self, generators: NDArray) -> Array:
+        rows, columns, scale, imaginary = self._layout()
+        left, right, pair_scale = svec_layout(generators.shape[1])
+        above, below = generators[rows], generators[columns].conj()
+        # The pair (a, b) of svec stands for (z_a z_b^* + z_b z_a^*) / sqrt(2), or z_a z_a^*.
+        entries = 0.5 * (above[:, left] * below[:, right] + above[:, right] * below[:, left]) * pair_scale
+        parts = np.where(imaginary[:, None], entries.imag, entries.real)
+        return parts * scale[:, None]
+
+    def _layout(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, NDArray[np.bool_]]:
+        if self.hermitian:
+            return hvec_layout(self.gram_order)
+        rows, columns, scale = svec_layout(self.gram_order)
+        return rows, columns, scale, np.zeros(rows.size, dtype=bool)
+
+    def coefficients(self, x: Array, basis: BasisName) -> NDArray:
+        """S (n, n) in the named basis of x = 2 (w - lo) / (hi - lo) - 1, degree by degree.
+
+        `legendre` is the orthonormal one. In monomials digits are lost as the order grows: their
+        coefficients alternate and cancel (ten digits at m = 20).
+        """
+        S = self.matrix(x)
+        if basis == "legendre":
+            return S
+        lo, hi = self.band
+        change = np.zeros((self.order + 1, self.order + 1))
+        for degree in range(self.order + 1):
+            unit = np.zeros(degree + 1)
+            unit[degree] = np.sqrt((2.0 * degree + 1.0) * np.pi / (hi - lo))
+            powers = legendre.leg2poly(unit)
+            column = powers if basis == "monomial" else chebyshev.poly2cheb(powers)
+            change[: degree + 1, degree] = column
+        spread = np.kron(change, np.eye(self.inputs))
+        return spread @ S @ spread.T

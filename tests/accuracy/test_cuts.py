@@ -1,0 +1,119 @@
+"""Cones against the sets they stand for, and the inequalities they prove against random members."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from inputdesign_cli.accuracy.cuts import DeterminantCut, EllipsoidCut, MatrixCut, TraceCut, VarianceCut
+from inputdesign_cli.design.conic import Block, solve_conic
+from inputdesign_cli.spectrum import svec, svec_length
+
+K = 3
+RNG = np.random.default_rng(0)
+
+
+def random_matrix(rank=K + 2):
+    root = RNG.normal(size=(K, rank))
+    return root @ root.T
+
+
+R = random_matrix(2)
+V = RNG.normal(size=(K, 2))
+W = random_matrix()
+Z, C = RNG.normal(size=(2, 2, K))
+FORM = np.zeros((K + 1, K + 1))
+FORM[:K, :K] = Z.T @ Z - C.T @ C
+FORM[:K, K] = FORM[K, :K] = -C[0]
+FORM[K, K] = -1.0
+
+
+def ellipsoid_scale(M, alpha):
+    """The least s for which no point of x^T s M x <= alpha^2 violates the form, by sampling directions."""
+    half = np.linalg.inv(np.linalg.cholesky(M))
+    directions = np.random.default_rng(1).normal(size=(400000, K))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    d = directions @ half
+    # Along each direction, the form is a quadratic in the length: its least positive root.
+    a, b = np.einsum("ni,ij,nj->n", d, FORM[:K, :K], d), 2 * d @ FORM[:K, K]
+    root = np.sqrt(np.maximum(b**2 + 4 * a, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lengths = np.stack([(-b + root) / (2 * a), (-b - root) / (2 * a)])
+    lengths = np.where((lengths > 0) & (b**2 + 4 * a >= 0), lengths, np.inf)
+    return (alpha / lengths.min()) ** 2
+
+
+# Each cut with the least multiple of M that belongs to it, from its definition.
+CUTS = {
+    "matrix": (MatrixCut(R), lambda M: np.linalg.eigvals(np.linalg.solve(M, R)).real.max()),
+    "variance": (VarianceCut(V), lambda M: np.trace(V.T @ np.linalg.solve(M, V))),
+    "determinant": (DeterminantCut(0.7), lambda M: 0.7 / np.linalg.det(M) ** (1 / K)),
+    "trace": (TraceCut(W), lambda M: 1 / np.trace(W @ M)),
+    "ellipsoid": (EllipsoidCut(FORM, 1.3), lambda M: ellipsoid_scale(M, 1.3)),
+}
+
+
+def least_scale(cut, M):
+    """Minimise s subject to the cones of the cut at s M."""
+    blocks = cut.blocks(K)
+    aux = blocks[0].auxiliary.shape[1]
+    cones = []
+    for block in blocks:
+        column = block.information @ svec(M)[:, None]
+        matrix = sp.hstack([sp.csc_matrix(column), block.auxiliary], format="csc")
+        cones.append(Block(block.kind, matrix, block.constant, block.order))
+    solution = solve_conic(np.eye(1 + aux)[0], cones, tolerance=1e-9)
+    assert solution.status in ("solved", "almost_solved")  # judged by the values below
+    return solution.x[0], solution.multipliers
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_cones_are_the_set(name):
+    cut, definition = CUTS[name]
+    for _ in range(3):
+        M = random_matrix()
+        scale, _ = least_scale(cut, M)
+        assert scale == pytest.approx(definition(M), rel=2e-3 if name == "ellipsoid" else 1e-6)
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_proofs_hold_whatever_the_multipliers(name):
+    """tr(Y M) >= r for every M of the set: random multipliers, random members on the boundary."""
+    cut, _ = CUTS[name]
+    boundary = [least_scale(cut, M)[0] * M for M in (random_matrix() for _ in range(6))]
+    for _ in range(20):
+        multipliers = []
+        for block in cut.blocks(K):
+            if block.kind == "psd":
+                root = RNG.normal(size=(block.order, block.order))
+                multipliers.append(svec(root @ root.T + 0.3 * RNG.normal() * np.eye(block.order)))
+            else:
+                multipliers.append(RNG.normal(size=block.constant.size))
+        Y, r = cut.proof(multipliers)
+        assert np.linalg.eigvalsh(Y)[0] >= -1e-9 * max(np.trace(Y), 1)
+        for M in boundary:
+            assert np.sum(Y * M) >= r - 1e-6 * abs(r)
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_proofs_are_tight_at_the_optimum(name):
+    """With the solver's own multipliers the inequality is an equality: strong duality."""
+    cut, _ = CUTS[name]
+    M = random_matrix()
+    scale, multipliers = least_scale(cut, M)
+    Y, r = cut.proof(list(multipliers))
+    assert np.sum(Y * M) * scale == pytest.approx(r, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_moved_cuts_describe_the_same_set(name):
+    cut, _ = CUTS[name]
+    M, congruence = random_matrix(), RNG.normal(size=(K, K))
+    moved, _ = least_scale(cut.moved(congruence), congruence @ M @ congruence.T)
+    assert moved == pytest.approx(least_scale(cut, M)[0], rel=1e-6)
+
+
+def test_blocks_have_the_right_sizes():
+    for cut, _ in CUTS.values():
+        for block in cut.blocks(K):
+            assert block.information.shape == (block.constant.size, svec_length(K))
+            assert block.auxiliary.shape[0] == block.constant.size

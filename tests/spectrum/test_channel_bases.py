@@ -1,0 +1,183 @@
+"""Families of Hermitian spectra: integrals against quadrature, faces inside the cone, prices attained."""
+
+import numpy as np
+import pytest
+from channel_plants import arx, paper_experiment
+
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import graded_grid
+from inputdesign_cli.spectrum import (
+    DirectedLines,
+    FlatBasis,
+    Functional,
+    MatrixFirBasis,
+    PolynomialBasis,
+    hmat,
+    hvec,
+)
+
+DISCRETE = ChannelExperiment(arx(), 20).whitened(1.0)
+PAPER = paper_experiment()
+FAMILIES = {
+    "fir": (MatrixFirBasis(2, 6), DISCRETE),
+    "polynomial": (PolynomialBasis(2, 5, (0.0, 2.0)), PAPER),
+    "complex polynomial": (PolynomialBasis(2, 5, (0.0, 2.0), True), PAPER),
+    "polynomial on a band": (PolynomialBasis(2, 3, (0.5, 1.5), True), DISCRETE),
+}
+
+
+def functionals(basis, experiment):
+    Y = np.diag(np.arange(1.0, experiment.size + 1))
+
+    def power(w):
+        return experiment.power_density("input", w) + 0.1 * experiment.power_density("output", w)
+
+    def value(w):
+        return experiment.value_density(Y, w)
+
+    return [Functional(basis.integrals(d, experiment.singularities), d) for d in (power, value)]
+
+
+def random_gram(basis, rng):
+    n = basis.gram_order
+    factor = rng.normal(size=(n, n)) + (1j * rng.normal(size=(n, n)) if basis.hermitian else 0)
+    return factor @ factor.conj().T
+
+
+def of_gram(basis, Q):
+    values, vectors = np.linalg.eigh(Q)
+    return sum(value * basis.products(v[:, None])[:, 0] for value, v in zip(values, vectors.T, strict=True))
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_integrals_are_those_of_the_density(name):
+    basis, experiment = FAMILIES[name]
+    rng = np.random.default_rng(3)
+    x = of_gram(basis, random_gram(basis, rng))
+    lo, hi = getattr(basis, "band", (0.0, np.pi))
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    w, weights = lo + (hi - lo) * (nodes + 1) / 2, weights * (hi - lo) / (2 * np.pi)
+    phi = basis.density(x, w)
+    for functional in functionals(basis, experiment):
+        expected = np.einsum("n,nab,nba->", weights, functional.density(w), phi).real
+        assert functional.at(x) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_gram_is_the_functional_on_gram_matrices(name):
+    basis, experiment = FAMILIES[name]
+    Q = random_gram(basis, np.random.default_rng(4))
+    for functional in functionals(basis, experiment):
+        G = basis.gram(functional.vector)
+        assert np.trace(G @ Q).real == pytest.approx(functional.at(of_gram(basis, Q)), rel=1e-10)
+        np.testing.assert_allclose(G, G.conj().T, atol=1e-12 * np.abs(G).max())
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_faces_hold_spectra_and_the_white_one_has_power_one(name):
+    basis, experiment = FAMILIES[name]
+    price, _ = functionals(basis, experiment)
+    face = basis.first_face(price)
+    rng = np.random.default_rng(5)
+    Y = rng.normal(size=(face.order, 3))
+    from inputdesign_cli.spectrum import svec
+
+    x = face.columns @ svec(Y @ Y.T)
+    lo, hi = getattr(basis, "band", (0.0, np.pi))
+    eigenvalues = np.linalg.eigvalsh(basis.density(x, np.linspace(lo, hi, 200)))
+    assert eigenvalues.min() >= -1e-9 * eigenvalues.max()
+    power = basis.integrals(lambda w: experiment.power_density("input", w), experiment.singularities)
+    assert power @ basis.white == pytest.approx(1.0, rel=1e-10)
+    factor = basis.factor(face, svec(Y @ Y.T))
+    np.testing.assert_allclose(of_gram(basis, factor @ factor.conj().T), x, atol=1e-9 * np.abs(x).max())
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_price_is_attained_and_never_exceeded(name):
+    basis, experiment = FAMILIES[name]
+    price, value = functionals(basis, experiment)
+    pricing = basis.price(price, value, np.linspace(0.01, 2.0, 300))
+    best = basis.products(pricing.directions[:, -1:])[:, 0]
+    assert price.at(best) == pytest.approx(pricing.scale * value.at(best), rel=1e-9)
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        x = of_gram(basis, random_gram(basis, rng))
+        assert price.at(x) >= pricing.scale * value.at(x)
+
+
+def test_enlarged_faces_keep_the_solution():
+    basis = PolynomialBasis(2, 20, (0.0, 2.0))
+    price, value = functionals(basis, PAPER)
+    face = basis.first_face(price)
+    assert face.order < basis.gram_order
+    from inputdesign_cli.spectrum import svec
+
+    Y = np.random.default_rng(7).normal(size=(face.order, 4))
+    x = face.columns @ svec(Y @ Y.T)
+    pricing = basis.price(price, value, np.linspace(0.01, 2.0, 300))
+    _, larger = basis.enlarge(face, svec(Y @ Y.T), pricing.directions, price)
+    residual = np.linalg.lstsq(larger.columns, x, rcond=None)[0]
+    np.testing.assert_allclose(larger.columns @ residual, x, atol=1e-8 * np.abs(x).max())
+
+
+def test_lower_orders_are_heads():
+    for basis in (MatrixFirBasis(2, 6), PolynomialBasis(2, 6, (0.0, 2.0), True)):
+        experiment = DISCRETE if isinstance(basis, MatrixFirBasis) else PAPER
+        lower = basis.of_order(2)
+        for whole, part in zip(functionals(basis, experiment), functionals(lower, experiment), strict=True):
+            np.testing.assert_allclose(whole.vector[: lower.size], part.vector, rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["legendre", "chebyshev", "monomial"])
+@pytest.mark.parametrize("hermitian", [False, True])
+def test_coefficients_in_any_basis_are_the_same_spectrum(kind, hermitian):
+    basis = PolynomialBasis(2, 6, (0.3, 2.0), hermitian)
+    x = of_gram(basis, random_gram(basis, np.random.default_rng(8)))
+    S = basis.coefficients(x, kind)
+    w = np.linspace(0.3, 2.0, 9)
+    z = 2 * (w - 0.3) / 1.7 - 1
+    p = {
+        "legendre": lambda: basis.functions(w),
+        "chebyshev": lambda: np.polynomial.chebyshev.chebvander(z, 6),
+        "monomial": lambda: np.vander(z, 7, increasing=True),
+    }[kind]()
+    blocks = S.reshape(7, 2, 7, 2)
+    np.testing.assert_allclose(
+        0.5 * np.einsum("na,aibj,nb->nij", p, blocks, p), basis.density(x, w), rtol=1e-8
+    )
+
+
+def test_hvec_keeps_inner_products():
+    rng = np.random.default_rng(9)
+    A, B = (rng.normal(size=(5, 5)) + 1j * rng.normal(size=(5, 5)) for _ in range(2))
+    A, B = A + A.conj().T, B + B.conj().T
+    assert hvec(A) @ hvec(B) == pytest.approx(np.trace(A @ B).real)
+    np.testing.assert_allclose(hmat(hvec(A)), A)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_atoms_pick_up_what_sinusoids_do_and_prices_bound_them(free):
+    grid = graded_grid(PAPER.singularities, 0.01, 2.0)
+    basis = DirectedLines.anywhere(0.01, 2.0, 2) if free else DirectedLines.at(np.linspace(0.1, 2.0, 12), 2)
+    price, value = functionals(basis, PAPER)
+    assert basis.flat.sum() == pytest.approx(1.0)
+    pricing = basis.price(price, value, grid)
+    grown, face = basis.enlarge(basis.first_face(price), np.zeros(0), pricing.directions, price)
+    assert grown.size > basis.size
+    assert face.order == grown.size
+    larger = functionals(grown, PAPER)
+    ratios = larger[0].vector / larger[1].vector
+    assert ratios.min() == pytest.approx(pricing.scale, rel=1e-8)
+    again, _ = grown.enlarge(face, np.zeros(0), pricing.directions, price)
+    assert again is grown
+    frequencies, powers = grown.lines(np.ones(grown.size))
+    assert np.all(np.diff(frequencies) > 0)
+    assert np.trace(powers, axis1=1, axis2=2).real.sum() == pytest.approx(grown.size)
+
+
+def test_flat_basis_prices_its_one_spectrum():
+    basis = FlatBasis(2, PAPER.band)
+    price, value = functionals(basis, PAPER)
+    w = np.array([0.5, 2.5])
+    np.testing.assert_allclose(basis.density(np.ones(1), w)[:, 0, 0], [np.pi / 4, 0.0])
+    assert basis.price(price, value, w).scale == pytest.approx(price.at(basis.white) / value.at(basis.white))
