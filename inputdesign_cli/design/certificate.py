@@ -1,8 +1,17 @@
 """Lower bounds that we prove ourselves: dual points, evaluated and made exactly feasible.
 
-For every admissible M and any Y >= 0 from a cut, tr(Y M) >= r. With M = M0 + M(x) and
-price(x) - s tr(Y M(x)) >= 0 on the whole cone of spectra, price(x) >= s (r - tr(Y M0)). The
-multipliers of the solver only suggest Y; the bound holds whatever they are.
+Every cut gives tr(Y M') >= r for all admissible M'; every limit a(z) <= b (times s) takes a weight
+w >= 0. With price = cost + sum w a over the upper limits and value = tr(Y M(.)) + sum w a over the lower
+ones, let t be the largest number with price - t value >= 0 on the whole cone of spectra. Then, for the
+goal "cost",
+
+    cost(z) >= t (sum r - tr(Y M0) + sum_lower w b) - sum_upper w b
+
+and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0,
+
+    s >= t (sum r - tr(Y M_fixed)) / (sum_upper w b - t sum_lower w b + t tr(Y M_scaled) - t sum_side r).
+
+The multipliers of the solver only suggest Y and w; the bounds hold whatever they are.
 """
 
 from __future__ import annotations
@@ -12,40 +21,96 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Cut
+from inputdesign_cli.design.master import Proof, Row
 from inputdesign_cli.design.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import Functional
+
+# Every upper limit keeps this share of its weight, so that no spectrum is free of charge.
+_LEAST_WEIGHT = 1e-9
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """A proved lower bound on the cost, and the dual point that proves it.
+    """A proved lower bound on the objective, and the dual point that proves it.
 
-    `weight` Y (k, k) is scaled so that price - tr(Y M(.)) is nonnegative on the cone of spectra;
-    `directions` are the spectra for which that is tightest (see `spectrum.Pricing`).
+    `weight` Y (k, k) and `limits` (a weight for each power limit) are scaled such that
+    price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
+    the spectra for which that is tightest (see `spectrum.Pricing`).
     """
 
     bound: float
     weight: Array
     directions: Array
+    limits: Array
+    price: Functional | None = None
+    value: Functional | None = None
 
 
-def certify(problem: Problem, cuts: Sequence[Cut], multipliers: Sequence[Array]) -> Certificate:
-    """The bound that these multipliers (k, k), one a cut, prove for the spectra of the problem."""
+def certify(
+    problem: Problem, proof: Proof, sides: Sequence[bool] = (), rows: Sequence[Row] = ()
+) -> Certificate:
+    """The bound that these multipliers prove for the spectra of the problem.
+
+    Args:
+        sides: for each cut of the proof whether it is a side requirement's; missing means that none is.
+        rows: the limits that the weights `proof.rows` belong to.
+    """
     k = problem.experiment.size
-    weight, required = np.zeros((k, k)), 0.0
-    for cut, multiplier in zip(cuts, multipliers, strict=True):
-        part, value = cut.proof(positive_part(multiplier))
-        weight = weight + part
-        required += value
-    pricing = problem.basis.price(problem.price, problem.value(weight), problem.grid)
-    gain = required - float(np.sum(weight * problem.baseline_information))
-    scale = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
-    return Certificate(scale * gain, scale * weight, pricing.directions)
+    sides = sides or [False] * len(proof.cuts)
+    weight = sum((Y for Y, _ in proof.cuts), np.zeros((k, k)))
+    required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if not side)
+    scaled_required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if side)
+    weights = _kept(problem, rows, proof.rows)
+    price: Functional | None = problem.price if problem.goal == "cost" else None
+    value = problem.value(weight)
+    upper = lower = fixed_lower = 0.0
+    for row, w in zip(rows, weights, strict=True):
+        if w == 0.0:
+            continue
+        if row.upper:
+            price = row.functional * w if price is None else price + row.functional * w
+            upper += w * row.bound
+        else:
+            value = value + row.functional * w
+            if problem.scaled and not problem.floors_fixed:
+                lower += w * row.bound
+            else:
+                fixed_lower += w * row.bound
+    if price is None:
+        raise ValueError("a goal with s needs an upper limit")
+    pricing = problem.basis.price(price, value, problem.grid)
+    gain = required - float(np.sum(weight * problem.fixed_information)) + fixed_lower
+    t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
+    if problem.goal == "cost":
+        bound, unit = t * gain - upper, 1.0
+    else:
+        scaled = float(np.sum(weight * problem.scaled_information))
+        spent = upper + t * (scaled - lower - scaled_required)
+        bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
+    if bound <= 0.0:
+        t = 0.0
+    shares = np.zeros(len(problem.limits))
+    for row, w in zip(rows, weights, strict=True):
+        if row.limit is not None:
+            shares[row.limit] = w * unit * (1.0 if row.upper else t)
+    return Certificate(
+        bound=max(bound, 0.0),
+        weight=t * unit * weight,
+        directions=pricing.directions,
+        limits=shares,
+        price=price * unit,
+        value=value * (t * unit),
+    )
 
 
-def positive_part(matrix: Array) -> Array:
-    """The nearest positive semidefinite matrix."""
-    eigenvalues, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    kept = eigenvalues > 0
-    return (vectors[:, kept] * eigenvalues[kept]) @ vectors[:, kept].T
+def _kept(problem: Problem, rows: Sequence[Row], weights: Array) -> Array:
+    """The weights with a tiny share added to upper limits, relative to the largest."""
+    if not len(rows) or problem.goal == "cost":
+        return weights
+    powers = np.array([row.upper and row.limit is not None for row in rows])
+    bounds = np.array([row.bound for row in rows])
+    spent = float(np.sum((weights * bounds)[[row.upper for row in rows]]))
+    added = np.zeros(len(rows))
+    added[powers] = _LEAST_WEIGHT * max(spent, 1e-30) / bounds[powers]
+    return weights + added

@@ -16,12 +16,16 @@ import scipy.sparse as sp
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec_length
 
-ConeKind = Literal["zero", "nonnegative", "psd"]
+ConeKind = Literal["zero", "nonnegative", "psd", "exponential"]
 
 
 @dataclass(frozen=True)
 class Block:
-    """offset + matrix x in the cone; for "psd" rows are svec of a matrix of this `order`."""
+    """offset + matrix x in the cone.
+
+    For "psd" the rows are svec of a matrix of this `order`; for "exponential" they are `order` triples
+    (t, y, x) with y exp(t / y) <= x, y > 0.
+    """
 
     kind: ConeKind
     matrix: sp.csc_matrix
@@ -31,6 +35,8 @@ class Block:
     def __post_init__(self) -> None:
         if self.kind == "psd" and self.offset.size != svec_length(self.order):
             raise ValueError("a psd block has as many rows as svec has entries")
+        if self.kind == "exponential" and self.offset.size != 3 * self.order:
+            raise ValueError("an exponential block has three rows for each of its order")
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,8 @@ def solve_conic(
             cones.append(clarabel.ZeroConeT(block.offset.size))
         elif block.kind == "nonnegative":
             cones.append(clarabel.NonnegativeConeT(block.offset.size))
+        elif block.kind == "exponential":
+            cones += [clarabel.ExponentialConeT()] * block.order
         else:
             cones.append(clarabel.PSDTriangleConeT(block.order))
     settings = clarabel.DefaultSettings()

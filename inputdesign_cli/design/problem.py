@@ -1,45 +1,94 @@
 """The one sentence that every convex design here is an instance of.
 
-minimise a linear cost of the spectrum x, subject to x in the cone of spectra and
-M(x) = M0 + sum_i x_i M_i meeting every requirement.
+minimise an objective of the spectrum x, subject to x in the cone of spectra, M(x) = M0 + sum_i x_i M_i
+meeting every requirement, and the powers and the density of x within their limits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Requirement, Violation, worst
+from inputdesign_cli.accuracy import Criterion, Requirement, Violation, worst
+from inputdesign_cli.design.limits import DensityBreach, DensityLimit, PowerLimit, breach_ratio
 from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.plant import graded_grid
+from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, Functional
+from inputdesign_cli.spectrum import Basis, FirBasis, Functional
 
 RequirementFactory = Callable[[Experiment], Requirement]
+Goal = Literal["cost", "factor", "samples"]
+Weight = float | tuple[float, ...]
+
+
+def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | None, float]]:
+    """The positive weights of a cost: kind, channel (None is the sum over the channels), weight."""
+    listed: list[tuple[PowerKind, int | None, float]] = []
+    for kind, weight in cost.items():
+        if isinstance(weight, tuple):
+            listed += [(kind, channel, w) for channel, w in enumerate(weight) if w > 0]
+        elif weight > 0:
+            listed.append((kind, None, weight))
+    return listed
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A least-cost design.
+    """A design problem, for one of three goals.
 
-    `cost` weighs the powers of input, output and excitation (least-costly paper, (18)).
-    `requirements` are made for the coordinates of `experiment`. `finer` is the same problem for a
-    larger basis, of whose integrals those of this basis are the head.
+    "cost": the least cost; `cost` weighs the powers of input, output and excitation (least-costly
+    paper, (18)).
+
+    "factor": the least s such that s M(x) meets the requirements, x within the limits: the best
+    accuracy (s is the square of the ratio r_u / r_adm, or the inverse of a criterion). In
+    (s x, s) this is linear again: z = s x, M' = s M0 + sum z_i M_i, limits times s.
+
+    "samples": the least number of samples N within the limits; the experiment's own number must be
+    one. In (N x, N) this is linear: M' = prior + N noise information + sum z_i M_i, limits times N.
+
+    `requirements` are made for the coordinates of `experiment`. `side` requirements (goal "factor")
+    must be met by M(x) itself. A density limit stands beside a limit on the power of the excitation
+    (`design.limits.implied_power`). With `floors_fixed` (goal "factor") lower limits do not scale: the
+    least multiple of the upper limits for which they can be met. `finer` is a problem of the same
+    experiment on the same or a larger basis, of whose integrals those of this basis are the head.
     """
 
     experiment: Experiment
     basis: Basis
-    cost: Mapping[PowerKind, float]
+    cost: Mapping[PowerKind, Weight]
     requirements: tuple[Requirement, ...]
-    finer: Problem | None = None
+    limits: tuple[PowerLimit, ...] = ()
+    densities: tuple[DensityLimit, ...] = ()
+    goal: Goal = "cost"
+    side: tuple[Requirement, ...] = ()
+    floors_fixed: bool = False
+    finer: Problem | None = field(default=None, repr=False)
 
     def coarsened(self, basis: Basis) -> Problem:
         """The same problem for a smaller basis of the same family (see `Basis.coarser`)."""
         return replace(self, basis=basis, finer=self)
+
+    @property
+    def scaled(self) -> bool:
+        """Whether an unknown s multiplies limits and known information (goals other than cost)."""
+        return self.goal != "cost"
+
+    @property
+    def has_floors(self) -> bool:
+        """Whether some limit is a lower one."""
+        powers = any(not limit.upper for limit in self.limits)
+        return powers or any(not limit.upper for limit in self.densities)
+
+    @property
+    def needs_definite(self) -> bool:
+        """Whether a singular information matrix is out of the question."""
+        asked = (*self.requirements, *self.side)
+        return any(not (isinstance(r, Criterion) and r.letter == "T") for r in asked)
 
     @cached_property
     def information_map(self) -> NDArray[np.float64]:
@@ -55,42 +104,104 @@ class Problem:
 
     def information(self, x: Array) -> Array:
         """(k, k): M(x)."""
-        return self.baseline_information + np.tensordot(x, self.information_map, axes=1)
+        return self.baseline_information + self.excited_information(x)
+
+    def excited_information(self, x: Array) -> Array:
+        """(k, k): sum_i x_i M_i."""
+        return np.tensordot(x, self.information_map, axes=1)
+
+    @cached_property
+    def fixed_information(self) -> Array:
+        """(k, k): the part of M' that neither x nor s scales."""
+        if self.goal == "cost":
+            return self.baseline_information
+        if self.goal == "samples":
+            return self.experiment.prior_information
+        return np.zeros_like(self.baseline_information)
+
+    @cached_property
+    def scaled_information(self) -> Array:
+        """(k, k): the part of M' in proportion to s."""
+        if self.goal == "cost":
+            return np.zeros_like(self.baseline_information)
+        return self.experiment.noise_information if self.goal == "samples" else self.baseline_information
 
     @cached_property
     def price(self) -> Functional:
-        """The cost as a functional of the spectrum."""
-        if self.finer is not None:
-            return Functional(self.finer.price.vector[: self.basis.size], self.finer.price.density)
-        parts = [self.power(kind) * weight for kind, weight in self.cost.items() if weight > 0]
+        """What x is measured by: the cost, or without one the sum of all powers over their upper limits."""
+        if self.goal == "cost":
+            parts = [self.power(kind, channel) * weight for kind, channel, weight in weights_of(self.cost)]
+        else:
+            caps = [limit for limit in self.limits if limit.upper]
+            parts = [self.power(limit.kind, limit.channel) * (1.0 / limit.bound) for limit in caps]
         total = parts[0]
         for part in parts[1:]:
             total = total + part
         return total
 
-    def power(self, kind: PowerKind) -> Functional:
-        """The power of input, output or excitation as a functional of the spectrum."""
+    def power(self, kind: PowerKind, channel: int | None = None) -> Functional:
+        """The power of input, output or excitation (of one channel) as a functional of the spectrum."""
+        known = self._powers.get((kind, channel))
+        if known is not None:
+            return known
 
         def density(w: Array) -> Array:
-            return self.experiment.power_density(kind, w)
+            return self.experiment.power_density(kind, w, channel)
 
-        return Functional(self.basis.integrals(density, self.experiment.singularities), density)
+        if self.finer is not None:
+            vector = self.finer.power(kind, channel).vector[: self.basis.size]
+        else:
+            vector = self.basis.integrals(density, self.experiment.singularities)
+        self._powers[kind, channel] = Functional(vector, density)
+        return self._powers[kind, channel]
+
+    @cached_property
+    def _powers(self) -> dict[tuple[PowerKind, int | None], Functional]:
+        return {}
+
+    @cached_property
+    def limit_functionals(self) -> tuple[Functional, ...]:
+        """The limited powers, one a limit."""
+        return tuple(self.power(limit.kind, limit.channel) for limit in self.limits)
 
     def value(self, weight: Array) -> Functional:
         """tr(Y (M(x) - M0)) for a fixed Y = `weight` (k, k) as a functional of the spectrum."""
-        experiment = self.experiment
-        scale = experiment.samples / experiment.model.variance
+        return Functional(
+            np.tensordot(self.information_map, weight, axes=2),
+            lambda w: self.experiment.value_density(weight, w),
+        )
 
-        def density(w: Array) -> Array:
-            F = experiment.excitation_gradient(w)
-            return scale * np.einsum("ni,ij,nj->n", F.conj(), weight, F, optimize=True).real
+    def density_at(self, frequency: float) -> Functional:
+        """Phi at one frequency as a functional; it has no density over frequency."""
+        assert isinstance(self.basis, FirBasis)
+        vector = self.basis.functions(np.array([frequency]))[0]
+        return Functional(vector, lambda w: np.zeros(np.shape(w)), concentrated=True)
 
-        return Functional(np.tensordot(self.information_map, weight, axes=2), density)
+    def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
+        """Local maxima of Phi over its limits times s (or once, for fixed ones), if above `above`."""
+        found = []
+        for index, limit in enumerate(self.densities):
+            assert isinstance(self.basis, FirBasis)
+            basis, factor = self.basis, self.bound_factor(limit.upper, s)
+            grid = np.union1d(limit.grid, np.linspace(0.0, np.pi, 16 * basis.size))
+
+            def ratio(
+                w: Array, limit: DensityLimit = limit, basis: FirBasis = basis, factor: float = factor
+            ) -> Array:
+                return breach_ratio(limit, basis.density(x, w) / factor, w)
+
+            w, heights = local_maxima(ratio, grid, ratio(grid), above=above)
+            found += [DensityBreach(index, float(a), float(h)) for a, h in zip(w, heights, strict=True)]
+        return found
+
+    def bound_factor(self, upper: bool, s: float) -> float:
+        """What a limit is multiplied by: s where limits scale, else one."""
+        return s if self.scaled and (upper or not self.floors_fixed) else 1.0
 
     @cached_property
     def grid(self) -> Array:
-        """Frequencies (rad/sample) that see every resonance of the excitation's densities."""
-        return graded_grid(self.experiment.singularities, 0.0, np.pi)
+        """Frequencies that see every resonance of the excitation's densities, over its band."""
+        return graded_grid(self.experiment.singularities, *self.experiment.band)
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[tuple[int, Violation]]:
         """All local maxima of all requirements' ratios, each with the index of its requirement."""
@@ -100,6 +211,25 @@ class Problem:
             for violation in requirement.violations(information, above=above)
         ]
 
+    def side_violations(self, information: Array, *, above: float = -np.inf) -> list[tuple[int, Violation]]:
+        """The same for the side requirements; their indices follow those of the requirements."""
+        first = len(self.requirements)
+        return [
+            (first + index, violation)
+            for index, requirement in enumerate(self.side)
+            for violation in requirement.violations(information, above=above)
+        ]
+
+    def requirement(self, index: int) -> Requirement:
+        """By the index that `violations` and `side_violations` give."""
+        return (*self.requirements, *self.side)[index]
+
     def worst_ratio(self, information: Array) -> Violation:
-        """The worst violation of all requirements."""
-        return worst([violation for _, violation in self.violations(information)])
+        """The worst violation of all requirements, criteria left out."""
+        found = [
+            violation
+            for requirement in (*self.requirements, *self.side)
+            if not isinstance(requirement, Criterion)
+            for violation in requirement.violations(information)
+        ]
+        return worst(found)

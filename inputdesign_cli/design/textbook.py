@@ -13,11 +13,13 @@ from typing import Literal
 
 import numpy as np
 
+from inputdesign_cli.accuracy.cuts import MatrixCut
 from inputdesign_cli.design.certificate import Certificate, certify
+from inputdesign_cli.design.master import Proof
 from inputdesign_cli.design.problem import Problem
 from inputdesign_cli.errors import Complaint, InaccurateError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import FirBasis
+from inputdesign_cli.spectrum import FirBasis, svec
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,12 @@ def solve_on_grid(
     maps = inverse @ problem.information_map @ inverse.T
     offset = inverse @ problem.baseline_information @ inverse.T
     information = offset + sum(power * c[i] * _symmetric(maps[i]) for i in range(basis.size))
-    cuts = [r.cut(float(w)) for r in problem.requirements for w in frequencies]
-    lmis = [information - _symmetric(inverse @ cut.matrix @ inverse.T) >> 0 for cut in cuts]
+    cuts = [
+        MatrixCut(r.cut(float(w)).matrix).moved(inverse)  # type: ignore[attr-defined]
+        for r in problem.requirements
+        for w in frequencies
+    ]
+    lmis = [information - _symmetric(cut.matrix) >> 0 for cut in cuts]
     program = cp.Problem(cp.Minimize((power / unit_cost) * problem.price.vector @ c), constraints + lmis)
     try:
         with warnings.catch_warnings():
@@ -65,8 +71,11 @@ def solve_on_grid(
     if program.status not in ("optimal", "optimal_inaccurate") or c.value is None:
         raise _failed(f"its status is {program.status}")
     x = power * c.value
-    multipliers = [unit_cost * inverse.T @ _symmetric(lmi.dual_value) @ inverse for lmi in lmis]
-    return GridResult(x, problem.price.at(x), certify(problem, cuts, multipliers))
+    proofs = []
+    for cut, lmi in zip(cuts, lmis, strict=True):
+        Y, r = cut.proof([svec(_symmetric(lmi.dual_value))])
+        proofs.append((unit_cost * inverse.T @ Y @ inverse, unit_cost * r))
+    return GridResult(x, problem.price.at(x), certify(problem, Proof(tuple(proofs), np.zeros(0))))
 
 
 def _positive(c, order: int, positivity: str) -> list:

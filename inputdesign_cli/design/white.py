@@ -10,7 +10,7 @@ import scipy.optimize
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.design.problem import Problem, RequirementFactory
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.spectrum import FirBasis
+from inputdesign_cli.spectrum import flat_basis
 
 _POLISH = 3
 
@@ -25,7 +25,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
     for _ in range(_POLISH):
         coordinates = experiment.whitened(power)
         requirements = tuple(make(coordinates) for make in factories)
-        problem = Problem(coordinates, FirBasis(0), {"excitation": 1.0}, requirements)
+        problem = Problem(coordinates, flat_basis(coordinates), {"excitation": 1.0}, requirements)
 
         def excess(log_power: float, problem: Problem = problem) -> float:
             information = problem.information(np.array([np.exp(log_power)]))

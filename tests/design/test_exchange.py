@@ -7,13 +7,17 @@ import pytest
 from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError, Relative
+from inputdesign_cli.design.designs import Question, solve_design
 from inputdesign_cli.design.exchange import exchange
-from inputdesign_cli.design.least_cost import least_cost
 from inputdesign_cli.design.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import FirBasis
 
 DENSE = np.unique(np.concatenate([np.linspace(0.0, np.pi, 50001), np.geomspace(1e-5, np.pi, 50001)]))
+
+
+def least_cost(experiment, basis, cost, factories, *, tolerance):
+    return solve_design(Question(experiment, basis, "cost", factories, cost=cost), tolerance=tolerance)
 
 
 def relative(model, fraction, alpha, band=(0.0, np.pi)):
@@ -52,6 +56,10 @@ def check(case, solution):
     assert phi.min() >= -1e-6 * phi.max(), case.name
     assert result.cost <= problem.price.at(solution.white_power * problem.basis.white) * (1 + 1e-9)
     assert solution.any_spectrum.certificate.bound <= result.cost * (1 + 1e-9)
+    # The bound over every spectrum against the cost of a spectrum of sinusoids that meets the accuracy.
+    anything = solution.any_spectrum
+    assert anything.certificate.bound >= anything.cost * (1 - 1e-4), case.name
+    assert requirement.ratios(anything.information, w).max() <= 1 + 1e-6, case.name
 
 
 @pytest.mark.parametrize("seed", [1, 4, 6, 9, 14, 19, 24, 30, 37, 43, 48, 57])

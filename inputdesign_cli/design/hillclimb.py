@@ -1,0 +1,209 @@
+"""Spectra with a factor of few columns by the bilinear hill-climb of the spectral design paper (Figure 3).
+
+Phi = 1/2 W H H^T W^T with H (n, c): M is quadratic in H. The paper fixes one argument of the bilinear
+form M(X, Y) and climbs in the other, which need not climb (for E it can lose). Since M(X - Y, X - Y) >= 0,
+M(X) >= 2 M(X, Y) - M(Y): making the criterion best of the right-hand side, which is affine in X, never
+loses. What it reaches is a lower bound of the best over all spectra; it depends on the start, so there
+are several.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array
+
+CriterionName = Literal["D", "A", "E", "T"]
+_MAX_STEPS = 100
+_SETTLED = 1e-7
+_STRETCH = (8.0, 3.0, 1.0)
+
+
+@dataclass(frozen=True)
+class QuadraticDesign:
+    """The problem for a factor: M_lm = baseline_lm + tr(A_lm H H^*), tr(P H H^*) <= cap for each limit.
+
+    `maps` (k, k, n, n) holds the A_lm and `limits` pairs (P, cap), Hermitian where H may be complex.
+    `scale` L (k, k): the criterion is that of L M L^T (raw or relative parameters).
+    """
+
+    maps: NDArray
+    baseline: Array
+    limits: tuple[tuple[NDArray, float], ...]
+    criterion: CriterionName
+    scale: Array
+
+    @property
+    def real(self) -> QuadraticDesign:
+        """The same for the real and imaginary parts of H, one above the other."""
+        if not np.iscomplexobj(self.maps):
+            return self
+        return QuadraticDesign(
+            _embedded(self.maps),
+            self.baseline,
+            tuple((_embedded(P), cap) for P, cap in self.limits),
+            self.criterion,
+            self.scale,
+        )
+
+    def information(self, H: Array) -> Array:
+        """(k, k): M for a real factor H (n, c)."""
+        return self.baseline + np.einsum("lmab,ac,bc->lm", self.maps, H, H, optimize=True)
+
+    def value(self, information: Array) -> float:
+        """log det, -tr of the inverse, smallest eigenvalue or trace of L M L^T."""
+        return criterion_value(self.criterion, self.scale @ information @ self.scale.T)
+
+    def feasible(self, H: Array) -> Array:
+        """H scaled until one limit binds."""
+        used = max(float(np.sum(H * (P @ H))) / cap for P, cap in self.limits)
+        return H / np.sqrt(used)
+
+
+def criterion_value(criterion: CriterionName, information: Array) -> float:
+    """The criterion of M (k, k), larger is better; minus infinity for singular M under D and A."""
+    eigenvalues = np.linalg.eigvalsh(0.5 * (information + information.T))
+    if criterion == "T":
+        return float(np.trace(information))
+    if criterion == "E":
+        return float(eigenvalues[0])
+    if eigenvalues[0] <= 0:
+        return -np.inf
+    return float(np.sum(np.log(eigenvalues)) if criterion == "D" else -np.sum(1.0 / eigenvalues))
+
+
+@dataclass(frozen=True)
+class HillClimb:
+    """The best factor H (n, c) found, what it attains, and the history of each start."""
+
+    factor: NDArray
+    value: float
+    histories: tuple[tuple[float, ...], ...]
+
+
+def hill_climb(
+    design: QuadraticDesign,
+    columns: int,
+    *,
+    starts: int,
+    rng: np.random.Generator,
+    guesses: Sequence[NDArray] = (),
+) -> HillClimb:
+    """Climb from random factors and from `guesses` (n, q), cut to their leading `columns`.
+
+    Raises:
+        ValueError: no start has any information.
+    """
+    real, half = design.real, len(design.maps[0, 0])
+    climber = _Step(real, columns)
+    n = real.maps.shape[-1]
+    begin = [_leading(guess, columns, stacked=n > half) for guess in guesses]
+    begin += [rng.normal(size=(n, columns)) for _ in range(starts)]
+    best: tuple[float, Array] | None = None
+    histories = []
+    for start in begin:
+        H, history = _climb(real, climber, real.feasible(start))
+        histories.append(tuple(history))
+        if best is None or history[-1] > best[0]:
+            best = history[-1], H
+    if best is None:
+        raise ValueError("a climb needs a start")
+    value, H = best
+    factor = H[:half] + 1j * H[half:] if n > half else H
+    return HillClimb(factor, value, tuple(histories))
+
+
+def _climb(design: QuadraticDesign, step: _Step, H: Array) -> tuple[Array, list[float]]:
+    history = [design.value(design.information(H))]
+    for _ in range(_MAX_STEPS):
+        found = step.best(H)
+        if found is None:
+            break
+        candidates = [design.feasible(found)] + [design.feasible(found + a * (found - H)) for a in _STRETCH]
+        values = [design.value(design.information(c)) for c in candidates]
+        top = int(np.argmax(values))
+        if values[top] <= history[-1]:
+            break
+        H = candidates[top]
+        history.append(values[top])
+        if np.isfinite(history[-2]) and history[-1] - history[-2] <= _SETTLED * abs(history[-1]):
+            break
+    return H, history
+
+
+class _Step:
+    """max phi(2 M(X, Y) - M(Y)) over X within the limits: compiled once, solved for every Y."""
+
+    def __init__(self, design: QuadraticDesign, columns: int) -> None:
+        import cvxpy as cp
+
+        self.design = design
+        k, n = design.baseline.shape[0], design.maps.shape[-1]
+        self._upper = np.triu_indices(k)
+        entries = self._upper[0].size
+        self._x: Any = cp.Variable(n * columns)
+        self._slope: Any = cp.Parameter((entries, n * columns))
+        self._offset: Any = cp.Parameter(entries)
+        M = cp.Variable((k, k), symmetric=True)
+        upper = cp.hstack([M[i, j] for i, j in zip(*self._upper, strict=True)])
+        constraints = [upper == self._slope @ self._x + self._offset]
+        for P, cap in design.limits:
+            root = np.kron(scipy.linalg.sqrtm(P / cap).real, np.eye(columns))
+            constraints.append(cp.norm(root @ self._x) <= 1.0)
+        inverse = np.linalg.inv(design.scale)
+        unit = inverse @ inverse.T
+        unit = unit / np.linalg.norm(unit, 2)
+        objective: Any
+        if design.criterion == "D":
+            objective = cp.log_det(M)
+        elif design.criterion == "A":
+            objective = -cp.matrix_frac(np.linalg.cholesky(unit), M)
+        elif design.criterion == "E":
+            objective = cp.Variable()
+            constraints.append(M - objective * unit >> 0)
+        else:
+            gain = design.scale.T @ design.scale
+            objective = cp.trace(gain / np.linalg.norm(gain, 2) @ M)
+        self._problem: Any = cp.Problem(cp.Maximize(objective), constraints)
+
+    def best(self, Y: Array) -> Array | None:
+        """The next factor (n, c), or None when the solver fails."""
+        import cvxpy as cp
+
+        design = self.design
+        slope = 2.0 * np.einsum("lmab,bc->lmac", design.maps, Y, optimize=True)
+        self._slope.value = slope[self._upper].reshape(self._upper[0].size, -1)
+        quadratic = design.information(Y) - design.baseline
+        self._offset.value = (design.baseline - quadratic)[self._upper]
+        try:
+            with warnings.catch_warnings():
+                # An inaccurate step does no harm: only what it is found to attain counts.
+                warnings.simplefilter("ignore")
+                self._problem.solve(solver=cp.CLARABEL)
+        except cp.SolverError:
+            return None
+        found = self._x.value
+        return None if found is None or not np.all(np.isfinite(found)) else found.reshape(Y.shape)
+
+
+def _embedded(A: NDArray) -> Array:
+    """Hermitian (.., n, n) -> real symmetric (.., 2 n, 2 n) with the same quadratic form."""
+    top = np.concatenate([A.real, -A.imag], axis=-1)
+    bottom = np.concatenate([A.imag, A.real], axis=-1)
+    return np.concatenate([top, bottom], axis=-2)
+
+
+def _leading(guess: NDArray, columns: int, *, stacked: bool) -> Array:
+    """The best approximation of guess guess^* by a factor of `columns` columns, in real numbers."""
+    u, s, _ = np.linalg.svd(guess, full_matrices=False)
+    H = (u * s)[:, :columns]
+    if H.shape[1] < columns:
+        H = np.pad(H, ((0, 0), (0, columns - H.shape[1])))
+    return np.concatenate([H.real, H.imag]) if stacked else H.real

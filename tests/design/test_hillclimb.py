@@ -1,0 +1,60 @@
+"""The bilinear hill-climb never loses, stays below the optimum, and reaches it with enough columns."""
+
+import numpy as np
+import pytest
+from channel_plants import paper_experiment
+from spectral_oracle import Spectral
+
+from inputdesign_cli.design.hillclimb import QuadraticDesign, criterion_value, hill_climb
+from inputdesign_cli.spectrum import PolynomialBasis
+
+
+def design(problem, criterion):
+    basis, k = problem.basis, problem.experiment.size
+    maps = np.array([[basis.gram(problem.maps[:, i, j]) for j in range(k)] for i in range(k)])
+    limits = tuple((basis.gram(limit), 1.0) for limit in problem.limits)
+    return QuadraticDesign(maps, np.zeros((k, k)), limits, criterion, problem.experiment.factor)
+
+
+@pytest.fixture(scope="module")
+def real():
+    return Spectral(paper_experiment(), PolynomialBasis(2, 3, (0.0, 2.0)))
+
+
+@pytest.mark.parametrize("criterion", ["D", pytest.param("A", marks=pytest.mark.slow), "E", "T"])
+def test_climbs_and_stays_below_the_optimum(real, criterion):
+    found = hill_climb(design(real, criterion), 2, starts=1, rng=np.random.default_rng(0))
+    history = np.array(found.histories[0])
+    assert np.all(np.diff(history) >= 0)
+    x, weight = real.solve(criterion)
+    bound = real.bound(x, criterion, weight)
+    assert found.value <= bound + 1e-9 * abs(bound)
+    assert abs(bound - found.value) <= 5e-3 * abs(bound)
+
+
+def test_what_it_reports_is_what_the_factor_attains(real):
+    problem = design(real, "D")
+    found = hill_climb(problem, 2, starts=1, rng=np.random.default_rng(1))
+    S = found.factor @ found.factor.T
+    M = np.array([[np.sum(A * S) for A in row] for row in problem.maps])
+    assert criterion_value("D", real.experiment.to_raw(M)) == pytest.approx(found.value, rel=1e-9)
+    assert max(np.sum(P * S) for P, _ in problem.limits) == pytest.approx(1.0)
+
+
+def test_a_factor_of_the_optimum_as_a_guess_loses_little_with_twice_the_columns(real):
+    """2 r real columns hold any spectrum: from the root of the optimal S, cut to them, nothing is missing."""
+    x, _ = real.solve("D")
+    values, vectors = np.linalg.eigh(real.basis.matrix(x))
+    root = vectors * np.sqrt(np.maximum(values, 0))
+    found = hill_climb(design(real, "D"), 4, starts=0, rng=np.random.default_rng(2), guesses=[root])
+    assert found.value == pytest.approx(real.value(x, "D"), abs=2e-2)
+
+
+def test_complex_factors_gain_over_real_ones():
+    complex_ = Spectral(paper_experiment(), PolynomialBasis(2, 3, (0.0, 2.0), True))
+    found = hill_climb(design(complex_, "T"), 2, starts=1, rng=np.random.default_rng(3))
+    x, _ = complex_.solve("T")
+    assert np.iscomplexobj(found.factor)
+    assert found.value == pytest.approx(complex_.value(x, "T"), rel=1e-3)
+    S = found.factor @ found.factor.conj().T
+    assert complex_.basis.gram(complex_.limits[0]).shape == S.shape
