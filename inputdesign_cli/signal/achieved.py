@@ -18,13 +18,8 @@ def record_information(experiment: Experiment, excitation: Array) -> Array:
     """
     gradient = experiment.whiten_rows(prediction_gradient(experiment, excitation))
     length = excitation.size / experiment.samples
-    noise = experiment.baseline_information
-    if experiment.prior is not None:
-        prior = experiment.whiten_matrix(experiment.prior)
-        noise = length * (noise - prior) + prior
-    else:
-        noise = length * noise
-    return noise + gradient.T @ gradient / experiment.model.variance
+    known = length * experiment.noise_information + experiment.prior_information
+    return known + gradient.T @ gradient / experiment.model.variance
 
 
 def prediction_gradient(experiment: Experiment, excitation: Array) -> NDArray[np.float64]:

@@ -9,15 +9,18 @@ from plants import random_case
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.signal import (
+    Demand,
+    Recipe,
+    Sinusoids,
     autocorrelation,
     filtered_noise,
     line_powers,
-    multisine,
     prediction_gradient,
+    realise,
     record_information,
     spectral_factor,
 )
-from inputdesign_cli.spectrum import FirBasis
+from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 
 @pytest.mark.parametrize("order", [0, 1, 5, 40, 200])
@@ -52,7 +55,8 @@ def test_multisine_has_exactly_its_line_powers(samples):
     w = 2 * np.pi * np.arange(samples // 2 + 1) / samples
     power = line_powers(FirBasis(2).density(c, w), samples)
     assert power.sum() == pytest.approx(c[0], rel=1e-12)
-    x = multisine(power, samples, np.random.default_rng(2))
+    lines = Sinusoids.on_grid(power, samples)
+    x = lines.record(lines.random_phases(np.random.default_rng(2)))
     spectrum = np.abs(np.fft.rfft(x) / samples) ** 2
     spectrum[1 : (samples + 1) // 2] *= 2
     np.testing.assert_allclose(spectrum, power, atol=1e-14)
@@ -105,3 +109,27 @@ def test_record_information_tends_to_that_of_the_spectrum(first_order):
     experiment = dataclasses.replace(first_order, samples=N).whitened(2.0)
     record = np.sqrt(2.0) * np.random.default_rng(0).standard_normal(N)
     np.testing.assert_allclose(record_information(experiment, record), np.eye(3), atol=0.03)
+
+
+def test_free_lines_that_a_record_cannot_tell_apart_do_not_cancel(first_order):
+    """Four sinusoids near w = 0 are one constant of their power; the line at 2.0 keeps its own power."""
+    basis = LinesBasis(np.array([1e-5, 2.0, 1.1e-5, 3e-4, 2.0 + 1e-6, 4e-4]), free=True)
+    x = np.array([1.0, 0.5, 1.0, 1.0, 0.5, 1.0])
+    for seed in range(6):
+        recipe = Recipe("multisine", candidates=1, seed=seed)
+        record = realise(first_order, basis, x, Demand(lambda _: 0.0), recipe, samples=500)
+        assert abs(np.mean(record.samples)) == pytest.approx(2.0, rel=0.01)
+        line = 2 * np.abs(np.mean(record.samples * np.exp(-2.0j * np.arange(500)))) ** 2
+        assert line == pytest.approx(1.0, rel=0.05)
+
+
+def test_given_lines_are_made_as_they_are_given(first_order):
+    basis = LinesBasis(np.array([1.0, 1.001]))
+    recipe = Recipe("multisine", candidates=1)
+    record = realise(first_order, basis, np.ones(2), Demand(lambda _: 0.0), recipe, samples=500)
+    rows = np.exp(1j * np.outer([1.0, 1.001], np.arange(500)))
+    regressors = np.concatenate([rows.real, rows.imag]).T
+    fit = np.linalg.lstsq(regressors, record.samples, rcond=None)
+    np.testing.assert_allclose(regressors @ fit[0], record.samples, atol=1e-8)
+    amplitude = np.hypot(fit[0][:2], fit[0][2:])
+    assert amplitude[0] == pytest.approx(amplitude[1], rel=1e-6)

@@ -1,0 +1,84 @@
+"""Phases of a low crest factor: the p-norm of the record minimised for p rising.
+
+P. Guillaume, J. Schoukens, R. Pintelon and I. Kollar, IEEE Trans. Instrumentation and Measurement 40
+(1991) 982-989: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak
+itself. Several signals that are linear in the same sinusoids (the output, the moves) may be kept low at
+once: the joint peak is that of all of them, each over its own bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.optimize
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.signal.sinusoids import Sinusoids
+
+_POWERS = (4, 8, 16, 32, 64, 128, 256, 512)
+_STEPS = 150
+_NEGLIGIBLE = 1e-40
+
+
+def optimise_phases(
+    lines: Sinusoids,
+    start: Array,
+    *,
+    gains: Sequence[ComplexArray] = (),
+    powers: Sequence[int] = _POWERS,
+    steps: int = _STEPS,
+) -> Array:
+    """(L,): phases from `start` (L,) on that keep the largest of all samples low.
+
+    Args:
+        gains: (L,) each, the signals to keep low as filters of the sinusoids, divided by what each may
+            reach; the record itself when there are none.
+        powers: the p, even numbers; with 4 alone the modulus comes out as even as can be.
+        steps: of the quasi-Newton method, for each p.
+    """
+    watched: list[ComplexArray | None] = list(gains) or [None]
+    phases, best = start, np.inf
+    kept = start
+    for p in powers:
+        found = scipy.optimize.minimize(
+            _log_norm,
+            phases,
+            args=(lines, watched, p),
+            jac=True,
+            method="L-BFGS-B",
+            options={"maxiter": steps, "maxcor": 20},
+        )
+        phases = found.x
+        peak = joint_peak(lines, phases, watched)
+        if peak < best:
+            kept, best = phases, peak
+    return kept
+
+
+def joint_peak(lines: Sinusoids, phases: Array, watched: Sequence[ComplexArray | None] = (None,)) -> float:
+    """The largest modulus over all samples of all the signals watched."""
+    return max(float(np.abs(lines.record(phases, gains)).max()) for gains in watched)
+
+
+def crest_factor(record: Array) -> float:
+    """Largest modulus over root mean square."""
+    return float(np.abs(record).max() / np.sqrt(np.mean(record**2)))
+
+
+def _log_norm(
+    phases: Array, lines: Sinusoids, watched: Sequence[ComplexArray | None], p: int
+) -> tuple[float, Array]:
+    """log of the p-norm (a mean) of all the signals, and its gradient with respect to the phases."""
+    records = [lines.record(phases, gains) for gains in watched]
+    peak = max(np.abs(record).max() for record in records)
+    count = sum(record.size for record in records)
+    # Without those that do not matter: powers that underflow are slow.
+    least = _NEGLIGIBLE ** (1.0 / p)
+    relative = [np.where(np.abs(record) < least * peak, 0.0, record / peak) for record in records]
+    powers = [np.abs(record) ** (p - 2) * record for record in relative]
+    total = sum(float(power @ record) for power, record in zip(powers, relative, strict=True))
+    slope = np.zeros(phases.size)
+    for power, gains in zip(powers, watched, strict=True):
+        slope += lines.slopes(phases, power / (peak * total), gains)
+    return float(np.log(peak) + np.log(total / count) / p), slope

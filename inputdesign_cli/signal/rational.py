@@ -1,0 +1,107 @@
+"""Low-order rational filters from the taps of a causal factor, stable by construction.
+
+Balanced truncation of the tapped delay line: the leading singular vectors of the Hankel matrix of the taps
+give a state-space model whose poles lie inside the unit circle (Pernebo and Silverman 1982).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray, unit_circle
+
+_LONGEST = 1024
+
+
+@dataclass(frozen=True)
+class RationalFilter:
+    """x(t+1) = A x + B e, u = C x + D e with white e of covariance I."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+    @property
+    def order(self) -> int:
+        """The number of states."""
+        return self.A.shape[0]
+
+    @property
+    def radius(self) -> float:
+        """The largest modulus of a pole."""
+        return float(np.abs(np.linalg.eigvals(self.A)).max(initial=0.0))
+
+    def at(self, w: Array) -> ComplexArray:
+        """(K, n, n): the frequency response."""
+        z = 1 / unit_circle(w)
+        states = np.linalg.solve(
+            z[:, None, None] * np.eye(self.order) - self.A, np.broadcast_to(self.B, (w.size, *self.B.shape))
+        )
+        return np.asarray(self.C @ states + self.D)
+
+    def spectrum(self, w: Array) -> ComplexArray:
+        """(K, n, n): response times its conjugate transpose."""
+        response = self.at(w)
+        return np.asarray(response @ np.conj(np.swapaxes(response, 1, 2)))
+
+    def power(self) -> Array:
+        """(n,): the exact mean squares of its outputs."""
+        covariance = scipy.linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T)
+        return np.diag(self.C @ covariance @ self.C.T + self.D @ self.D.T)
+
+    def scaled(self, factor: float) -> RationalFilter:
+        """The filter with its output times `factor`."""
+        return RationalFilter(self.A, self.B, factor * self.C, factor * self.D)
+
+    def filtered(self, samples: int, rng: np.random.Generator) -> Array:
+        """(n, samples): stationary noise, started from the stationary distribution of the state."""
+        covariance = scipy.linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T)
+        values, vectors = np.linalg.eigh(covariance)
+        state = vectors @ (np.sqrt(np.maximum(values, 0)) * rng.standard_normal(self.order))
+        drive = rng.standard_normal((samples, self.B.shape[1]))
+        out = np.empty((samples, self.C.shape[0]))
+        for t in range(samples):
+            out[t] = self.C @ state + self.D @ drive[t]
+            state = self.A @ state + self.B @ drive[t]
+        return out.T
+
+
+def rational_filter(taps: Array, order: int) -> RationalFilter:
+    """The balanced truncation to `order` states for each input of the filter with `taps` (L, n, n)."""
+    taps = taps[: 2 * _LONGEST]
+    n = taps.shape[1]
+    half = (taps.shape[0] - 1) // 2
+    blocks = np.zeros((2 * half, n, n))
+    blocks[: taps.shape[0] - 1] = taps[1 : 2 * half + 1]
+
+    def apply(flip: bool) -> Callable[[Array], Array]:
+        kernel = np.fft.rfft(np.swapaxes(blocks, 1, 2) if flip else blocks, 4 * half, axis=0)
+
+        def product(vector: Array) -> Array:
+            columns = np.fft.rfft(vector.reshape(half, n)[::-1], 4 * half, axis=0)
+            full = np.fft.irfft(np.einsum("kij,kj->ki", kernel, columns), 4 * half, axis=0)
+            return full[half - 1 : 2 * half - 1].ravel()
+
+        return product
+
+    hankel = scipy.sparse.linalg.LinearOperator(
+        (half * n, half * n), matvec=apply(False), rmatvec=apply(True), dtype=float
+    )
+    states = order * n
+    start = np.random.default_rng(0).standard_normal(half * n)
+    left, values, right = scipy.sparse.linalg.svds(hankel, k=states, v0=start)
+    rank = np.argsort(values)[::-1]
+    left, values, right = left[:, rank], values[rank], right[rank]
+    held = values > 1e-12 * values[0]
+    root = np.sqrt(values[held])
+    observed, reached = left[:, held] * root, root[:, None] * right[held]
+    # The taps end, so the rows that the shift brings in are zero and the truncation is a contraction.
+    shifted = np.vstack([observed[n:], np.zeros((n, root.size))])
+    A = (observed / root**2).T @ shifted
+    return RationalFilter(A, reached[:, :n], observed[:n], taps[0])

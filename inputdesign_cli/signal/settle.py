@@ -1,0 +1,67 @@
+"""The lowest level at which a record does what is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.optimize
+
+# Levels are found to this relative accuracy where the record is a multiple of its values, and to
+# the coarser one where limits and rounding make it depend on the level in another way.
+_EXACT = 1e-10
+_COARSE = 1e-3
+_GROWTH = 1.12
+_MOST_GROWTH = 40.0
+
+
+def least_level(ratio: Callable[[float], float], start: float) -> float:
+    """The level at which a `ratio` that falls continuously with the level is one, from above.
+
+    Raises:
+        LinAlgError: the ratio is not defined at any level: some parameter is not excited.
+    """
+    level = start
+    for _ in range(3):  # exact at once when all that is known comes from the record
+        reached = ratio(level)
+        if abs(reached - 1.0) <= 1e-12:
+            return level
+        level *= reached
+    low = high = level
+    while ratio(high) > 1.0:
+        low, high = high, high * 1.5
+    while ratio(low) <= 1.0 and low > 1e-9 * start:
+        low /= 1.5
+    if low < high:
+        root = scipy.optimize.brentq(
+            lambda a: np.log(ratio(np.exp(a))), np.log(low), np.log(high), xtol=_EXACT, rtol=1e-14
+        )
+        high = float(np.exp(root))
+        while ratio(high) > 1.0:
+            high *= 1.0 + _EXACT
+    return high
+
+
+def first_level(accepted: Callable[[float], bool], start: float) -> float | None:
+    """The least of rising levels that is accepted, to a thousandth, or None when none is.
+
+    Where limits bite, raising the level first helps, and at last changes nothing any more.
+    """
+    low, high = start / _GROWTH, start
+    while not accepted(high):
+        low, high = high, high * _GROWTH
+        if high > _MOST_GROWTH * start:
+            return None
+    while high > low * (1.0 + _COARSE):
+        middle = np.sqrt(low * high)
+        if accepted(middle):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def level_of_power(power: Callable[[float], float], wanted: float, start: float) -> float:
+    """The level at which the record has the `wanted` power, or the highest that still adds to it."""
+    found = first_level(lambda level: power(level) >= wanted * (1.0 - 1e-9), start)
+    return _MOST_GROWTH * start if found is None else found

@@ -1,0 +1,57 @@
+"""The delivered records of random designs: they meet the accuracy by themselves, at little extra power."""
+
+import numpy as np
+import pytest
+from plants import random_case
+
+from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.assemble.record import worst_ratio
+from inputdesign_cli.design.designs import Question, solve_design
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.signal import Demand, Recipe, input_and_output, realise, record_information
+from inputdesign_cli.spectrum import FirBasis
+
+EXTRA = {500: 0.10, 5000: 0.03}
+
+
+def delivered(seed, samples, **recipe):
+    """The design of a random case for so many samples, its record, and what that attains, all recomputed."""
+    case = random_case(seed)
+
+    def requirement(experiment):
+        return ModelError(experiment, case.admissible, case.alpha, case.band)
+
+    question = Question(
+        Experiment(case.loop, samples), FirBasis(case.order), "cost", [requirement], cost=case.cost
+    )
+    design = solve_design(question, tolerance=1e-6)
+    problem, x = design.problem, design.result.x
+    designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
+    demand = Demand(worst_ratio(problem.requirements), True, case.cost, designed)
+    record = realise(problem.experiment, FirBasis(x.size - 1), x, demand, Recipe(**recipe), samples=samples)
+    u, y = input_and_output(problem.experiment, record.samples)
+    means = {"input": np.mean(u**2), "output": np.mean(y**2), "excitation": np.mean(record.samples**2)}
+    cost = sum(weight * means[kind] for kind, weight in case.cost.items())
+    ratio = demand.worst_ratio(record_information(problem.experiment, record.samples))
+    return record, ratio, cost / designed - 1
+
+
+def check(seed, samples, **recipe):
+    record, ratio, extra = delivered(seed, samples, **recipe)
+    assert record.met
+    assert ratio <= 1 + 1e-9
+    assert extra == pytest.approx(record.extra_power, abs=1e-9)
+    assert extra <= EXTRA[samples]
+
+
+@pytest.mark.parametrize("seed", [0, 9, 12, 14])
+def test_some_random_designs(seed):
+    check(seed, 500)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("samples", [500, 5000])
+@pytest.mark.parametrize("method", ["filtered_noise", "multisine"])
+@pytest.mark.parametrize("seed", range(20))
+def test_random_designs(seed, samples, method):
+    check(seed, samples, method=method)
