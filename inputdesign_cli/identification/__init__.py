@@ -1,0 +1,12 @@
+"""From samples to models: prediction-error estimates with their covariance, and tests of the residuals."""
+
+from inputdesign_cli.identification.batch import BatchEstimate as BatchEstimate
+from inputdesign_cli.identification.batch import fit_batch as fit_batch
+from inputdesign_cli.identification.estimate import Estimate as Estimate
+from inputdesign_cli.identification.estimate import identify as identify
+from inputdesign_cli.identification.predictor import prediction_errors as prediction_errors
+from inputdesign_cli.identification.residual_tests import ResidualTest as ResidualTest
+from inputdesign_cli.identification.residual_tests import cross_correlation as cross_correlation
+from inputdesign_cli.identification.residual_tests import whiteness as whiteness
+from inputdesign_cli.identification.structure import Polynomials as Polynomials
+from inputdesign_cli.identification.structure import Structure as Structure

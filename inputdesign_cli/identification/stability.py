@@ -1,0 +1,36 @@
+"""Polynomials with all roots inside the unit circle: the test, and the nearest thing when it fails."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array
+
+# A root is never moved closer to the circle than this.
+_MARGIN = 1e-3
+
+
+def is_stable(monic: Array) -> NDArray[np.bool_]:
+    """(runs,): whether all roots in z of each polynomial (runs, m + 1) lie inside the unit circle.
+
+    By the step-down recursion: the reflection coefficients are below one in modulus.
+    """
+    stable = np.ones(monic.shape[0], dtype=bool)
+    p = monic
+    while p.shape[1] > 1:
+        last = p[:, -1:]
+        stable &= np.abs(last[:, 0]) < 1.0
+        room = np.where(np.abs(last) < 1.0, 1.0 - last**2, 1.0)
+        p = ((p - last * p[:, ::-1]) / room)[:, :-1]
+    return stable
+
+
+def reflected(monic: Array) -> Array:
+    """A polynomial (m + 1,) with its roots outside the unit circle mirrored at it."""
+    roots = np.roots(monic)
+    modulus = np.abs(roots)
+    roots = np.where(modulus >= 1.0, roots / np.maximum(modulus, 1e-300) ** 2, roots)
+    modulus = np.maximum(np.abs(roots), 1e-300)
+    roots = roots * np.minimum(1.0, (1.0 - _MARGIN) / modulus) ** (modulus > 1.0 - 1e-9)
+    return np.atleast_1d(np.asarray(np.poly(roots).real, dtype=float))
