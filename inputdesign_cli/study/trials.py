@@ -1,0 +1,149 @@
+"""One input tried many times: simulate the true loop, identify each record, compare with theory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification import Structure, fit_batch, identify
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal import input_and_output
+from inputdesign_cli.study.excitations import Excitation
+
+# Complex numbers of frequency responses held at a time.
+_CHUNK = 2_000_000
+
+
+@dataclass(frozen=True)
+class Trials:
+    """What the runs gave.
+
+    Attributes:
+        theta: (runs, k) estimates; `converged` (runs,).
+        power: mean squares of what the excitation causes: input, output, excitation.
+        total_power: mean squares of input and output, noise included.
+        first: (samples,) the excitation of the first run.
+    """
+
+    true: Experiment
+    structure: Structure
+    theta: Array
+    converged: NDArray[np.bool_]
+    power: dict[str, float]
+    total_power: dict[str, float]
+    first: Array
+
+    def errors(self, w: Array) -> Array:
+        """|G_hat - G_0| (runs, n) at frequencies `w` (n,) in rad/sample."""
+        true = self.true.model.plant_at(w)
+        size = max(1, _CHUNK // w.size)
+        parts = [
+            np.abs(self.structure.responses(self.theta[i : i + size], w) - true)
+            for i in range(0, len(self.theta), size)
+        ]
+        return np.concatenate(parts)
+
+    @cached_property
+    def same_structure(self) -> bool:
+        """Whether the true system has the parameters of the model."""
+        return self.true.model.names == self.structure.names
+
+
+@dataclass(frozen=True)
+class TrialJob:
+    """What all batches of one study share: the arguments of `run_trials` but the number of runs."""
+
+    true: Experiment
+    structure: Structure
+    start: Array
+    excitation: Excitation
+
+
+def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
+    """One batch of the study; see `run_trials`."""
+    return run_trials(job.true, job.structure, job.start, job.excitation, runs=runs, rng=rng)
+
+
+def joined(parts: Sequence[Trials]) -> Trials:
+    """All batches of one study as one; mean squares are weighted by the number of runs."""
+    weights = np.array([len(part.theta) for part in parts], dtype=np.float64)
+
+    def mean(entries: Sequence[dict[str, float]]) -> dict[str, float]:
+        return {
+            name: float(np.average([entry[name] for entry in entries], weights=weights))
+            for name in entries[0]
+        }
+
+    return replace(
+        parts[0],
+        theta=np.concatenate([part.theta for part in parts]),
+        converged=np.concatenate([part.converged for part in parts]),
+        power=mean([part.power for part in parts]),
+        total_power=mean([part.total_power for part in parts]),
+    )
+
+
+def run_trials(
+    true: Experiment,
+    structure: Structure,
+    start: Array,
+    excitation: Excitation,
+    *,
+    runs: int,
+    rng: np.random.Generator,
+) -> Trials:
+    """Simulate `runs` experiments from rest on the `true` system and identify each of them.
+
+    The search begins at `start` (k,), the model that the design was made on. Runs where it does not settle
+    are repeated from several starts. Prior information of `true` enters as an estimate from earlier data
+    would: with an error of its own in each run.
+    """
+    r = excitation.draw(runs, true.samples, rng)
+    u_x, y_x = input_and_output(true, r)
+    u_e, y_e = _noise(true, runs, rng)
+    u, y = u_x + u_e, y_x + y_e
+    found = fit_batch(structure, u, y, start=start)
+    theta, information, converged = found.theta, found.information, found.converged.copy()
+    for run in np.flatnonzero(~converged):
+        again = identify(structure, u[run], y[run], start=start)
+        theta[run], information[run], converged[run] = again.theta, again.information, again.converged
+    if true.prior is not None and true.model.names == structure.names:
+        theta = _with_prior(theta, information, true.prior, true.model.theta, rng)
+    mean_squares = {
+        "input": float(np.mean(u_x**2)),
+        "output": float(np.mean(y_x**2)),
+        "excitation": float(np.mean(r**2)),
+    }
+    total = {"input": float(np.mean(u**2)), "output": float(np.mean(y**2))}
+    return Trials(true, structure, theta, converged, mean_squares, total, np.array(r[0]))
+
+
+def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    """What e causes at input and output, (runs, samples) each, from rest."""
+    model, controller = true.model, true.loop.controller
+    e = np.sqrt(model.variance) * rng.standard_normal((runs, true.samples))
+    if controller is None:
+        v = scipy.signal.lfilter(model.C, np.convolve(model.A, model.D), e, axis=1)
+        return np.zeros_like(v), v
+    denominator = np.convolve(model.D, true.loop.characteristic)
+    forward = np.convolve(model.F, model.C)
+    y = scipy.signal.lfilter(np.convolve(forward, controller.denominator_polynomial), denominator, e, axis=1)
+    u = scipy.signal.lfilter(-np.convolve(forward, controller.numerator), denominator, e, axis=1)
+    return u, y
+
+
+def _with_prior(
+    theta: Array, information: Array, prior: Array, centre: Array, rng: np.random.Generator
+) -> Array:
+    """Estimates (runs, k) combined with earlier ones of information `prior`, which may be singular."""
+    values, vectors = np.linalg.eigh(prior)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    earlier = prior @ centre + rng.standard_normal(theta.shape) @ root.T
+    own = np.einsum("rij,rj->ri", information, theta)
+    return np.linalg.solve(information + prior, (own + earlier)[:, :, None])[:, :, 0]

@@ -1,0 +1,3 @@
+from conftest_study import spec, stub
+
+__all__ = ["spec", "stub"]
