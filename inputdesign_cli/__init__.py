@@ -12,19 +12,36 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inputdesign_cli.assemble import analyse, solve, validate
+    from inputdesign_cli.assemble import analyse, assess, identify, solve, validate
     from inputdesign_cli.spec import load_spec, parse_spec
+    from inputdesign_cli.study.simulation import simulate
+    from inputdesign_cli.study.sweep import sweep
 
 __version__ = "0.1.0"
 
-__all__ = ["__version__", "analyse", "load_spec", "parse_spec", "solve", "validate"]
+__all__ = [
+    "__version__",
+    "analyse",
+    "assess",
+    "identify",
+    "load_spec",
+    "parse_spec",
+    "simulate",
+    "solve",
+    "sweep",
+    "validate",
+]
 
 _HOME = {
     "load_spec": "inputdesign_cli.spec",
     "parse_spec": "inputdesign_cli.spec",
     "solve": "inputdesign_cli.assemble",
+    "simulate": "inputdesign_cli.study.simulation",
     "analyse": "inputdesign_cli.assemble",
+    "assess": "inputdesign_cli.assemble",
+    "identify": "inputdesign_cli.assemble",
     "validate": "inputdesign_cli.assemble",
+    "sweep": "inputdesign_cli.study.sweep",
 }
 
 

@@ -34,6 +34,36 @@ class SpectrumCurves:
     line_frequency: Array | None = None  # (L,)
     line_power: Array | None = None  # (L,) mean square of each sinusoid
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
+    record: Array | None = None  # (n,) smoothed periodogram of the record
+
+
+@dataclass(frozen=True)
+class MatrixSpectrumCurves:
+    """The spectrum of several inputs over frequency: a density, or the masses of lines."""
+
+    frequency: Array  # (n,) rad per time unit
+    spectrum: NDArray[np.complex128]  # (n, inputs, inputs), Hermitian
+    white: float | None = None  # the level of white noise of the same total power
+    lines: bool = False
+
+
+@dataclass(frozen=True)
+class DirectionCurves:
+    """The plant's gains in its principal directions, and the input's power in each of them."""
+
+    frequency: Array  # (n,)
+    gain: Array  # (n, inputs), singular values of G, largest first
+    power: Array  # (n, inputs), of the input along the right singular vectors
+    white: float | None = None
+    lines: bool = False
+
+
+@dataclass(frozen=True)
+class LossCurves:
+    """What the runs of a Monte Carlo study lost, input by input."""
+
+    losses: Mapping[str, Array]  # name -> (runs,)
+    theory: Mapping[str, float] = field(default_factory=dict)  # name -> mean
 
 
 @dataclass(frozen=True)
@@ -46,6 +76,8 @@ class BoundCurves:
     r_adm: Array | None = None
     r_u_white: Array | None = None  # of white excitation at the cost that it needs
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
+    r_u_record: Array | None = None  # of the samples of the record
+    label: str = "design"  # what gave r_u
 
 
 @dataclass(frozen=True)
@@ -58,11 +90,139 @@ class OptimalityCurves:
 
 
 @dataclass(frozen=True)
+class ChannelSpectrumCurves:
+    """A Hermitian spectrum over frequency: moduli of its entries and its eigenvalues; lines as stems."""
+
+    frequency: Array  # (n,) rad per time unit
+    moduli: Mapping[str, Array]  # "11" -> |Phi_11| (n,), "12" -> |Phi_12|, ..; of lines their powers
+    eigenvalues: Array  # (n, r), ascending
+    lines: bool = False
+    symbol: str = "u"
+
+
+@dataclass(frozen=True)
+class ChannelBoundCurves:
+    """Model error against admissible error, entry by entry: "[2,1]" -> its curves."""
+
+    entries: Mapping[str, BoundCurves]
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """The predicted confidence region of a pair of parameters: their values and (2, 2) covariances."""
+
+    names: tuple[str, str]
+    center: Array  # (2,)
+    covariance: Array
+    white: Array | None = None  # of white excitation within the same limits
+
+
+@dataclass(frozen=True)
+class EllipseCurves:
+    """Confidence ellipses of some pairs, all at one `probability`."""
+
+    pairs: tuple[Ellipse, ...]
+    probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class CloudCurves:
+    """Estimates of many runs in some planes of the parameters, and what theory predicts."""
+
+    names: tuple[str, ...]
+    pairs: tuple[tuple[int, int], ...]
+    theta: Array  # (runs, k)
+    centre: Array  # (k,) the truth
+    covariance: Array  # (k, k) in theory
+    probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class ErrorBandCurves:
+    """Quantiles over many runs of |G_hat - G_0| over frequency, against what was promised; arrays (n,)."""
+
+    frequency: Array
+    quantiles: Mapping[float, Array]  # probability -> (n,)
+    r_u: Array | None = None
+    r_adm: Array | None = None
+    name: str = "design"
+    runs: int = 0
+
+
+@dataclass(frozen=True)
+class FitCurves:
+    """Recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
+
+    time: Array
+    y: Array
+    predicted: Array
+    simulated: Array | None = None
+    fit: float | None = None  # per cent
+
+
+@dataclass(frozen=True)
+class ResidualCurves:
+    """Normalised correlations of residuals over lags (samples), and the probabilities of the two tests."""
+
+    lags: Array
+    autocorrelation: Array
+    input_lags: Array
+    cross_correlation: Array
+    limit: float
+    whiteness: float
+    independence: float
+
+
+@dataclass(frozen=True)
 class SignalCurves:
     """The record to be applied: `time` (n,), one array (n,) a channel."""
 
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
+
+
+@dataclass(frozen=True)
+class ErrorCurves:
+    """Mean-squared error of a shape of moments over the energy; all arrays (n,)."""
+
+    energy: Array
+    bias_squared: Array
+    variance: Array
+    white: Array  # of white regressors of that energy
+    design: tuple[float, float]  # energy and error of the design
+    target: float | None = None
+
+
+@dataclass(frozen=True)
+class MomentsCurves:
+    """The moments of regressors, and the lines of the periodic input that has them (if it is one input)."""
+
+    R: Array  # (n, n)
+    estimated: int  # how many of the n are estimated
+    line_frequency: Array | None = None  # (L,) rad per time unit, from 0 on
+    line_power: Array | None = None  # (L,) mean squares
+    nyquist: float = np.pi
+
+
+Curves = (
+    SpectrumCurves
+    | MatrixSpectrumCurves
+    | DirectionCurves
+    | LossCurves
+    | BoundCurves
+    | OptimalityCurves
+    | SignalCurves
+    | ChannelSpectrumCurves
+    | ChannelBoundCurves
+    | EllipseCurves
+    | ErrorCurves
+    | MomentsCurves
+    | CloudCurves
+    | ErrorBandCurves
+    | FitCurves
+    | ResidualCurves
+)
 
 
 @dataclass(frozen=True)
@@ -73,6 +233,5 @@ class Outcome:
     resolved_spec: str  # YAML text of the spec with all overrides applied
     time_unit: str = "s"
     tables: Mapping[str, Table] = field(default_factory=dict)
-    curves: Mapping[str, SpectrumCurves | BoundCurves | OptimalityCurves | SignalCurves] = field(
-        default_factory=dict
-    )
+    curves: Mapping[str, Curves] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)  # file name ("model.yaml") -> content

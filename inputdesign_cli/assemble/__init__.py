@@ -2,39 +2,68 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.assemble.least_cost import build_task, solve_least_cost
+from inputdesign_cli.assemble.analysis import analyse_given
+from inputdesign_cli.assemble.assessment import assess as assess
+from inputdesign_cli.assemble.channel_analysis import analyse_channels, build_channel_analysis
+from inputdesign_cli.assemble.channel_design import solve_channels
+from inputdesign_cli.assemble.channel_task import build_channel_task
+from inputdesign_cli.assemble.channels import has_channels
+from inputdesign_cli.assemble.closed_loop_error import solve_closed_loop_error
+from inputdesign_cli.assemble.closed_loop_problem import build_problem
+from inputdesign_cli.assemble.design import solve_convex
+from inputdesign_cli.assemble.identification import identify as identify
+from inputdesign_cli.assemble.regression import build_regression, solve_regression
+from inputdesign_cli.assemble.task import build_analysis, build_task
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec import RegressionPlant, Spec
 
 
 def solve(spec: Spec) -> Outcome:
-    """Design the experiment that the spec asks for.
+    """Design the experiment that the spec asks for; a given excitation is analysed.
 
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
+    if not spec.designs:
+        return analyse(spec)
     try:
-        return solve_least_cost(spec)
+        if isinstance(spec.plant, RegressionPlant):
+            return solve_regression(spec)
+        if spec.accuracy.closed_loop_error is not None:
+            return solve_closed_loop_error(spec)
+        return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
     except IdesignError as error:
         raise spec.place(error) from error
 
 
 def analyse(spec: Spec) -> Outcome:
-    """What a given excitation buys, without designing anything."""
-    raise spec.complain(
-        "not-supported",
-        "this version does not analyse a given excitation",
-        hint="design one: idesign solve SPEC",
-        key="spectrum",
-    )
+    """What a given excitation buys, without designing anything.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    try:
+        several = has_channels(spec) and not spec.designs
+        return analyse_channels(spec) if several else analyse_given(spec)
+    except IdesignError as error:
+        raise spec.place(error) from error
 
 
 def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing."""
     try:
-        build_task(spec)
+        if not spec.designs:
+            build_channel_analysis(spec) if has_channels(spec) else build_analysis(spec)
+        elif isinstance(spec.plant, RegressionPlant):
+            build_regression(spec)
+        elif spec.accuracy.closed_loop_error is not None:
+            build_problem(spec)
+        elif has_channels(spec):
+            build_channel_task(spec)
+        else:
+            build_task(spec)
     except IdesignError as error:
         raise spec.place(error) from error

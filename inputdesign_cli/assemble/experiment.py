@@ -2,18 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.plant import Loop, PolynomialModel, Rational
+from inputdesign_cli.plant import Loop, PolynomialModel, Rational, zero_order_hold
+from inputdesign_cli.signal import record_information
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.plant import PolynomialPlant
-from inputdesign_cli.spec.transfer import DiscreteTransfer
+from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer
+
+_PRIOR = "experiment.prior.information"
 
 
 def rational(transfer: DiscreteTransfer) -> Rational:
     """A transfer function of the spec, its denominator kept in factors."""
     return Rational.build(list(transfer.numerator), [list(f) for f in transfer.denominator_factors])
+
+
+def weight(spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer, key: str) -> Rational:
+    """A weight of the spec, sampled by a zero-order hold where it is given in s.
+
+    Raises:
+        SpecError: `not-sampled` for a weight in s that does not say how it is sampled.
+    """
+    if isinstance(transfer, DiscreteTransfer):
+        return rational(transfer)
+    if transfer.sample is None:
+        raise spec.complain(
+            "not-sampled",
+            f"{key} is in s, but the experiment is in discrete time",
+            hint="write sample: zoh beside continuous, or give the weight in q^-1",
+            key=key,
+        )
+    ratio = transfer.continuous
+    return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, spec.sample_time)
 
 
 def build_model(spec: Spec) -> PolynomialModel:
@@ -58,7 +83,7 @@ def build_experiment(spec: Spec) -> Experiment:
     controller = spec.experiment.controller
     loop = Loop(model, None if controller is None else rational(controller))
     loop.check_stability()
-    return Experiment(loop, spec.experiment.samples, _prior(spec, model))
+    return Experiment(loop, spec.experiment.samples, _prior(spec, loop))
 
 
 def build_cost(spec: Spec) -> dict[PowerKind, float]:
@@ -75,36 +100,54 @@ def _single(weight: object) -> float:
     return float(weight[0]) if isinstance(weight, tuple) else float(weight)  # type: ignore[arg-type]
 
 
-def _prior(spec: Spec, model: PolynomialModel) -> np.ndarray | None:
+def _prior(spec: Spec, loop: Loop) -> np.ndarray | None:
+    """The information at hand (k, k): a matrix, or that of the samples of an earlier experiment."""
     prior = spec.experiment.prior
     if prior is None:
         return None
-    key = "experiment.prior"
+    names = loop.model.names
     if isinstance(prior.information, str):
-        raise spec.complain(
-            "not-supported",
-            "this version takes prior information as a matrix, not from a data file",
-            hint="write information: [[..]], the inverse of the covariance of the parameters",
-            key=f"{key}.information",
-        )
-    matrix = np.array(prior.information, dtype=float)
-    names = prior.parameters or model.names
-    for name in names:
-        if name not in model.names:
+        excitation = read_excitation_record(spec, prior.information, _PRIOR)
+        earlier = Experiment(loop, excitation.size)
+        return record_information(earlier, excitation)
+    return embedded(spec, names, np.array(prior.information, dtype=float), prior.parameters, _PRIOR)
+
+
+def read_excitation_record(spec: Spec, name: str, key: str) -> np.ndarray:
+    """The samples of an excitation from a CSV file: its column u (in closed loop r).
+
+    Raises:
+        DataError: the file cannot be used.
+    """
+    channel = "r" if spec.closed_loop else "u"
+    return read_columns(spec.resolve_path(name), {"signal": channel}, key=key)["signal"]
+
+
+def embedded(
+    spec: Spec, known: Sequence[str], matrix: np.ndarray, names: Sequence[str] | None, key: str
+) -> np.ndarray:
+    """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
+
+    Raises:
+        SpecError: `unknown-parameter` or `wrong-shape`.
+    """
+    for name in names or ():
+        if name not in known:
             raise spec.complain(
                 "unknown-parameter",
                 f'the model has no parameter "{name}"',
-                hint=f"its parameters are {', '.join(model.names)}",
-                key=f"{key}.parameters",
+                hint=f"its parameters are {', '.join(known)}",
+                key=key,
             )
-    if len(matrix) != len(names):
+    listed = tuple(names or known)
+    if len(matrix) != len(listed):
         raise spec.complain(
             "wrong-shape",
-            f"the prior information is {len(matrix)} x {len(matrix)}, but there are {len(names)} parameters",
-            hint=f"order its rows as {', '.join(model.names)}, or name its parameters",
-            key=f"{key}.information",
+            f"the matrix is {len(matrix)} x {len(matrix)}, but there are {len(listed)} parameters",
+            hint=f"order its rows as {', '.join(known)}, or name its parameters",
+            key=key,
         )
-    full = np.zeros((len(model.names), len(model.names)))
-    index = [model.names.index(name) for name in names]
+    full = np.zeros((len(known), len(known)))
+    index = [list(known).index(name) for name in listed]
     full[np.ix_(index, index)] = matrix
     return full

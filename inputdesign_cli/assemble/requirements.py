@@ -1,125 +1,128 @@
-"""Spec -> requirements on the accuracy of the model."""
+"""Spec -> requirements on the accuracy of the model and criteria, as makers for any coordinates."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
-import scipy.special
 
 from inputdesign_cli.accuracy import (
-    Absolute,
-    AdmissibleError,
+    Criterion,
+    EllipsoidError,
+    InformationTarget,
     ModelError,
-    Relative,
-    Sensitivity,
-    Table,
-    Weighted,
+    WeightedVariance,
 )
-from inputdesign_cli.assemble.experiment import rational
-from inputdesign_cli.assemble.tables import read_columns
-from inputdesign_cli.errors import Complaint, DataError
+from inputdesign_cli.assemble.experiment import embedded, weight
+from inputdesign_cli.assemble.model_error import confidence_factor, sampled_band
+from inputdesign_cli.design.problem import RequirementFactory
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Loop, Rational
+from inputdesign_cli.plant import Rational
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
-from inputdesign_cli.spec.transfer import DiscreteTransfer
 
-_KEY = "accuracy.model_error"
-
-
-def confidence_factor(probability: float, parameters: int) -> float:
-    """alpha with Pr(chi-squared with this many degrees of freedom <= alpha^2) = probability."""
-    return float(np.sqrt(2.0 * scipy.special.gammaincinv(parameters / 2.0, probability)))
+_RELATIVE_ZERO = 1e-9
 
 
-def build_model_error(spec: Spec, experiment: Experiment) -> ModelError:
-    """`accuracy.model_error` in raw coordinates; `dataclasses.replace` moves it to others.
+def build_requirements(
+    spec: Spec, experiment: Experiment, error: ModelError | EllipsoidError | None
+) -> list[RequirementFactory]:
+    """One maker for each requirement that `accuracy` states, in the order of the contract.
+
+    Args:
+        error: the one on the model error, from `build_model_error`.
 
     Raises:
-        SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
-        DataError: the table cannot be used.
+        SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
+            cannot be met or is not supported.
+        DataError: a table cannot be used.
     """
-    error = spec.accuracy.model_error
-    if error is None:
-        raise ValueError("the spec states no model_error")
-    if error.region != "first_order":
-        raise spec.complain(
-            "not-supported",
-            "this version bounds the model error to first order",
-            hint="write region: first_order, or leave the key out",
-            key=f"{_KEY}.region",
+    makers: list[RequirementFactory] = []
+    accuracy = spec.accuracy
+    if error is not None:
+        makers.append(lambda e: replace(error, experiment=e))
+    if accuracy.information is not None:
+        target = accuracy.information
+        makers.append(
+            _target(spec, experiment, target.matrix, target.parameters, "accuracy.information", "information")
         )
-    model = experiment.model
-    lo, hi = spec.clip_band(error.band)
-    band = (lo * spec.sample_time, min(hi * spec.sample_time, np.pi))
-    admissible = _admissible(spec, experiment, band)
-    if error.weight is not None:
-        if not isinstance(error.weight, DiscreteTransfer):
+    if accuracy.application is not None:
+        makers.append(_application(spec, experiment))
+    if accuracy.weighted_variance is not None:
+        variance = _weighted_variance(spec, experiment)
+        makers.append(lambda e: replace(variance, experiment=e))
+    for name, deviation in (accuracy.standard_deviation or {}).items():
+        key = "accuracy.standard_deviation"
+        precision = np.array([[1.0 / deviation**2]])
+        makers.append(_target(spec, experiment, precision, (name,), key, f"standard_deviation of {name}"))
+    return makers
+
+
+def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | None:
+    """`accuracy.criterion`, of the parameters or of their relative errors.
+
+    Raises:
+        SpecError: `zero-parameter` when a relative error of a parameter that is zero is asked for.
+    """
+    letter = spec.accuracy.criterion
+    if letter is None:
+        return None
+    scale = np.ones(experiment.size)
+    if spec.accuracy.scale == "relative":
+        scale = experiment.model.theta
+        if np.any(scale == 0.0):
+            name = experiment.model.names[int(np.argmax(scale == 0.0))]
             raise spec.complain(
-                "not-supported",
-                "this version takes the weight as a sampled transfer function",
-                hint="write weight: {numerator: [..], denominator: [..]} in q^-1",
-                key=f"{_KEY}.weight",
+                "zero-parameter",
+                f"{name} is zero, so that it has no relative error",
+                hint="use scale: absolute, or drop the parameter from the model",
+                key="accuracy.scale",
             )
-        admissible = Weighted(admissible, rational(error.weight))
-    alpha = error.alpha or confidence_factor(error.probability or 0.95, int(np.sum(model.in_plant)))
-    requirement = ModelError(experiment, admissible, alpha, band)
-    requirement.check_positive()
+
+    def make(coordinates: Experiment) -> Criterion:
+        factor = np.eye(coordinates.size) if coordinates.factor is None else coordinates.factor
+        return Criterion(letter, scale[:, None] * factor)
+
+    return make
+
+
+def _target(
+    spec: Spec,
+    experiment: Experiment,
+    matrix: Sequence[Sequence[float]] | Array,
+    names: Sequence[str] | None,
+    key: str,
+    label: str,
+) -> RequirementFactory:
+    full = embedded(spec, experiment.model.names, np.array(matrix, dtype=float), names, key)
+    return lambda e: InformationTarget(e.whiten_matrix(full), label)
+
+
+def _application(spec: Spec, experiment: Experiment) -> RequirementFactory:
+    """M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over."""
+    application = spec.accuracy.application
+    assert application is not None
+    chi2 = confidence_factor(application.confidence, len(application.parameters)) ** 2
+    hessian = 0.5 * chi2 * application.gamma * np.array(application.hessian, dtype=float)
+    return _target(spec, experiment, hessian, application.parameters, "accuracy.application", "application")
+
+
+def _weighted_variance(spec: Spec, experiment: Experiment) -> WeightedVariance:
+    variance, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
+    assert variance is not None
+    transfer = variance.weight
+    W = Rational.build([1.0]) if transfer is None else weight(spec, transfer, f"{key}.weight")
+    band = sampled_band(spec, variance.band)
+    requirement = WeightedVariance(experiment, W, variance.max, band, variance.relative)
+    if variance.relative:
+        G = np.abs(experiment.model.plant_at(requirement.grid))
+        if G.min() <= _RELATIVE_ZERO * np.median(G):
+            at = requirement.grid[int(np.argmin(G))] / spec.sample_time
+            raise spec.complain(
+                "admissible-not-positive",
+                f"G vanishes at {at:.6g} rad/{spec.time_unit}, where its relative variance is infinite",
+                hint="restrict `band` to the frequencies that matter",
+                key=key,
+            )
     return requirement
-
-
-def _admissible(spec: Spec, experiment: Experiment, band: tuple[float, float]) -> AdmissibleError:
-    error = spec.accuracy.model_error
-    assert error is not None
-    model = experiment.model
-    if error.relative is not None:
-        return Relative(model, error.relative)
-    if error.absolute is not None:
-        return Absolute(error.absolute)
-    if error.table is not None:
-        return _table(spec, error.table, band)
-    sensitivity = error.sensitivity
-    assert sensitivity is not None
-    given = sensitivity.controller or spec.experiment.controller
-    assert given is not None
-    controller = rational(given)
-    Loop(model, controller).check_stability()
-    if not np.any(controller.numerator):
-        raise spec.complain(
-            "no-feedback",
-            "the controller is zero: no model error can harm the sensitivity",
-            hint="give the controller of the loop to be kept",
-            key=f"{_KEY}.sensitivity",
-        )
-    if sensitivity.max_db is not None:
-        return Sensitivity(model, controller, Rational.build([10 ** (-sensitivity.max_db / 20)]))
-    weight = sensitivity.weight
-    assert weight is not None
-    return Sensitivity(model, controller, rational(weight))
-
-
-def _table(spec: Spec, name: str, band: tuple[float, float]) -> Table:
-    key = f"{_KEY}.table"
-    path = spec.resolve_path(name)
-    columns = read_columns(path, {"frequency": "frequency", "r_adm": "r_adm"}, key=key)
-    frequency, value = columns["frequency"], columns["r_adm"]
-
-    def refuse(message: str, hint: str) -> DataError:
-        return DataError(Complaint("bad-table", f"{path.name}: {message}", hint, key, spec.locate(key)))
-
-    if np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
-        raise refuse("the frequencies must be nonnegative and increase from row to row", "sort the rows")
-    if np.any(value <= 0):
-        row = int(np.argmax(value <= 0)) + 2
-        raise refuse(
-            f"r_adm is {value[row - 2]:g} in row {row}: it must be positive",
-            "leave frequencies that do not matter out, and restrict band",
-        )
-    scaled = frequency * spec.sample_time
-    lo, hi = band
-    if scaled[0] > lo * (1 + 1e-9) or scaled[-1] < hi * (1 - 1e-9):
-        unit = f"rad/{spec.time_unit}"
-        raise refuse(
-            f"it covers {frequency[0]:g} to {frequency[-1]:g} {unit}, but the band is "
-            f"{lo / spec.sample_time:g} to {hi / spec.sample_time:g} {unit}",
-            "extend the table, or restrict accuracy.model_error.band",
-        )
-    return Table(scaled, value)

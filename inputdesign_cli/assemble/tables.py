@@ -25,23 +25,7 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
     Raises:
         DataError: `data-unreadable`, `data-missing-column` or `data-not-a-number`.
     """
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise _unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [
-                (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
-            ]
-    except FileNotFoundError:
-        raise _unreadable(
-            path, key, "does not exist", "paths are relative to the folder of the spec"
-        ) from None
-    except IsADirectoryError:
-        raise _unreadable(path, key, "is a folder", "name a CSV file") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise _unreadable(path, key, f"cannot be read ({error})", "name a CSV file in UTF-8") from None
-    if len(rows) < 2:
-        raise _unreadable(path, key, "holds no rows of numbers", "write a header line and rows below it")
+    rows = _rows(path, key)
     header = [name.strip().lower() for name in rows[0][1]]
     columns: dict[str, Array] = {}
     for role, start in wanted.items():
@@ -61,6 +45,37 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
             )
         columns[role] = np.array([_number(path, key, line, row, found[0]) for line, row in rows[1:]])
     return columns
+
+
+def has_column(path: Path, start: str, *, key: str) -> bool:
+    """Whether some header of a CSV file begins like this.
+
+    Raises:
+        DataError: `data-unreadable`.
+    """
+    return any(name.strip().lower().startswith(start) for name in _rows(path, key)[0][1])
+
+
+def _rows(path: Path, key: str) -> list[tuple[int, list[str]]]:
+    """The rows that are not empty with their line numbers, at least a header and one row."""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise _unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [
+                (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
+            ]
+    except FileNotFoundError:
+        raise _unreadable(
+            path, key, "does not exist", "paths are relative to the folder of the spec"
+        ) from None
+    except IsADirectoryError:
+        raise _unreadable(path, key, "is a folder", "name a CSV file") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise _unreadable(path, key, f"cannot be read ({error})", "name a CSV file in UTF-8") from None
+    if len(rows) < 2:
+        raise _unreadable(path, key, "holds no rows of numbers", "write a header line and rows below it")
+    return rows
 
 
 def _number(path: Path, key: str, line: int, row: list[str], column: int) -> float:

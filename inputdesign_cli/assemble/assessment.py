@@ -1,0 +1,123 @@
+"""Spec and data -> does the real experiment meet the target, and if not, what is still to be done."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from inputdesign_cli.accuracy import worst
+from inputdesign_cli.assemble.design import solve_convex
+from inputdesign_cli.assemble.identification import (
+    Identified,
+    identification_entry,
+    identification_outcome,
+    identified,
+    model_notes,
+)
+from inputdesign_cli.assemble.model_error import build_model_error
+from inputdesign_cli.assemble.requirements import build_requirements
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spec import Spec, parse_spec
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Whether the data meet what the spec asks for; the outcome of the identification or of the top-up."""
+
+    met: bool
+    outcome: Outcome
+
+
+def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
+    """Identify the model from a real experiment and compare what the data buy with what is asked.
+
+    Both sides are evaluated at the new estimate: r_u by the information of the data themselves (and of
+    `experiment.prior`), r_adm by the new model. Where it falls short, the experiment that makes up for it
+    is designed as `solve` does, with the data as prior information.
+
+    Raises:
+        SpecError: nothing is asked that data could meet; see `identify` and `solve`.
+        DataError: the file cannot be used.
+        InfeasibleError, InaccurateError: of the top-up.
+    """
+    try:
+        return _assess(spec, Path(data), remove_means)
+    except IdesignError as error:
+        raise spec.place(error) from error
+
+
+def _assess(spec: Spec, path: Path, remove_means: bool) -> Assessment:
+    if not spec.accuracy.requirements:
+        raise spec.complain(
+            "nothing-to-assess",
+            "the spec states no accuracy that data could meet or miss",
+            hint="state one, such as accuracy: {model_error: {relative: 0.05}}",
+            key="accuracy",
+        )
+    started = time.perf_counter()
+    found = identified(spec, path, remove_means=remove_means)
+    information = found.estimate.information + found.experiment.prior_information
+    met, listed = _requirements(found, information)
+    if met or not spec.designs:
+        outcome = identification_outcome(spec, found, started)
+        verdict = {"met": met, "requirements": listed}
+        result = {**outcome.result, "status": "met" if met else "missed", "assessment": verdict}
+        return Assessment(met, replace(outcome, result=result))
+    identification = identification_outcome(spec, found, started)
+    topped = _top_up(found, information)
+    result = {
+        **topped.result,
+        "title": spec.title,
+        "status": "missed",
+        "identification": identification_entry(found.estimate),
+        "assessment": {"met": False, "requirements": listed, "top_up_status": topped.result["status"]},
+        "notes": [*topped.result.get("notes", []), *found.data.notes, *model_notes(found.estimate)],
+    }
+    tables = {**topped.tables, **{f"data_{k}": t for k, t in identification.tables.items()}}
+    curves = {**topped.curves, **{f"data_{k}": c for k, c in identification.curves.items()}}
+    return Assessment(
+        False,
+        replace(
+            topped,
+            result=result,
+            tables=tables,
+            curves=curves,
+            files={**topped.files, **identification.files},
+        ),
+    )
+
+
+def _requirements(found: Identified, information: Array) -> tuple[bool, list[dict[str, Any]]]:
+    spec, experiment = found.spec, found.experiment
+    error = build_model_error(spec, experiment) if spec.accuracy.model_error is not None else None
+    listed: list[dict[str, Any]] = []
+    for make in build_requirements(spec, experiment, error):
+        requirement = make(experiment)
+        violation = worst(requirement.violations(information))
+        entry: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
+        if violation.frequency is not None:
+            entry["frequency"] = violation.frequency / spec.sample_time
+        listed.append(entry)
+    return all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed), listed
+
+
+def _top_up(found: Identified, information: Array) -> Outcome:
+    """The design on the new estimate with the data as prior information."""
+    prior = {
+        "parameters": list(found.estimate.names),
+        "information": (0.5 * (information + information.T)).tolist(),
+    }
+    spec = parse_spec(
+        found.spec.to_yaml(),
+        file="top-up",
+        overrides=[f"experiment.prior={json.dumps(prior)}"],
+        folder=found.spec.resolve_path("."),
+    )
+    return solve_convex(spec)

@@ -1,0 +1,168 @@
+"""A given excitation of several channels or in continuous time -> what accuracy it buys."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.accuracy import Absolute, EntryError, EntryOfPlant, active_entries, worst
+from inputdesign_cli.assemble.analysis import check_excites
+from inputdesign_cli.assemble.channel_curves import (
+    channel_signal_curves,
+    density_curves,
+    entry_bound_curves,
+    line_curves,
+    plain_complex,
+)
+from inputdesign_cli.assemble.channel_given import (
+    ChannelExcitation,
+    channel_samples,
+    read_channel_excitation,
+    spectral,
+)
+from inputdesign_cli.assemble.channel_record import record_sizes
+from inputdesign_cli.assemble.channel_requirements import required_band
+from inputdesign_cli.assemble.channel_task import (
+    channel_cost,
+    channel_prior,
+    channel_requirements,
+    check_channels_supported,
+)
+from inputdesign_cli.assemble.channels import (
+    build_channel_model,
+    excitation_band,
+    frequency_unit,
+    record_step,
+)
+from inputdesign_cli.assemble.ellipses import check_pairs, experiment_ellipses
+from inputdesign_cli.assemble.model_error import model_error_alpha
+from inputdesign_cli.assemble.record import worst_ratio
+from inputdesign_cli.assemble.result import information_entry, requirements_entry
+from inputdesign_cli.assemble.task import Task
+from inputdesign_cli.design.designs import Question
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal import channel_record_information
+from inputdesign_cli.spec import Spec
+from inputdesign_cli.spectrum import DirectedLines, FlatBasis, TabulatedChannels
+
+
+def build_channel_analysis(spec: Spec) -> Task:
+    """The question of a given excitation: its requirements, if any, are checked, not met.
+
+    Raises:
+        SpecError, DataError: see the builders of the parts.
+    """
+    check_channels_supported(spec)
+    record_step(spec)
+    model, band = build_channel_model(spec), excitation_band(spec)
+    # Any: requirements ask for no more than both kinds of experiments have.
+    experiment: Any = ChannelExperiment(
+        model, spec.experiment.samples, band, channel_prior(spec, ChannelExperiment(model, 1, band))
+    )
+    requirements = channel_requirements(spec, experiment)
+    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    check_pairs(spec, model.names)
+    question = Question(experiment, FlatBasis(model.inputs, band), "cost", requirements)
+    return Task(question, experiment, channel_cost(spec), model_error_alpha(spec, experiment), None)  # type: ignore[arg-type]
+
+
+def analyse_channels(spec: Spec) -> Outcome:
+    """r_u entry by entry, information, predicted standard deviations and powers of `spectrum.given`.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used, or the excitation leaves
+            parameters undetermined (`not-exciting`).
+    """
+    started = time.perf_counter()
+    task = build_channel_analysis(spec)
+    raw: Any = task.experiment
+    excitation = read_channel_excitation(spec, raw)
+    experiment: Any = raw.whitened(max(sum(excitation.power["excitation"]), 1e-300))
+    if excitation.samples is not None:
+        experiment = replace(experiment, samples=len(excitation.samples))
+    information = excitation.information(experiment)
+    check_excites(spec, experiment, information)
+    requirements = tuple(make(experiment) for make in task.question.requirements)
+    cost, white = excitation.cost(channel_cost(spec)), _even(raw, 1.0)
+    level = cost / white.cost(channel_cost(spec))
+    flat = _even(raw, level).information(experiment)
+    met = all(worst(r.violations(information)).ratio <= 1.0 + 1e-9 for r in requirements)
+    result: dict[str, Any] = {
+        "format": 1,
+        "title": spec.title,
+        "status": "given" if not requirements else "met" if met else "missed",
+        "cost": cost,
+        "samples": experiment.samples,
+        "power": excitation.power,
+        "information": information_entry(experiment, information),
+        "spectrum": _entry(spec, excitation),
+        "baseline": {"white": {"cost": cost, "excitation_power": level}},
+    }
+    result |= requirements_entry(spec, task, requirements, information, np.zeros(0))
+    tables: dict[str, Any] = {}
+    curves: dict[str, Any] = {}
+    errors = [r for r in requirements if isinstance(r, EntryOfPlant)]
+    tables["bound"], curves["bound"] = entry_bound_curves(
+        spec, errors or _unstated(spec, task, experiment), information, flat, stated=bool(errors)
+    )
+    if isinstance(excitation.basis, DirectedLines):
+        tables["spectrum"], curves["spectrum"] = line_curves(spec, excitation.basis, _x(excitation))
+    elif excitation.basis is not None:
+        tables["spectrum"], curves["spectrum"] = density_curves(spec, excitation.basis, _x(excitation))
+    ellipses = experiment_ellipses(spec, experiment, information, flat)
+    if ellipses is not None:
+        curves["ellipses"] = ellipses
+    samples = channel_samples(spec, excitation)
+    if samples is not None:
+        kind = "given" if excitation.samples is not None else "multisine"
+        result["signal"] = {"type": kind, **record_sizes(spec, experiment, samples)}
+        if requirements:
+            reached = channel_record_information(experiment, samples, record_step(spec))
+            result["signal"]["worst_ratio"] = _ratio(requirements, reached)
+        tables["signal"], curves["signal"] = channel_signal_curves(spec, samples)
+    result["timing_s"] = {"analysis": time.perf_counter() - started}
+    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves)
+
+
+def _even(experiment: ChannelExperiment, power: float) -> ChannelExcitation:
+    """White excitation of this total power, flat over the band and even over the channels."""
+    share = np.full(experiment.inputs, power / experiment.inputs)
+    return spectral("white", TabulatedChannels.white(share, experiment.band), np.ones(1), experiment)
+
+
+def _x(excitation: ChannelExcitation) -> Array:
+    assert excitation.x is not None
+    return excitation.x
+
+
+def _ratio(requirements: tuple[Any, ...], information: Array) -> float | None:
+    """The worst ratio of a record; None when it is too short to excite every parameter."""
+    try:
+        return worst_ratio(requirements)(information)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _unstated(spec: Spec, task: Task, experiment: ChannelExperiment) -> tuple[EntryError, ...]:
+    """What draws r_u of every entry where no bound on it is stated."""
+    band = required_band(spec, experiment, None)
+    return tuple(
+        EntryError(experiment, Absolute(1.0), task.alpha, band, output=i, input=j)
+        for i, j in active_entries(experiment.model, band[1])
+    )
+
+
+def _entry(spec: Spec, excitation: ChannelExcitation) -> dict[str, Any]:
+    entry: dict[str, Any] = {"type": "given", "given": excitation.kind}
+    if isinstance(excitation.basis, DirectedLines):
+        frequencies, powers = excitation.basis.lines(_x(excitation))
+        entry["frequencies"] = frequencies / frequency_unit(spec)
+        entry["powers"] = plain_complex(powers)
+    elif excitation.kind == "white":
+        entry["power"] = excitation.power["input"]
+    return entry

@@ -1,0 +1,188 @@
+"""Tables and curves of designs with several channels or in continuous time, in the units of the spec."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import EntryOfPlant
+from inputdesign_cli.assemble.channels import excitation_band, frequency_unit
+from inputdesign_cli.assemble.curves import distinct, frequency_header
+from inputdesign_cli.design.designs import Design
+from inputdesign_cli.outcome import (
+    BoundCurves,
+    ChannelBoundCurves,
+    ChannelSpectrumCurves,
+    OptimalityCurves,
+    SignalCurves,
+    SpectrumCurves,
+    Table,
+)
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.spectrum import PolynomialSpectrum
+from inputdesign_cli.spectrum import (
+    DirectedLines,
+    FlatBasis,
+    LinesBasis,
+    MatrixFirBasis,
+    PolynomialBasis,
+    best_directions,
+)
+
+_POINTS = 1000
+_CARRIES = 1e-9
+_SUPPORT = 1e-3
+
+
+def hermitian_columns(values: NDArray, symbol: str) -> dict[str, Array]:
+    """Columns phi_11, phi_12_re, phi_12_im, phi_22, .. of values (n, r, r); phi of values (n,)."""
+    if values.ndim == 1:
+        return {symbol: values}
+    columns = {}
+    for i in range(values.shape[1]):
+        columns[f"{symbol}_{i + 1}{i + 1}"] = values[:, i, i].real
+        for j in range(i + 1, values.shape[2]):
+            columns[f"{symbol}_{i + 1}{j + 1}_re"] = values[:, i, j].real
+            columns[f"{symbol}_{i + 1}{j + 1}_im"] = values[:, i, j].imag
+    return columns
+
+
+def density_curves(
+    spec: Spec, basis: object, x: Array
+) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+    """spectrum.csv and its plot of a basis with a density: over the band of the excitation."""
+    w = np.linspace(*excitation_band(spec), _POINTS)
+    phi = basis.density(x, w)  # type: ignore[attr-defined]
+    frequency = w / frequency_unit(spec)
+    table = Table({frequency_header(spec): frequency, **hermitian_columns(phi, "phi")})
+    if phi.ndim == 1:
+        inside = frequency > 0
+        return table, SpectrumCurves(frequency[inside], density=phi[inside])
+    return table, _moduli(frequency, phi, lines=False)
+
+
+def line_curves(
+    spec: Spec, basis: LinesBasis | DirectedLines, x: Array
+) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+    """spectrum.csv and its plot of sinusoids: powers, or Hermitian power matrices, ascending in frequency."""
+    powers: Any
+    if isinstance(basis, LinesBasis):
+        order = np.argsort(basis.frequencies)
+        order = order[x[order] > _CARRIES * x.sum()]
+        frequencies, powers = basis.frequencies[order], x[order]
+    else:
+        frequencies, powers = basis.lines(x)
+    frequency = frequencies / frequency_unit(spec)
+    table = Table({frequency_header(spec): frequency, **hermitian_columns(powers, "power")})
+    if powers.ndim == 1:
+        return table, SpectrumCurves(frequency, line_frequency=frequency, line_power=powers)
+    return table, _moduli(frequency, powers, lines=True)
+
+
+def _moduli(frequency: Array, phi: NDArray, *, lines: bool) -> ChannelSpectrumCurves:
+    r = phi.shape[1]
+    pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
+    moduli = {f"{i + 1}{j + 1}": np.abs(phi[:, i, j]) for i, j in pairs}
+    return ChannelSpectrumCurves(frequency, moduli, np.linalg.eigvalsh(phi), lines)
+
+
+def entry_bound_curves(
+    spec: Spec,
+    requirements: Sequence[EntryOfPlant],
+    information: Array,
+    white: Array | None,
+    *,
+    stated: bool = True,
+) -> tuple[Table, ChannelBoundCurves]:
+    """bound.csv and its plot: r_u, r_adm and |G| of every entry over the band of the requirement.
+
+    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing.
+    """
+    band = requirements[0].band
+    lo = max(band[0], 1e-3 * band[1])
+    peaks = [v.frequency for r in requirements for v in r.violations(information, above=0.5)]
+    inside = np.array([w for w in peaks if w is not None and lo <= w <= band[1]])
+    w = np.unique(np.concatenate([np.geomspace(lo, band[1], 600), np.linspace(lo, band[1], 300), inside]))
+    frequency = w / frequency_unit(spec)
+    columns: dict[str, Array] = {frequency_header(spec): frequency}
+    entries = {}
+    for requirement in requirements:
+        i, j = requirement.output, requirement.input
+        r_u = requirement.error_bound(information, w)
+        r_adm = requirement.admissible.at(w) if stated else None
+        G = np.abs(requirement.experiment.model.plant_at(w)[:, i, j])
+        for name, values in (("r_u", r_u), ("r_adm", r_adm), ("G_abs", G)):
+            if values is not None:
+                columns[f"{name}_{i + 1}{j + 1}"] = values
+        compared = None if white is None else requirement.error_bound(white, w)
+        if compared is not None:
+            columns[f"r_u_white_{i + 1}{j + 1}"] = compared
+        entries[requirement.label] = BoundCurves(frequency, r_u, G, r_adm, compared)
+    return Table(columns), ChannelBoundCurves(entries)
+
+
+def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | None:
+    """The worth of the best direction at each frequency over its price, by the bound over every spectrum."""
+    anything = design.any_spectrum
+    price, value = anything.certificate.price, anything.certificate.value
+    if price is None or value is None:
+        return None
+    basis, x = anything.basis, anything.x
+    assert isinstance(basis, LinesBasis | DirectedLines)
+    support = np.unique(basis.frequencies[x > _SUPPORT * x.sum()])
+    lo, hi = design.problem.experiment.band
+    start = max(lo, 1e-3 * hi)
+    w = np.union1d(np.geomspace(start, hi, _POINTS), support[support >= start])
+    ratio, _ = best_directions(price.density(w), value.density(w))
+    unit = frequency_unit(spec)
+    return OptimalityCurves(w / unit, ratio, distinct(np.maximum(support, w[0])) / unit)
+
+
+def channel_signal_curves(spec: Spec, record: Array) -> tuple[Table, SignalCurves]:
+    """signal.csv and its plot: time, u1, u2, .."""
+    time = spec.sample_time * np.arange(len(record), dtype=np.float64)
+    offset = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), record.shape[1])
+    channels = {f"u{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
+    limits = {}
+    if spec.limits.amplitude is not None and spec.limits.amplitude.input is not None:
+        most = np.broadcast_to(np.asarray(spec.limits.amplitude.input, dtype=float), record.shape[1])
+        limits = {f"u{i + 1}": (offset[i] - most[i], offset[i] + most[i]) for i in range(most.size)}
+    return Table({f"time_{spec.time_unit}": time, **channels}), SignalCurves(time, channels, limits)
+
+
+def channel_spectrum_entry(spec: Spec, basis: object, x: Array) -> dict[str, Any]:
+    """What `result.json` says of a spectrum of the families for channels and bands."""
+    if isinstance(basis, FlatBasis):
+        return {"type": "white", "power": float(x[0])}
+    if isinstance(basis, MatrixFirBasis):
+        return {"type": "fir", "order": basis.order, "coefficients": basis.autocovariances(x)}
+    if isinstance(basis, DirectedLines):
+        frequencies, powers = basis.lines(x)
+        return {
+            "type": "free" if basis.free else "multisine",
+            "frequencies": frequencies / frequency_unit(spec),
+            "powers": plain_complex(powers),
+        }
+    assert isinstance(basis, PolynomialBasis)
+    stated = spec.spectrum
+    kind = stated.basis if isinstance(stated, PolynomialSpectrum) else "legendre"
+    return {
+        "type": "polynomial",
+        "basis": kind,
+        "order": basis.order,
+        "band": [edge / frequency_unit(spec) for edge in basis.band],
+        "coefficients": plain_complex(basis.coefficients(x, kind)),
+    }
+
+
+def plain_complex(values: NDArray) -> Any:
+    """Complex numbers as {re, im}; real ones as they are."""
+    if not np.iscomplexobj(values):
+        return values
+    if values.ndim == 0:
+        return {"re": float(values.real), "im": float(values.imag)}
+    return [plain_complex(part) for part in values]

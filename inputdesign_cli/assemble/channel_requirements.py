@@ -1,0 +1,148 @@
+"""Spec -> what is required of every entry of G: its model error and its weighted variance over frequency."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from inputdesign_cli.accuracy import (
+    Absolute,
+    AdmissibleError,
+    ContinuousWeight,
+    EllipsoidEntryError,
+    EntryError,
+    EntryVariance,
+    RelativeEntry,
+    Weighted,
+    active_entries,
+)
+from inputdesign_cli.accuracy.model_error import check_positive
+from inputdesign_cli.assemble.bound_table import read_bound
+from inputdesign_cli.assemble.channels import frequency_unit
+from inputdesign_cli.assemble.experiment import weight
+from inputdesign_cli.assemble.model_error import model_error_alpha
+from inputdesign_cli.assemble.tables import has_column
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import Rational
+from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer
+
+_ERROR = "accuracy.model_error"
+
+
+def build_entry_errors(spec: Spec, experiment: Any) -> tuple[EntryError | EllipsoidEntryError, ...]:
+    """`accuracy.model_error` for every entry of G, in raw coordinates; empty when it is not asked for.
+
+    Raises:
+        SpecError: `not-supported` forms, `admissible-not-positive`.
+        DataError: the table cannot be used.
+    """
+    error = spec.accuracy.model_error
+    if error is None:
+        return ()
+    if error.sensitivity is not None:
+        raise spec.complain(
+            "not-supported",
+            "model_error.sensitivity is that of one sampled loop; with several channels or in continuous "
+            "time the bound is relative, absolute or a table",
+            hint="write relative: 0.05 (of each entry of G), absolute: 0.1 or table: r_adm.csv",
+            key=f"{_ERROR}.sensitivity",
+        )
+    band = required_band(spec, experiment, error.band)
+    weighted = None if error.weight is None else any_weight(spec, error.weight, f"{_ERROR}.weight")
+    alpha = model_error_alpha(spec, experiment)
+    errors: list[EntryError | EllipsoidEntryError] = []
+    for i, j in active_entries(experiment.model, band[1]):
+        admissible = _admissible(spec, experiment, band, i, j)
+        if weighted is not None:
+            admissible = Weighted(admissible, weighted)
+        errors.append(
+            EntryError(experiment, admissible, alpha, band, output=i, input=j)
+            if error.region == "first_order"
+            else _over_ellipsoid(spec, experiment, admissible, alpha, band, i, j)
+        )
+        check_positive(admissible, errors[-1].grid)
+    return tuple(errors)
+
+
+def _over_ellipsoid(
+    spec: Spec,
+    experiment: Any,
+    admissible: AdmissibleError,
+    alpha: float,
+    band: tuple[float, float],
+    i: int,
+    j: int,
+) -> EllipsoidEntryError:
+    error = spec.accuracy.model_error
+    assert error is not None
+    if not experiment.model.is_fraction(i, j):
+        raise spec.complain(
+            "not-supported",
+            f"region: ellipsoid needs entries that are fractions linear in the parameters; [{i + 1},{j + 1}] "
+            "is not: it has both A and F, or is sampled from s",
+            hint="use region: first_order for this structure",
+            key=f"{_ERROR}.region",
+        )
+    against: Literal["relative", "absolute"] = "absolute" if error.relative is None else "relative"
+    return EllipsoidEntryError(experiment, admissible, alpha, against, band, output=i, input=j)
+
+
+def _admissible(
+    spec: Spec, experiment: ChannelExperiment, band: tuple[float, float], i: int, j: int
+) -> AdmissibleError:
+    """r_adm of one entry; of a table its column r_adm_21, or r_adm for all entries alike."""
+    error = spec.accuracy.model_error
+    assert error is not None
+    if error.relative is not None:
+        return RelativeEntry(experiment.model, error.relative, i, j)
+    if error.absolute is not None:
+        return Absolute(error.absolute)
+    assert error.table is not None
+    own = f"r_adm_{i + 1}{j + 1}"
+    several = has_column(spec.resolve_path(error.table), "r_adm_", key=f"{_ERROR}.table")
+    unit = frequency_unit(spec)
+    return read_bound(spec, error.table, band, unit=unit, column=own if several else "r_adm")
+
+
+def any_weight(
+    spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer, key: str
+) -> Rational | ContinuousWeight:
+    """A weight in the time of the plant.
+
+    Raises:
+        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled.
+    """
+    if spec.plant.sampled:
+        return weight(spec, transfer, key)
+    assert isinstance(transfer, ContinuousTransfer)
+    ratio = transfer.continuous
+    return ContinuousWeight(np.array(ratio.numerator), np.array(ratio.denominator_polynomial))
+
+
+def build_entry_variances(spec: Spec, experiment: Any) -> list[EntryVariance]:
+    """`accuracy.weighted_variance` for every entry of G, in raw coordinates; empty when not asked for.
+
+    Raises:
+        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled.
+    """
+    stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance.weight"
+    if stated is None:
+        return []
+    W: Any = Rational.build([1.0]) if stated.weight is None else any_weight(spec, stated.weight, key)
+    band = required_band(spec, experiment, stated.band)
+    return [
+        EntryVariance(experiment, W, stated.max, band, stated.relative, output=i, input=j)
+        for i, j in active_entries(experiment.model, band[1])
+    ]
+
+
+def required_band(
+    spec: Spec, experiment: ChannelExperiment, stated: tuple[float, float] | None
+) -> tuple[float, float]:
+    """The band of a requirement: as stated, or all frequencies, in continuous time those that are excited."""
+    if stated is not None:
+        lo, hi = (edge * frequency_unit(spec) for edge in stated)
+        return lo, float(min(hi, np.pi)) if spec.plant.sampled else hi
+    return (0.0, float(np.pi)) if spec.plant.sampled else experiment.band

@@ -1,0 +1,123 @@
+"""A recorded experiment: u and y from a CSV file, its columns, units and times checked, outliers named."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.assemble.tables import read_columns
+from inputdesign_cli.errors import Complaint, DataError, Location
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spec import Spec
+
+_UNITS = ("s", "ms", "us", "min", "h", "d")
+# Times may jitter by this share of the sample time.
+_JITTER = 1e-3
+# Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
+_OUTLYING = 8.0
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Data:
+    """u and y (samples,) of one experiment, and what a user should know of them."""
+
+    u: Array
+    y: Array
+    notes: tuple[str, ...] = field(default=())
+
+
+def read_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
+    """The columns u (or u1), y (or y1) and, if there is one, time.
+
+    Raises:
+        DataError: the file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
+            the spec says.
+    """
+    header = _header(path)
+    wanted = {"u": "u1" if "u1" in header else "u", "y": "y1" if "y1" in header else "y"}
+    timed = [name for name in header if name == "time" or name.startswith("time_")]
+    if timed:
+        wanted["time"] = timed[0]
+        _check_unit(spec, path, timed[0])
+    columns = read_columns(path, wanted, key="")
+    if timed:
+        _check_times(spec, path, columns["time"])
+    notes = []
+    for name in ("u", "y"):
+        x = columns[name]
+        notes += _outliers(name, x)
+        if remove_means:
+            columns[name] = x - x.mean()
+        elif abs(x.mean()) > x.std() > 0:
+            notes.append(
+                f"{name} varies by {x.std():.3g} about {x.mean():.3g}: models describe deviations from an "
+                "operating point; --remove-means takes the means away"
+            )
+    return Data(columns["u"], columns["y"], tuple(notes))
+
+
+def _header(path: Path) -> list[str]:
+    """Names of the columns; empty where the file cannot be read, which `read_columns` complains about."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            return [name.strip().lower() for name in next(csv.reader(file), [])]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return []
+
+
+def _check_unit(spec: Spec, path: Path, name: str) -> None:
+    unit = name.removeprefix("time").removeprefix("_")
+    if unit in _UNITS and unit != spec.time_unit:
+        raise DataError(
+            Complaint(
+                "data-wrong-unit",
+                f"the times are in {unit}, but the spec counts in {spec.time_unit}",
+                f"set time_unit: {unit} (and sample_time in it), or convert the column",
+                "time_unit",
+                Location(str(path), 1, 1, name),
+            )
+        )
+
+
+def _check_times(spec: Spec, path: Path, time: Array) -> None:
+    steps = np.diff(time)
+    off = np.abs(steps - spec.sample_time) > _JITTER * spec.sample_time
+    if not np.any(off):
+        return
+    row = int(np.argmax(off))
+    typical = float(np.median(steps))
+    if abs(typical - spec.sample_time) > _JITTER * spec.sample_time:
+        message = f"the data are sampled every {typical:.6g} {spec.time_unit}"
+        hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
+    else:
+        message = (
+            f"the time advances by {steps[row]:.6g} {spec.time_unit} here ({int(off.sum())} such places)"
+        )
+        hint = "fill the gap, or use a part of the record without gaps"
+    raise DataError(
+        Complaint(
+            "data-not-uniform",
+            f"{message}, but sample_time is {spec.sample_time:g} {spec.time_unit}",
+            hint,
+            "sample_time",
+            Location(str(path), row + 3, 1, f"{time[row + 1]:.10g}"),
+        )
+    )
+
+
+def _outliers(name: str, x: Array) -> list[str]:
+    middle = np.median(x)
+    spread = 1.4826 * np.median(np.abs(x - middle))
+    if spread <= 0.0:
+        return []
+    found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
+    if not found.size:
+        return []
+    rows = ", ".join(str(row + 2) for row in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
+    return [
+        f"{name} has {found.size} outlying value{'s' * (found.size > 1)} (row {rows}): look at the record"
+    ]

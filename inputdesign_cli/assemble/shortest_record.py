@@ -1,0 +1,84 @@
+"""When the limits on single samples leave too little power: the shortest experiment that can, or why none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from inputdesign_cli.assemble.task import Task
+from inputdesign_cli.design.designs import Design
+from inputdesign_cli.errors import Complaint, InfeasibleError
+from inputdesign_cli.signal import Record
+from inputdesign_cli.spec import Spec
+
+_LONGEST = 64  # times the length that was asked for
+_CANDIDATES = 4
+_GROWTH = 1.4
+_FINE = 0.01
+
+
+def shortest_record(
+    spec: Spec, task: Task, design: Design, missed: Record, block: int, made: Callable[..., Record]
+) -> Record:
+    """For `shortest_experiment` the longer record; otherwise the error that says how long it would be.
+
+    The longer record has the shape of the designed spectrum at the lower power that it then needs.
+
+    Raises:
+        InfeasibleError: `limits-too-tight`.
+    """
+    found = _search(missed.samples.size, block, made)
+    seeking = design.problem.goal == "samples" and spec.signal.samples is None
+    most = spec.limits.samples
+    if seeking and found is not None and (most is None or found.samples.size <= most):
+        return found
+    raise _complaint(spec, design, missed, found)
+
+
+def _search(start: int, block: int, made: Callable[..., Record]) -> Record | None:
+    """The shortest record that meets the demand, to one per cent, by trying; None when there is none."""
+    low, high, found = start, start, None
+    while found is None or not found.met:
+        if high >= _LONGEST * start:
+            return None
+        low, high = high, _rounded(high * _GROWTH, block)
+        found = made(high, _CANDIDATES)
+    while high - low > max(_FINE * high, block):
+        middle = _rounded(0.5 * (low + high), block)
+        if middle in (low, high):
+            break
+        tried = made(middle, _CANDIDATES)
+        if tried.met:
+            high, found = middle, tried
+        else:
+            low = middle
+    return found
+
+
+def _rounded(length: float, block: int) -> int:
+    return int(np.ceil(length / block)) * block
+
+
+def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None) -> InfeasibleError:
+    limits = spec.limits
+    stated = [name for name in ("amplitude", "rate") if getattr(limits, name) is not None]
+    names = " and ".join(f"limits.{name}" for name in stated)
+    size = missed.samples.size
+    message = (
+        f"no record of {size} samples within {names} meets the accuracy: the best found reaches "
+        f"r_u / r_adm = {missed.worst_ratio:.4g} with power {np.mean(missed.samples**2):.4g}"
+        if np.isfinite(missed.worst_ratio)
+        else f"no record of {size} samples within {names} excites every parameter"
+    )
+    if found is None:
+        hint = f"raise the limits: {_LONGEST} times as many samples were not enough either"
+    else:
+        hint = (
+            f"{found.samples.size} samples can (power {np.mean(found.samples**2):.4g}): set "
+            f"experiment.samples and signal.samples, raise the limits, or loosen the accuracy"
+        )
+        if limits.samples is not None and found.samples.size > limits.samples:
+            hint += f"; limits.samples is {limits.samples}"
+    key = f"limits.{stated[0]}"
+    return InfeasibleError(Complaint("limits-too-tight", message, hint, key, spec.locate(key)))

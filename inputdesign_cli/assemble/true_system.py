@@ -1,0 +1,64 @@
+"""Spec -> the true system of a simulation, in the loop and for the length of the nominal experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Loop
+from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.plant import PolynomialPlant
+
+
+def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) -> Experiment:
+    """`nominal` with the plant and the noise of `simulation`, where they are given.
+
+    Args:
+        result: of the design; noise of a relative size refers to its output power.
+
+    Raises:
+        SpecError: another kind of plant, or a loop that is unstable with the true plant.
+    """
+    study = spec.simulation
+    if study is None or (study.plant is None and study.noise is None):
+        return nominal
+    model = nominal.model
+    if study.plant is not None:
+        plant = study.plant
+        if not isinstance(plant, PolynomialPlant) or plant.inputs > 1 or plant.outputs > 1:
+            raise spec.complain(
+                "not-supported",
+                "this version simulates polynomial plants with one input and one output only",
+                hint="give simulation.plant as polynomials A, B, F in q^-1",
+                key="simulation.plant",
+            )
+        model = replace(
+            model,
+            A=np.array(plant.A_per_output[0]),
+            B=np.array(plant.B_matrix[0][0]),
+            F=np.array(plant.F_matrix[0][0]),
+        )
+    if study.noise is not None:
+        model = replace(
+            model,
+            C=np.array(study.noise.C_per_output(1)[0]),
+            D=np.array(study.noise.D_per_output(1)[0]),
+            variance=_variance(spec, result),
+        )
+    loop = Loop(model, nominal.loop.controller)
+    loop.check_stability()
+    return replace(nominal, loop=loop, factor=None)
+
+
+def _variance(spec: Spec, result: Mapping[str, Any]) -> float:
+    assert spec.simulation is not None
+    assert spec.simulation.noise is not None
+    noise = spec.simulation.noise
+    if noise.variance is not None:
+        return float(np.atleast_2d(np.asarray(noise.variance, dtype=float))[0, 0])
+    assert noise.relative_std is not None
+    return float(noise.relative_std**2 * np.sum(result["power"]["output"]))
