@@ -17,11 +17,19 @@ from pathlib import Path
 from typing import Any
 
 from inputdesign_cli.errors import Complaint, DataError, OutputError
-from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.outcome import BoundCurves, OptimalityCurves, Outcome, Table
 from inputdesign_cli.provenance import environment
 from inputdesign_cli.textformats import csv_text, json_text, plain
 
-__all__ = ["environment", "finished_result", "read_run", "write_run", "write_text"]
+__all__ = [
+    "complaining",
+    "environment",
+    "finished_result",
+    "read_run",
+    "replace_text",
+    "write_run",
+    "write_text",
+]
 
 RESULT = "result.json"
 SPEC = "spec.yaml"
@@ -71,7 +79,7 @@ def write_run(outcome: Outcome, directory: Path, *, figures: bool = True) -> lis
     """
     result = finished_result(outcome)
     target = Path(os.path.realpath(directory))
-    with _complaining(directory):
+    with complaining(directory):
         if target.exists() and not target.is_dir():
             raise OutputError(
                 Complaint(
@@ -106,8 +114,29 @@ def write_text(path: Path, text: str) -> None:
     OutputError
         `output-not-writable`, `output-full`.
     """
-    with _complaining(path):
+    with complaining(path):
         _write(path, text)
+
+
+def replace_text(path: Path, text: str | Iterable[str]) -> None:
+    """Write a text file (or one that comes in pieces) so that a reader finds the old one or the new one,
+    whole, whenever the writer is killed.
+
+    Raises
+    ------
+    OutputError
+        `output-not-writable`, `output-full`.
+    """
+    partial = path.with_name(f".{path.name}.partial-{os.getpid()}")
+    with complaining(path):
+        try:
+            with partial.open("w", encoding="utf-8", newline="\n") as file:
+                file.writelines([text] if isinstance(text, str) else text)
+                file.flush()
+                os.fsync(file.fileno())
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 def read_run(directory: Path) -> dict[str, Any]:
@@ -158,10 +187,12 @@ def _unreadable(directory: Path, why: str) -> DataError:
 def _write_files(outcome: Outcome, result: dict[str, Any], folder: Path, figures: bool) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
     texts = {SPEC: outcome.resolved_spec}
-    texts |= {f"{stem}.csv": csv_text(table) for stem, table in outcome.tables.items()}
+    texts |= {f"{stem}.csv": csv_text(table) for stem, table in _tables(outcome).items()}
     for name, text in texts.items():
         _write(folder / name, text)
-    names = list(texts)
+    for name, content in outcome.files.items():
+        (folder / name).write_bytes(content)
+    names = [*texts, *outcome.files]
     if figures and outcome.curves:
         from inputdesign_cli.report.plots import draw
 
@@ -174,6 +205,20 @@ def _write_files(outcome: Outcome, result: dict[str, Any], folder: Path, figures
         _sync(folder / name)
     _sync(folder)
     return names
+
+
+def _tables(outcome: Outcome) -> dict[str, Table]:
+    """The tables, with what the curves show beyond them: a report is drawn from the files alone."""
+    tables = dict(outcome.tables)
+    for stem, curves in outcome.curves.items():
+        if isinstance(curves, OptimalityCurves) and stem not in tables:
+            header = f"frequency_rad_per_{outcome.time_unit}"
+            tables[stem] = Table({header: curves.frequency, "ratio": curves.ratio})
+        elif isinstance(curves, BoundCurves) and stem in tables:
+            more = {"r_u_white": curves.r_u_white, "r_u_record": curves.r_u_record}
+            shown = {name: values for name, values in more.items() if values is not None}
+            tables[stem] = Table({**tables[stem].columns, **shown})
+    return tables
 
 
 def _write(path: Path, text: str) -> None:
@@ -244,7 +289,7 @@ def _sync(path: Path) -> None:
 
 
 @contextmanager
-def _complaining(target: Path) -> Iterator[None]:
+def complaining(target: Path) -> Iterator[None]:
     """Turn what the operating system refuses into an `OutputError`."""
     try:
         yield

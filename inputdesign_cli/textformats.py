@@ -67,7 +67,8 @@ def csv_text(table: Table) -> str:
         lengths = ", ".join(f"{name}: {len(values)}" for name, values in columns.items())
         raise ValueError(f"the columns of a table differ in length ({lengths})")
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(f"{x:.17g}" for x in row) for row in rows)]
+    layout = ",".join(["%.17g"] * len(columns))
+    lines = [",".join(columns), *(layout % row for row in rows)]
     return "\n".join(lines) + "\n"
 
 

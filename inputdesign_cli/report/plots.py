@@ -4,13 +4,37 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from inputdesign_cli.outcome import BoundCurves, OptimalityCurves, SignalCurves, SpectrumCurves
+from inputdesign_cli.outcome import (
+    BoundCurves,
+    ChannelBoundCurves,
+    ChannelSpectrumCurves,
+    CloudCurves,
+    Curves,
+    DirectionCurves,
+    EllipseCurves,
+    ErrorBandCurves,
+    ErrorCurves,
+    FitCurves,
+    LossCurves,
+    MatrixSpectrumCurves,
+    MomentsCurves,
+    OptimalityCurves,
+    ResidualCurves,
+    SignalCurves,
+    SpectrumCurves,
+)
 from inputdesign_cli.report.bound import draw_bound
+from inputdesign_cli.report.channels import draw_channel_bounds, draw_channel_spectrum
+from inputdesign_cli.report.data import draw_fit, draw_residuals
+from inputdesign_cli.report.ellipses import draw_ellipses
+from inputdesign_cli.report.error import draw_error
+from inputdesign_cli.report.loss import draw_loss
+from inputdesign_cli.report.matrix_spectrum import draw_directions, draw_matrix_spectrum
+from inputdesign_cli.report.moments import draw_moments
 from inputdesign_cli.report.optimality import draw_optimality
 from inputdesign_cli.report.signal import draw_signal
 from inputdesign_cli.report.spectrum import draw_spectrum
-
-Curves = SpectrumCurves | BoundCurves | OptimalityCurves | SignalCurves
+from inputdesign_cli.report.trials import draw_cloud, draw_error_bands
 
 
 def draw(curves: Curves, path: Path, time_unit: str = "s") -> None:
@@ -24,9 +48,33 @@ def draw(curves: Curves, path: Path, time_unit: str = "s") -> None:
     match curves:
         case SpectrumCurves():
             draw_spectrum(curves, path, time_unit)
+        case MatrixSpectrumCurves():
+            draw_matrix_spectrum(curves, path, time_unit)
+        case DirectionCurves():
+            draw_directions(curves, path, time_unit)
+        case LossCurves():
+            draw_loss(curves, path)
         case BoundCurves():
             draw_bound(curves, path, time_unit)
         case OptimalityCurves():
             draw_optimality(curves, path, time_unit)
         case SignalCurves():
             draw_signal(curves, path, time_unit)
+        case ErrorCurves():
+            draw_error(curves, path)
+        case MomentsCurves():
+            draw_moments(curves, path, time_unit)
+        case ChannelSpectrumCurves():
+            draw_channel_spectrum(curves, path, time_unit)
+        case ChannelBoundCurves():
+            draw_channel_bounds(curves, path, time_unit)
+        case EllipseCurves():
+            draw_ellipses(curves, path)
+        case CloudCurves():
+            draw_cloud(curves, path)
+        case ErrorBandCurves():
+            draw_error_bands(curves, path, time_unit)
+        case FitCurves():
+            draw_fit(curves, path, time_unit)
+        case ResidualCurves():
+            draw_residuals(curves, path)

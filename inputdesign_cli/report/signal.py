@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from inputdesign_cli.outcome import Array, SignalCurves
-from inputdesign_cli.report.style import BLUE, GREY, figure
+from inputdesign_cli.report.style import BLUE, GREY, ORANGE, figure
 
 SHOWN = 1000  # samples that a figure of this width can show one by one
 STEPS_TO = 300  # up to here the hold between samples is visible
@@ -26,6 +26,9 @@ def draw_signal(curves: SignalCurves, path: Path, time_unit: str) -> None:
             _draw_record(record, curves.time[:shown], values[:shown])
             record.set_ylabel(rf"${name[0]}_{{{name[1:]}}}(t)$")
             _draw_histogram(histogram, values)
+            for bound in curves.limits.get(name, ()):
+                for axes in (record, histogram):
+                    axes.axhline(bound, color=ORANGE, linewidth=1.0, linestyle=(0, (5, 2)))
         last, counts = grid[-1]
         last.set_xlabel(f"time ({time_unit})")
         counts.set_xlabel("share (%)")

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from inputdesign_cli.outcome import Array, SpectrumCurves
-from inputdesign_cli.report.style import BLUE, GREY, ORANGE, figure, frequency_axis, legend_above
+from inputdesign_cli.report.style import BLUE, GREEN, GREY, ORANGE, figure, frequency_axis, legend_above
 
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
@@ -25,6 +25,11 @@ def draw_spectrum(curves: SpectrumCurves, path: Path, time_unit: str) -> None:
         if curves.density is not None:
             label = rf"$\Phi_{{{curves.symbol}}}$, design"
             handles += axes.plot(curves.frequency, curves.density, color=BLUE, linewidth=2.0, label=label)
+            if curves.record is not None:
+                label = "record, smoothed"
+                handles += axes.plot(
+                    curves.frequency, curves.record, color=GREEN, linewidth=1.0, alpha=0.8, label=label
+                )
             if curves.white is not None:
                 white = rf"$\Phi_{{{curves.symbol}}}$, white"
                 handles.append(axes.axhline(curves.white, color=GREY, linestyle=(0, (5, 2)), label=white))

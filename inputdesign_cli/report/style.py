@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from inputdesign_cli.outcome import Array
 
 SIZE = (7.0, 4.5)  # inches
+NARROW = (4.6, 3.4)
 DPI = 150
 
 # Okabe and Ito's palette, which stays apart for colour-blind readers.
@@ -24,8 +25,10 @@ BLUE = "#0072B2"
 ORANGE = "#D55E00"
 GREEN = "#009E73"
 GREY = "#777777"
+PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 
 _RC: dict[Any, Any] = {
+    "svg.hashsalt": "idesign",
     "font.size": 10.0,
     "axes.titlesize": 10.0,
     "axes.spines.top": False,
@@ -43,11 +46,20 @@ _RC: dict[Any, Any] = {
 
 @contextmanager
 def figure(path: Path) -> Iterator[Figure]:
-    """A figure to draw on, saved to `path` as PNG when the block ends well."""
+    """A figure to draw on, saved to `path` when the block ends well.
+
+    As PNG; or, if `path` ends in `.svg`, as a smaller SVG whose text stays readable on a phone.
+    """
+    narrow = str(path).endswith(".svg")
     with mpl.rc_context(_RC):
-        canvas = FigureCanvasAgg(Figure(figsize=SIZE, dpi=DPI, layout="constrained"))
+        size = NARROW if narrow else SIZE
+        canvas = FigureCanvasAgg(Figure(figsize=size, dpi=DPI, layout="constrained"))
         yield canvas.figure
-        canvas.print_png(path)
+        if narrow:
+            # Without a date and with ids that do not change, the same figure is the same file.
+            canvas.print_figure(path, format="svg", metadata={"Date": None, "Creator": None})
+        else:
+            canvas.print_png(path)
 
 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
@@ -61,11 +73,13 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:
     """A legend over the axes, where it cannot cover a curve."""
+    narrow = axes.get_figure(root=True).get_figwidth() < SIZE[0]  # type: ignore[union-attr]
+    longest = max((len(str(handle.get_label())) for handle in handles), default=0)
     axes.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
-        ncols=len(handles),
+        ncols=max(1, min(3, 46 // (longest + 6))) if narrow else len(handles),
         borderaxespad=0.3,
         handlelength=2.2,
         columnspacing=1.4,

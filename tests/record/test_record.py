@@ -57,6 +57,7 @@ def test_the_files_of_a_run(tmp_path):
     assert [path.name for path in paths] == [
         "spec.yaml",
         "signal.csv",
+        "optimality.csv",
         "signal.png",
         "optimality.png",
         "result.json",

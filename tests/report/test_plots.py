@@ -8,13 +8,28 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from inputdesign_cli.outcome import BoundCurves, OptimalityCurves, SignalCurves, SpectrumCurves
+from inputdesign_cli.outcome import (
+    BoundCurves,
+    ChannelBoundCurves,
+    ChannelSpectrumCurves,
+    DirectionCurves,
+    Ellipse,
+    EllipseCurves,
+    ErrorCurves,
+    LossCurves,
+    MatrixSpectrumCurves,
+    MomentsCurves,
+    OptimalityCurves,
+    SignalCurves,
+    SpectrumCurves,
+)
 from inputdesign_cli.report.plots import draw
 
 W = np.geomspace(1e-3, np.pi, 200)
 Z = np.exp(-1j * W)
 G = np.abs(3.6 * Z / (1 - 0.7 * Z))
 DENSITY = 0.03 + 2.5 * np.exp(-((W / 0.22) ** 2))
+PAIR = DENSITY[:, None, None] * np.array([[1.0, 0.9j], [-0.9j, 1.0]])
 
 CURVES = {
     "bound": BoundCurves(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi])),
@@ -22,11 +37,42 @@ CURVES = {
     "bound with a gap in r_adm": BoundCurves(W, 0.008 * G, G, np.where(W < 1, 0.01 * G, -1.0)),
     "spectrum": SpectrumCurves(W, DENSITY, 1.7),
     "spectrum with zeros": SpectrumCurves(W, 1e4 * np.maximum(np.cos(20 * W), 0.0) / W**2, 1.0),
+    "spectrum with its record": SpectrumCurves(W, DENSITY, 1.7, record=DENSITY * (1 + 0.2 * np.sin(90 * W))),
+    "bound with its record": BoundCurves(W, 0.008 * G, G, 0.01 * G, r_u_record=0.009 * G),
+    "limited signal": SignalCurves(np.arange(50.0), {"u1": 3 + np.sin(np.arange(50.0))}, {"u1": (1.5, 4.5)}),
     "lines": SpectrumCurves(W, None, 1.7, np.array([0.1553]), np.array([0.1925])),
     "lines and density": SpectrumCurves(W, DENSITY, None, np.array([0.02, 0.1]), np.array([0.1, 0.2]), "r"),
+    "matrix": MatrixSpectrumCurves(W, PAIR, 1.7),
+    "matrix of lines": MatrixSpectrumCurves(W[::20], PAIR[::20], lines=True),
+    "matrix with zeros": MatrixSpectrumCurves(W, PAIR * np.maximum(np.cos(20 * W), 0.0)[:, None, None]),
+    "directions": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([DENSITY, W], 1), 1.7),
+    "directions of lines": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
+    "loss": LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
     "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
+    "channels": ChannelSpectrumCurves(
+        W, {"11": DENSITY, "22": 2 * DENSITY, "12": 0.5 * DENSITY}, np.stack([DENSITY, 2 * DENSITY], axis=1)
+    ),
+    "channels with a peak": ChannelSpectrumCurves(
+        W, {"11": 1 / (1e-4 + (W - 1) ** 2)}, 1 / (1e-4 + (W[:, None] - 1) ** 2)
+    ),
+    "lines of channels": ChannelSpectrumCurves(
+        np.array([0.3]), {"11": np.ones(1), "12": np.ones(1)}, np.ones((1, 2)), lines=True
+    ),
+    "bounds of entries": ChannelBoundCurves(
+        {"[1,2]": BoundCurves(W, 0.008 * G, G, 0.01 * G), "[2,1]": BoundCurves(W, 0.008 * G, G)}
+    ),
+    "ellipses": EllipseCurves(
+        tuple(
+            Ellipse(("b1", f"a{i}"), np.array([1.0, i]), np.array([[2.0, 1.0], [1.0, 1.0]]), np.eye(2))
+            for i in range(4)
+        )
+    ),
     "signal": SignalCurves(np.arange(50.0), {"u1": np.sin(np.arange(50.0))}),
     "long signal": SignalCurves(np.arange(3000.0), {f"u{i}": np.sin(np.arange(3000.0)) for i in range(1, 7)}),
+    "error": ErrorCurves(W, 0.2 + 0 * W, 1 / W, 0.5 + 2 / W, (1.0, 1.2), 1.2),
+    "error without a target": ErrorCurves(W, 0.2 + 0 * W, 1 / W, 0.5 + 2 / W, (1.0, 1.2)),
+    "moments": MomentsCurves(np.eye(3), 1),
+    "many moments": MomentsCurves(np.eye(12), 4, np.array([0.0, 2.8]), np.array([1.0, 0.3])),
     "constant signal": SignalCurves(np.arange(5.0), {"r1": np.ones(5)}),
 }
 

@@ -1,0 +1,191 @@
+"""The page about a run or a sweep: strict HTML that needs nothing, says what it must, and escapes text."""
+
+import base64
+import json
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import html5lib
+import pytest
+
+from inputdesign_cli import analyse, load_spec, solve
+from inputdesign_cli.document.render import report_text
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.record import write_run
+from inputdesign_cli.study.sweep import sweep
+
+SPEC = """\
+title: "Heat <script>alert(1)</script> & flow"
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 1}
+experiment: {samples: 100%s}
+accuracy: {model_error: {relative: 0.1, confidence: 0.9}}
+spectrum: {type: fir, order: 2}
+signal: {type: multisine, candidates: 1, seed: 5}
+"""
+LOOP = ", controller: {numerator: [0.1], denominator: [1]}"
+XHTML = "{http://www.w3.org/1999/xhtml}"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """An open and a closed loop, solved and written without figures."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, loop in (("open", ""), ("closed", LOOP)):
+        (folder / f"{name}.yaml").write_text(SPEC % loop)
+        write_run(solve(load_spec(folder / f"{name}.yaml")), folder / name, figures=False)
+    return folder
+
+
+def parse(text):
+    """The page, which must be valid HTML; whatever points out of it is an error."""
+    page = html5lib.HTMLParser(strict=True).parse(text)
+    assert page.findall(f".//{XHTML}script") == []
+    for element in page.iter():
+        for name, value in element.attrib.items():
+            assert not name.startswith("on"), "a script"
+            if name in ("src", "href"):
+                assert value.startswith("data:image/"), value[:80]
+    assert "url(" not in text
+    assert "@import" not in text
+    return page
+
+
+def words(page):
+    return re.sub(r"\s+", " ", "".join(page.itertext()))
+
+
+@pytest.mark.parametrize("name", ["open", "closed"])
+def test_the_page_of_a_run(runs, name):
+    page = parse(report_text(runs / name))
+    result = json.loads((runs / name / "result.json").read_text())
+    headings = [element.text for element in page.iter(f"{XHTML}h2")]
+    assert headings == [
+        "The question", "The answer", "Accuracy", "Spectrum", "Signal", "The certificate",
+        "What was assumed", "How to reproduce it", "Methods", "All numbers",
+    ]  # fmt: skip
+    said = words(page)
+    for part in (
+        "output-error system with one input and one output",
+        "90 % confidence",
+        "10 % of |G|",
+        f"in {name} loop",
+        f"{result['cost']:.6g}",
+        f"{result['baseline']['white']['ratio']:.3g} times as much",
+        f"No spectrum of this family gets below {result['objective']['lower_bound']:.8g}",
+        f"No spectrum whatever gets below {result['objective']['any_spectrum_bound']:.8g}",
+        result["spec_sha256"],
+        "idesign solve spec.yaml",
+        "Bombois and G. Scorletti",
+        result["environment"]["numpy"],
+        "alert(1)",
+    ):
+        assert part in said, part
+    assert (runs / name / "spec.yaml").read_text() in "".join(page.itertext())
+
+
+def test_charts_are_pictures_with_words(runs):
+    page = parse(report_text(runs / "closed"))
+    images = list(page.iter(f"{XHTML}img"))
+    assert len(images) == 4
+    for image in images:
+        assert len(image.get("alt")) > 20
+        kind, _, data = image.get("src").partition(";base64,")
+        assert kind == "data:image/svg+xml"
+        assert ElementTree.fromstring(base64.b64decode(data)).tag.endswith("svg")
+
+
+def test_the_same_run_gives_the_same_page(runs):
+    assert report_text(runs / "open") == report_text(runs / "open")
+
+
+def test_figures_without_a_known_table_are_taken_as_they_are(runs, tmp_path):
+    run = tmp_path / "run"
+    write_run(solve(load_spec(runs / "open.yaml")), run, figures=False)
+    result = json.loads((run / "result.json").read_text())
+    (run / "loss.png").write_bytes(b"\x89PNG not really")
+    result |= {
+        "files": [*result["files"], "loss.png"],
+        "simulation": {"runs": 10, "inputs": {"white": {"a": 0.5}}},
+    }
+    (run / "result.json").write_text(json.dumps(result))
+    page = parse(report_text(run))
+    assert "data:image/png;base64," in [i.get("src")[:22] for i in page.iter(f"{XHTML}img")]
+    assert "Further figures" in words(page)
+    assert "inputs.white.a" in words(page)
+    assert "idesign simulate spec.yaml" in words(page)
+
+
+def test_the_page_of_a_sweep(runs, tmp_path):
+    out = tmp_path / "out"
+    sweep(runs / "open.yaml", ["experiment.samples=50,100,-1", "spectrum.order=1,2"], directory=out)
+    page = parse(report_text(out))
+    said = words(page)
+    for part in ("6 points: 2 invalid, 4 optimal", "best at experiment.samples = 100",
+                 "out-of-range", "at least 1", "idesign sweep sweep.yaml", "Bombois"):  # fmt: skip
+        assert part in said, part
+    assert len(list(page.iter(f"{XHTML}img"))) == 2
+    assert (out / "sweep.yaml").read_text() in "".join(page.itertext())
+
+
+def test_a_sweep_without_any_result_has_a_page(runs, tmp_path):
+    out = tmp_path / "out"
+    sweep(runs / "open.yaml", ["accuracy.model_error={table: a.csv},{table: b.csv}"], directory=out)
+    said = words(parse(report_text(out)))
+    assert "2 points: 2 invalid" in said
+
+
+def test_a_directory_without_a_run(tmp_path):
+    with pytest.raises(DataError) as caught:
+        report_text(tmp_path)
+    assert caught.value.complaints[0].code == "run-missing"
+
+
+SPECS = Path(__file__).parents[2] / "specs"
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "verb", "said"),
+    [
+        (
+            "regression",
+            ["experiment.samples=100"],
+            solve,
+            [
+                "bias and variance together, must not exceed 1",
+                "Asked: the least energy",
+                "No moments whatever",
+            ],
+        ),
+        (
+            "first_order",
+            ["objective=shortest_experiment", "limits={input_power: 1}", "spectrum={type: white}"],
+            solve,
+            ["The length of the experiment is sought", "has 853 samples", "same limits needs 853"],
+        ),
+        (
+            "first_order",
+            ["objective=best_accuracy", "limits={input_power: 1}", "spectrum={type: white}"],
+            solve,
+            ["Asked: the smallest multiple of what is admitted", "can be kept to 1.30595 times"],
+        ),
+        (
+            "criterion",
+            ["spectrum.order=2"],
+            solve,
+            ["Asked: the experiment that teaches most", "log det M ="],
+        ),
+        (
+            "first_order_given",
+            [],
+            analyse,
+            ["what accuracy the given excitation buys", "The figures hold for"],
+        ),
+    ],
+)
+def test_each_kind_of_question_has_its_own_words(name, overrides, verb, said, tmp_path):
+    write_run(verb(load_spec(SPECS / f"{name}.yaml", overrides)), tmp_path / "run", figures=False)
+    page = words(parse(report_text(tmp_path / "run")))
+    for part in said:
+        assert part in page, part
