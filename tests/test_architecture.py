@@ -11,7 +11,7 @@ ROOT = Path(inputdesign_cli.__file__).parent
 
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
 ORDER = [
-    {"errors", "codes"},
+    {"errors", "codes", "threads"},
     {"complaints", "provenance"},
     {"spec", "plant"},
     {"spectrum", "information", "accuracy"},
@@ -19,6 +19,7 @@ ORDER = [
     {"outcome"},
     {"assemble"},
     {"study", "report", "record", "textformats", "golden", "golden_file"},
+    {"document"},
     {"cli", "__main__"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}

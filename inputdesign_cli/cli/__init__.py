@@ -11,13 +11,19 @@ import typer
 
 from inputdesign_cli import __version__
 from inputdesign_cli.cli.analyse import analyse
+from inputdesign_cli.cli.assess import assess
 from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.explain import explain
+from inputdesign_cli.cli.identify import identify
 from inputdesign_cli.cli.init import init
+from inputdesign_cli.cli.report import report
 from inputdesign_cli.cli.schema import schema
+from inputdesign_cli.cli.simulate import simulate
 from inputdesign_cli.cli.solve import solve
+from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
+from inputdesign_cli.threads import use_one_thread
 
 app = typer.Typer(
     name="idesign",
@@ -25,7 +31,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done, 1 a golden mismatch or a missed target, 2 bad input or usage, "
     "3 infeasible, 4 the required accuracy was not proved, 130 interrupted.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -48,10 +54,25 @@ def _start(
     pass
 
 
-for command in (solve, analyse, validate, check, init, explain, schema):
+COMMANDS = (
+    solve,
+    analyse,
+    simulate,
+    identify,
+    assess,
+    sweep,
+    report,
+    validate,
+    check,
+    init,
+    explain,
+    schema,
+)
+for command in COMMANDS:
     app.command()(guarded(command))
 
 
 def main() -> None:
     """The `idesign` command."""
+    use_one_thread()  # numpy, which reads it, has not been imported yet
     app(prog_name="idesign")

@@ -6,12 +6,18 @@ from typing import Annotated
 
 import typer
 
+from inputdesign_cli.cli.completion import error_codes
 from inputdesign_cli.cli.terminal import aligned
 
 
 def explain(
     code: Annotated[
-        str | None, typer.Argument(metavar="[CODE]", help="The code of an error; without it, all codes.")
+        str | None,
+        typer.Argument(
+            metavar="[CODE]",
+            help="The code of an error; without it, all codes.",
+            autocompletion=error_codes,
+        ),
     ] = None,
 ) -> None:
     """Explain an error code.

@@ -17,6 +17,10 @@ class Kind(StrEnum):
 
     OPEN_LOOP = "open-loop"
     CLOSED_LOOP = "closed-loop"
+    SWEEP = "sweep"
+    CRITERION = "criterion"
+    CONTROL = "control"
+    REGRESSION = "regression"
 
 
 def init(

@@ -7,13 +7,23 @@ from typing import Annotated
 
 import typer
 
+from inputdesign_cli.cli.completion import spec_keys
+
 SpecFile = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
+DataFile = Annotated[
+    Path,
+    typer.Argument(metavar="DATA", help="The record of an experiment: a CSV file with columns u and y."),
+]
+Means = Annotated[
+    bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
         help="Override one entry of the spec, such as spectrum.order=10 (the value is YAML). Repeatable.",
+        autocompletion=spec_keys,
     ),
 ]
 Output = Annotated[

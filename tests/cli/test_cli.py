@@ -13,6 +13,7 @@ import typer
 
 import inputdesign_cli
 from inputdesign_cli.cli import app, main
+from inputdesign_cli.cli.init import Kind
 from inputdesign_cli.cli.terminal import aligned, colourful, status
 from inputdesign_cli.errors import (
     Complaint,
@@ -364,11 +365,12 @@ def test_init_writes_once(run, tmp_path):
     assert (tmp_path / "mine.yaml").read_text() == text
 
 
-@pytest.mark.parametrize("kind", ["open-loop", "closed-loop"])
+@pytest.mark.parametrize("kind", list(Kind))
 def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
     assert run("init", "--kind", kind, "a.yaml")[0] == 0
     spec = inputdesign_cli.load_spec(tmp_path / "a.yaml", [])
-    assert (spec.experiment.controller is None) == (kind == "open-loop")
+    assert (spec.experiment.controller is not None) == (kind == "closed-loop")
+    assert (spec.sweep is not None) == (kind == "sweep")
     assert (tmp_path / "a.yaml").read_text().count("#") > 8
 
 
@@ -412,7 +414,8 @@ def test_help_imports_nothing_heavy():
 
 
 def test_every_command_of_the_contract_so_far_is_there():
-    assert set(COMMANDS) >= {"solve", "analyse", "validate", "check", "init", "schema", "explain"}
+    wanted = {"solve", "analyse", "sweep", "report", "validate", "check", "init", "schema", "explain"}
+    assert set(COMMANDS) >= wanted
 
 
 @pytest.mark.parametrize("name", COMMANDS)

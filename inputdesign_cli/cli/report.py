@@ -1,0 +1,36 @@
+"""`idesign report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inputdesign_cli.cli.options import Quiet
+from inputdesign_cli.cli.terminal import status
+
+
+def report(
+    directory: Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run or of a sweep.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="The file to write. The default is report.html in RUN."
+        ),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write a run or a sweep as one HTML page.
+
+    The page tells the question, the answer, its proof, what was assumed and how to reproduce it, with
+    charts. It needs no network and no script, and can be printed.
+    """
+    with status(f"{directory}: writing ...", quiet=quiet):
+        from inputdesign_cli.document.render import PAGE, report_text
+        from inputdesign_cli.record import replace_text
+
+        file = output or directory / PAGE
+        replace_text(file, report_text(directory))
+    if not quiet:
+        typer.echo(file)

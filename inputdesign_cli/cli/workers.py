@@ -1,0 +1,36 @@
+"""Where a command computes: in its own process, in several, or on a cluster."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from inputdesign_cli.study.executor import Executor
+
+Jobs = Annotated[
+    int,
+    typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core."),
+]
+ClusterAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Compute on the Dask cluster at this address (tcp://HOST:PORT).",
+    ),
+]
+
+
+def executor(jobs: int, cluster: str | None) -> Executor:
+    """What the two options ask for; an address comes first."""
+    from inputdesign_cli.study.cluster import Cluster
+    from inputdesign_cli.study.executor import Here
+    from inputdesign_cli.study.processes import Processes
+
+    if cluster is not None:
+        return Cluster(cluster)
+    count = jobs or len(os.sched_getaffinity(0))
+    return Processes(count) if count > 1 else Here()

@@ -1,0 +1,130 @@
+"""`idesign sweep` and `idesign report`: what is printed, where, and how they end."""
+
+import json
+import sys
+
+import pytest
+
+from inputdesign_cli.cli import main
+from inputdesign_cli.cli.completion import error_codes, spec_keys
+from inputdesign_cli.cli.progress import ProgressLine, duration, progress_text
+from inputdesign_cli.study.sweep import Progress
+
+SPEC = """\
+title: A small design
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 1}
+experiment: {samples: 100}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 2}
+signal: {type: multisine, candidates: 1, seed: 1}
+"""
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `idesign` in a folder with a spec: its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SPEC)
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+        monkeypatch.setenv(name, "1")
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["idesign", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return call
+
+
+def test_a_sweep_and_its_report(run, tmp_path):
+    settings = ["--set", "experiment.samples=50,60", "--set", "spectrum.order=-1,1"]
+    code, out, err = run("sweep", "small.yaml", *settings, "--dry-run")
+    assert (code, err) == (0, "")
+    assert "4 points: 4 pending" in out
+    assert not (tmp_path / "runs").exists()
+    code, out, err = run("sweep", "small.yaml", *settings)
+    assert (code, err) == (0, "")
+    for part in ("4: 2 invalid, 2 optimal", "[out-of-range]", "--set spectrum.order=-1", "runs/small-sweep"):
+        assert part in out
+    code, out, _ = run("sweep", "small.yaml", *settings, "--dry-run", "--json")
+    assert [point["status"] for point in json.loads(out)] == ["failed", "done", "failed", "done"]
+    assert json.loads(out)[1]["settings"] == {"experiment.samples": "50", "spectrum.order": "1"}
+    code, out, _ = run("sweep", "small.yaml", *settings, "--json")
+    assert (code, json.loads(out)["statuses"]) == (0, {"invalid": 2, "optimal": 2})
+    assert run("sweep", "small.yaml", *settings, "--quiet") == (0, "", "")
+    code, out, err = run("report", "runs/small-sweep")
+    assert (code, out, err) == (0, "runs/small-sweep/report.html\n", "")
+    assert (tmp_path / "runs" / "small-sweep" / "report.html").read_text().startswith("<!DOCTYPE html>")
+    run("report", "runs/small-sweep", "-o", "page.html", "--quiet")
+    assert (tmp_path / "page.html").exists()
+
+
+def test_a_sweep_none_of_whose_points_has_a_result_ends_as_its_first_failure(run):
+    setting = "accuracy.model_error={table: a.csv},{table: b.csv}"
+    code, out, err = run("sweep", "small.yaml", "--set", setting)
+    assert code == 2
+    assert "2: 2 invalid" in out
+    assert "data-unreadable" in err
+
+
+def test_fail_fast_ends_with_the_code_of_the_failure(run):
+    code, out, err = run("sweep", "small.yaml", "--set", "spectrum.order=1,-1,2", "--fail-fast")
+    assert (code, out) == (2, "")
+    assert "out-of-range" in err
+    assert "(at --set spectrum.order=-1)" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ([], "sweep-empty"),
+        (["--set", "spectrum.order=1:2"], "bad-range"),
+        (["--set", "spectrum.ordr=1,2"], "unknown-key"),
+        (["--set", "spectrum.order=1,2", "--set", "noise.variance=1,2,3", "--zip"], "sweep-lengths"),
+        (["--set", "spectrum.order=1,2", "-o", "small.yaml"], "output-not-a-directory"),
+        (["--set", "spectrum.order=1,2", "-o", "."], "output-not-a-sweep"),
+    ],
+)
+def test_what_is_wrong_is_said_before_anything_is_written(run, tmp_path, arguments, code):
+    ended, out, err = run("sweep", "small.yaml", *arguments)
+    assert (ended, out) == (2, "")
+    assert code in err
+    assert [path.name for path in tmp_path.iterdir()] == ["small.yaml"]
+
+
+def test_a_report_of_nothing(run):
+    code, out, err = run("report", "nowhere")
+    assert (code, out) == (2, "")
+    assert "run-missing" in err
+
+
+def test_the_progress_line():
+    text = progress_text(Progress(total=100, passed=50, computed=25, failed=0), 5.0)
+    assert text == "[############............] 50/100  5 points/s  0:10 left"
+    assert "3 without a result" in progress_text(Progress(100, 50, 25, 3), 5.0)
+    assert progress_text(Progress(10, 0, 0, 0), 0.0) == "[........................] 0/10"
+    assert [duration(s) for s in (0, 59.6, 3600, 36061)] == ["0:00", "1:00", "1:00:00", "10:01:01"]
+
+
+def test_progress_goes_to_a_terminal_and_nowhere_else(monkeypatch, capsys):
+    line = ProgressLine(quiet=False)
+    line(Progress(2, 1, 1, 0))
+    line.close()
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    for quiet, shown in ((True, False), (False, True)):
+        line = ProgressLine(quiet=quiet)
+        line(Progress(2, 2, 2, 0))
+        line.close()
+        assert ("2/2" in capsys.readouterr().err) is shown
+
+
+def test_completion_knows_codes_and_keys():
+    assert ("sweep-empty", "A sweep that varies nothing") in error_codes("sweep-")
+    assert spec_keys("experiment.sa") == ["experiment.samples="]
+    assert "accuracy.model_error.relative=" in spec_keys("accuracy.")
+    assert spec_keys("spectrum.order=") == []
+    assert len(spec_keys("spectrum.order")) == 1
