@@ -195,4 +195,4 @@ def test_figures_of_the_paper_and_recomputed_ones_agree_with_each_other():
                     if other.path == printed.path and other is not printed:
                         assert abs(other.expected - printed.expected) <= printed.tolerance
                         pairs += 1
-    assert pairs == 7
+    assert pairs >= 7
