@@ -7,7 +7,7 @@ PYTHON = $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 py
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test slow lint golden bench docs clean
+.PHONY: help setup run test slow lint golden bench docs papers clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F '|' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -43,6 +43,9 @@ bench: $(READY)  ## time the solvers
 
 docs: $(READY)  ## write docs/cli.md from the help texts
 	$(PY) docs/make_cli_page.py
+
+papers: $(READY)  ## write docs/papers.md: the figures of the papers beside ours
+	$(PY) docs/make_papers_page.py
 
 clean:  ## remove caches and builds (runs/ and .venv stay)
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis dist
