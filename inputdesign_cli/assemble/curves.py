@@ -102,8 +102,11 @@ def optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | None:
     price, value = anything.certificate.price, anything.certificate.value
     if price is None or value is None:
         return None
-    lines = getattr(anything.basis, "frequencies", np.zeros(0))
-    support = lines[anything.x > 1e-3 * anything.x.sum()]
+    assert isinstance(anything.basis, LinesBasis)
+    lines = anything.basis.frequencies
+    # By what is paid, not by power: power is almost free near DC in a loop with integral action.
+    paid = anything.x * price.density(lines)
+    support = lines[paid > 1e-3 * paid.sum()]
     lo, hi = (lines.min(), lines.max()) if spec.limits.band is not None else (0.0, np.pi)
     w = axis(float(lo), float(hi), support)
     cost = price.density(w)

@@ -30,7 +30,7 @@ def draw_optimality(curves: OptimalityCurves, path: Path, time_unit: str) -> Non
                 markeredgewidth=1.6,
                 clip_on=False,
                 zorder=5,
-                label="power of the design",
+                label="power of the optimum",
             )
         axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
         axes.set_ylabel("relative worth of excitation")
