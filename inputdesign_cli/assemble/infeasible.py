@@ -42,16 +42,20 @@ def explain(spec: Spec, task: Task, unreachable: UnreachableError) -> Infeasible
     needs = [_needed(task, limit) for limit in involved if limit.upper]
     parts = [text for text in needs if text]
     looser = np.sqrt(max(proved, 1.0))
-    message = f"{names}{at} cannot be met within the limits: " + (
-        "; ".join(parts) if parts else "no change of a single limit is enough"
-    )
+    if not parts:
+        # The optimum of the goal "factor" meets the accuracy within limits so many times as large.
+        times = f"would have to be {_up(nearest.objective)} times as large"
+        only_density = problem.densities and not stated
+        together = f"no change of a single limit is enough; all of them together {times}"
+        parts = [f"limits.spectrum {times}" if only_density else together]
+    message = f"{names}{at} cannot be met within the limits: " + "; ".join(parts)
     hint = (
         f"raise the limit, or loosen the accuracy: within the limits the error can be made no smaller than "
         f"{looser:.4g} times what is asked"
     )
     if _within_reach_of_any(task):
         hint += "; spectrum: {type: free} can meet it"
-    if problem.densities:
+    if problem.densities and stated:
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
     return InfeasibleError(Complaint("infeasible", message, hint, key, spec.locate(key)))

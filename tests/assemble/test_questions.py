@@ -203,6 +203,23 @@ def test_infeasible_without_a_way_out_by_one_limit():
     limits = "limits: {input_power: 0.01, output_power: 0.1}\n"
     complaint = complaint_of(ERROR + FIR + limits, InfeasibleError)
     assert "no change of a single limit is enough" in complaint.message
+    times = float(complaint.message.split("have to be ")[1].split(" times")[0])
+    # What the message promises is true, and no overstatement.
+    raised = (
+        f"limits: {{input_power: {0.01 * times * (1 + 1e-4)}, output_power: {0.1 * times * (1 + 1e-4)}}}\n"
+    )
+    assert run(ERROR + FIR + raised)["status"] == "optimal"
+    lowered = (
+        f"limits: {{input_power: {0.01 * times * (1 - 1e-3)}, output_power: {0.1 * times * (1 - 1e-3)}}}\n"
+    )
+    assert complaint_of(ERROR + FIR + lowered, InfeasibleError).code == "infeasible"
+
+
+def test_a_density_that_is_too_low_is_told_its_factor():
+    # A flat spectrum needs 1.705495; below that level no spectrum has more at any frequency.
+    complaint = complaint_of(ERROR + FIR + "limits: {spectrum: 1.5}\n", InfeasibleError)
+    times = float(complaint.message.split("limits.spectrum would have to be ")[1].split(" times")[0])
+    assert times == pytest.approx(1.705495 / 1.5, rel=1e-4)
 
 
 def test_contradictory_limits():
