@@ -12,7 +12,8 @@ from inputdesign_cli.assemble.closed_loop_error import solve_closed_loop_error
 from inputdesign_cli.assemble.closed_loop_problem import build_problem
 from inputdesign_cli.assemble.design import solve_convex
 from inputdesign_cli.assemble.identification import identify as identify
-from inputdesign_cli.assemble.regression import build_regression, solve_regression
+from inputdesign_cli.assemble.regression import solve_regression
+from inputdesign_cli.assemble.regression_task import build_regression
 from inputdesign_cli.assemble.task import build_analysis, build_task
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.outcome import Outcome

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.assemble.regression import RegressionRun, refuse_coloured, run_regression
+from inputdesign_cli.assemble.regression import RegressionRun, run_regression
+from inputdesign_cli.assemble.regression_task import refuse_coloured
 from inputdesign_cli.design.mse import Regression
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.plant.polynomial import Array
