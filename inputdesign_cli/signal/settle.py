@@ -31,12 +31,11 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
     while ratio(high) > 1.0:
         low, high = high, high * 1.5
     while ratio(low) <= 1.0 and low > 1e-9 * start:
-        low /= 1.5
-    if low < high:
-        root = scipy.optimize.brentq(
-            lambda a: np.log(ratio(np.exp(a))), np.log(low), np.log(high), xtol=_EXACT, rtol=1e-14
+        low, high = low / 1.5, low
+    if ratio(low) > 1.0:
+        high = float(
+            scipy.optimize.brentq(lambda a: np.log(ratio(a)), low, high, xtol=_EXACT * low, rtol=1e-14)
         )
-        high = float(np.exp(root))
         while ratio(high) > 1.0:
             high *= 1.0 + _EXACT
     return high

@@ -48,6 +48,14 @@ def test_least_level_with_and_without_prior_knowledge():
         assert (known + 2.0 * level**2) ** -0.5 <= 1.0 + 1e-12
 
 
+@pytest.mark.parametrize("known", [0.0, 0.9])
+def test_least_level_of_any_size(known):
+    """The same root over twelve decades, where the ends of a bracket are roots up to rounding."""
+    for gain in 10.0 ** np.random.default_rng(0).uniform(-6, 6, 200):
+        level = least_level(lambda a, g=gain: (known + g * a**2) ** -0.4, 1.0)
+        assert level == pytest.approx(np.sqrt((1 - known) / gain), rel=1e-8)
+
+
 def test_first_level():
     assert first_level(lambda a: a >= 3.0, 1.0) == pytest.approx(3.0, rel=2e-3)
     assert first_level(lambda a: False, 1.0) is None
