@@ -15,7 +15,7 @@ from inputdesign_cli.design.designs import Design
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
-    ChannelSpectrumCurves,
+    MatrixSpectrumCurves,
     OptimalityCurves,
     SignalCurves,
     SpectrumCurves,
@@ -53,7 +53,7 @@ def hermitian_columns(values: NDArray, symbol: str) -> dict[str, Array]:
 
 def density_curves(
     spec: Spec, basis: object, x: Array
-) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+) -> tuple[Table, SpectrumCurves | MatrixSpectrumCurves]:
     """spectrum.csv and its plot of a basis with a density: over the band of the excitation."""
     w = np.linspace(*excitation_band(spec), _POINTS)
     phi = basis.density(x, w)  # type: ignore[attr-defined]
@@ -62,12 +62,12 @@ def density_curves(
     if phi.ndim == 1:
         inside = frequency > 0
         return table, SpectrumCurves(frequency[inside], density=phi[inside])
-    return table, _moduli(frequency, phi, lines=False)
+    return table, MatrixSpectrumCurves(frequency, phi)
 
 
 def line_curves(
     spec: Spec, basis: LinesBasis | DirectedLines, x: Array
-) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+) -> tuple[Table, SpectrumCurves | MatrixSpectrumCurves]:
     """spectrum.csv and its plot of sinusoids: powers, or Hermitian power matrices, ascending in frequency."""
     powers: Any
     if isinstance(basis, LinesBasis):
@@ -80,14 +80,7 @@ def line_curves(
     table = Table({frequency_header(spec): frequency, **hermitian_columns(powers, "power")})
     if powers.ndim == 1:
         return table, SpectrumCurves(frequency, line_frequency=frequency, line_power=powers)
-    return table, _moduli(frequency, powers, lines=True)
-
-
-def _moduli(frequency: Array, phi: NDArray, *, lines: bool) -> ChannelSpectrumCurves:
-    r = phi.shape[1]
-    pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
-    moduli = {f"{i + 1}{j + 1}": np.abs(phi[:, i, j]) for i, j in pairs}
-    return ChannelSpectrumCurves(frequency, moduli, np.linalg.eigvalsh(phi), lines)
+    return table, MatrixSpectrumCurves(frequency, powers, lines=True)
 
 
 def entry_bound_curves(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -109,8 +109,25 @@ def entry_label(output: int, input: int, *, single: bool) -> str:
     return "" if single else f"[{output + 1},{input + 1}]"
 
 
+class Parametrised:
+    """What a model knows by its list of `parameters`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def theta(self) -> Array:
+        return np.array([parameter.value for parameter in self.parameters])
+
+
 @dataclass(frozen=True)
-class PolynomialChannels:
+class PolynomialChannels(Parametrised):
     """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. An
@@ -179,16 +196,12 @@ class PolynomialChannels:
         return found
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        return tuple(parameter.name for parameter in self.parameters)
-
-    @cached_property
-    def theta(self) -> Array:
-        return np.array([parameter.value for parameter in self.parameters])
-
-    @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
+
+    def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
+        """A, C or D as one polynomial an output, a common one repeated."""
+        return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
 
     def _row(self, rows: Sequence[Array], output: int) -> Array:
         return rows[0] if len(rows) == 1 else rows[output]
@@ -205,6 +218,14 @@ class PolynomialChannels:
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         q = unit_circle(w)
         return self._entries(q, lambda i, j: evaluate(self.B[i][j], q) / self._denominator(q, i, j))
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
+        q = unit_circle(w)
+        H = np.zeros((q.size, self.outputs, self.outputs), dtype=complex)
+        for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
+            H[:, i, i] = evaluate(c, q) / (evaluate(a, q) * evaluate(d, q))
+        return H
 
     def is_fraction(self, output: int, input: int) -> bool:
         """Whether an entry is a fraction of two polynomials that are affine in theta."""
