@@ -16,9 +16,10 @@ from inputdesign_cli.assemble.channels import (
 )
 from inputdesign_cli.assemble.ellipses import check_pairs
 from inputdesign_cli.assemble.experiment import embedded
-from inputdesign_cli.assemble.limits import build_power_limits
+from inputdesign_cli.assemble.limits import build_density_limits, build_power_limits
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.requirements import build_criterion, build_requirements
+from inputdesign_cli.assemble.spectra import check_has_density
 from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Question
@@ -55,6 +56,7 @@ def build_channel_task(spec: Spec) -> Task:
     check_pairs(spec, model.names)
     basis = spectrum_basis(spec, experiment.inputs, band)
     _check_columns(spec, basis)
+    check_has_density(spec, basis)
     cost = channel_cost(spec)
     question = Question(
         experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
@@ -64,6 +66,7 @@ def build_channel_task(spec: Spec) -> Task:
         side=[] if criterion is None else requirements,
         cost=cost if goal == "cost" else {},
         limits=build_power_limits(spec),
+        densities=build_density_limits(spec, experiment),
         band=band,
     )
     return Task(question, experiment, cost, model_error_alpha(spec, experiment), None)  # type: ignore[arg-type]
@@ -123,7 +126,6 @@ def channel_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 _SIGNALS = (None, "multisine")
 _SIGNAL_KEYS = (*("periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "also"),)
-_LIMITS = ("energy", "spectrum")
 
 
 def check_channels_supported(spec: Spec) -> None:
@@ -141,13 +143,12 @@ def check_channels_supported(spec: Spec) -> None:
             raise refuse(
                 f"accuracy.{name}", f"handle {name} here", "state the accuracy as model_error or a criterion"
             )
-    for name in _LIMITS:
-        if getattr(spec.limits, name) is not None:
-            raise refuse(
-                f"limits.{name}",
-                f"enforce limits.{name} for several channels or in continuous time",
-                "limit the powers instead",
-            )
+    if spec.limits.energy is not None:
+        raise refuse(
+            "limits.energy",
+            "enforce limits.energy for several channels or in continuous time",
+            "limit input_power, its mean a sample",
+        )
     if spec.closed_loop:
         raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
     if spec.solver.method != "exchange":
@@ -195,7 +196,7 @@ def _check_columns(spec: Spec, basis: object) -> None:
     assert isinstance(basis, PolynomialBasis)
     plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
     floors = any(not limit.upper for limit in build_power_limits(spec))
-    if not plain or floors:
+    if not plain or floors or spec.limits.spectrum is not None:
         raise spec.complain(
             "not-supported",
             "factor_columns is for a criterion under upper limits on powers",

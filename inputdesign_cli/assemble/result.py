@@ -228,14 +228,14 @@ def _limits(spec: Spec, task: Task, design: Design) -> list[dict[str, Any]]:
         }
         entries.append(entry)
     for index, density in enumerate(task.question.densities):
-        breaches = [b for b in at.density_breaches(found.x, 1.0, above=-np.inf) if b.limit == index]
+        breaches = [b for b in at.density_breaches(found.x, 1.0, above=-np.inf) if b.place.limit == index]
         tightest = max(breaches, key=lambda b: b.ratio)
         entries.append(
             {
                 "name": "spectrum",
                 "kind": "max" if density.upper else "min",
                 "worst_ratio": tightest.ratio,
-                "frequency": tightest.frequency / frequency_unit(spec),
+                "frequency": tightest.place.frequency / frequency_unit(spec),
                 "binding": tightest.ratio >= 1.0 - _BINDS,
             }
         )
