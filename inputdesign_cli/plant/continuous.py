@@ -12,7 +12,8 @@ import numpy as np
 from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.channels import Parameter, Parametrised, Rows, entry_label
+from inputdesign_cli.plant.channel_model import Parameter, Parametrised, entry_label
+from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.model import Fraction
