@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import EntryOfPlant
-from inputdesign_cli.assemble.channels import excitation_band, frequency_unit
+from inputdesign_cli.assemble.channels import excitation_band, excitation_symbol, frequency_unit
 from inputdesign_cli.assemble.curves import distinct, frequency_header
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.outcome import (
@@ -55,14 +55,14 @@ def density_curves(
     spec: Spec, basis: object, x: Array
 ) -> tuple[Table, SpectrumCurves | MatrixSpectrumCurves]:
     """spectrum.csv and its plot of a basis with a density: over the band of the excitation."""
-    w = np.linspace(*excitation_band(spec), _POINTS)
+    w, symbol = np.linspace(*excitation_band(spec), _POINTS), excitation_symbol(spec)
     phi = basis.density(x, w)  # type: ignore[attr-defined]
     frequency = w / frequency_unit(spec)
     table = Table({frequency_header(spec): frequency, **hermitian_columns(phi, "phi")})
     if phi.ndim == 1:
         inside = frequency > 0
-        return table, SpectrumCurves(frequency[inside], density=phi[inside])
-    return table, MatrixSpectrumCurves(frequency, phi)
+        return table, SpectrumCurves(frequency[inside], density=phi[inside], symbol=symbol)
+    return table, MatrixSpectrumCurves(frequency, phi, symbol=symbol)
 
 
 def line_curves(
@@ -76,11 +76,11 @@ def line_curves(
         frequencies, powers = basis.frequencies[order], x[order]
     else:
         frequencies, powers = basis.lines(x)
-    frequency = frequencies / frequency_unit(spec)
+    frequency, symbol = frequencies / frequency_unit(spec), excitation_symbol(spec)
     table = Table({frequency_header(spec): frequency, **hermitian_columns(powers, "power")})
     if powers.ndim == 1:
-        return table, SpectrumCurves(frequency, line_frequency=frequency, line_power=powers)
-    return table, MatrixSpectrumCurves(frequency, powers, lines=True)
+        return table, SpectrumCurves(frequency, line_frequency=frequency, line_power=powers, symbol=symbol)
+    return table, MatrixSpectrumCurves(frequency, powers, lines=True, symbol=symbol)
 
 
 def entry_bound_curves(
@@ -136,10 +136,11 @@ def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | 
 
 
 def channel_signal_curves(spec: Spec, record: Array) -> tuple[Table, SignalCurves]:
-    """signal.csv and its plot: time, u1, u2, .."""
+    """signal.csv and its plot: time, u1, u2, .., in closed loop r1, r2, .."""
     time = spec.sample_time * np.arange(len(record), dtype=np.float64)
     offset = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), record.shape[1])
-    channels = {f"u{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
+    symbol = excitation_symbol(spec)
+    channels = {f"{symbol}{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
     limits = {}
     if spec.limits.amplitude is not None and spec.limits.amplitude.input is not None:
         most = np.broadcast_to(np.asarray(spec.limits.amplitude.input, dtype=float), record.shape[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +10,8 @@ import numpy as np
 
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, build_entry_variances
 from inputdesign_cli.assemble.channels import (
-    build_channel_model,
-    excitation_band,
+    channel_experiment,
+    excitation_symbol,
     record_step,
     spectrum_basis,
 )
@@ -28,6 +29,7 @@ from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import channel_record_information
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.plant import PolynomialPlant
 from inputdesign_cli.spec.spectrum import FirSpectrum, PolynomialSpectrum
 from inputdesign_cli.spectrum import PolynomialBasis
 
@@ -43,12 +45,9 @@ def build_channel_task(spec: Spec) -> Task:
             `not-identifiable`.
     """
     check_channels_supported(spec)
-    model = build_channel_model(spec)
-    band = excitation_band(spec)
     # Any: designs and requirements ask for no more than both kinds of experiments have.
-    experiment: Any = ChannelExperiment(
-        model, spec.experiment.samples, band, channel_prior(spec, ChannelExperiment(model, 1, band))
-    )
+    experiment: Any = with_prior(spec, channel_experiment(spec))
+    model, band = experiment.model, experiment.band
     requirements = channel_requirements(spec, experiment)
     criterion = build_criterion(spec, experiment)
     goal = _GOALS[spec.goal]
@@ -93,8 +92,19 @@ def _without_variance(spec: Spec) -> Spec:
     return spec.model_copy(update={"accuracy": accuracy})
 
 
+def with_prior(spec: Spec, experiment: ChannelExperiment) -> ChannelExperiment:
+    """The experiment with what `experiment.prior` adds to it.
+
+    Raises:
+        SpecError, DataError: see `channel_prior`.
+    """
+    return replace(experiment, prior=channel_prior(spec, experiment))
+
+
 def channel_prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
-    """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment (u1, u2, ..).
+    """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment.
+
+    Its columns are u1, u2, .., in closed loop r1, r2, ..
 
     Raises:
         SpecError, DataError: the matrix does not fit the parameters, the file cannot be used.
@@ -104,7 +114,7 @@ def channel_prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
         return None
     key = "experiment.prior.information"
     if isinstance(prior.information, str):
-        channels = [f"u{i + 1}" for i in range(experiment.inputs)]
+        channels = [f"{excitation_symbol(spec)}{i + 1}" for i in range(experiment.inputs)]
         columns = read_columns(
             spec.resolve_path(prior.information), {name: name for name in channels}, key=key
         )
@@ -150,7 +160,7 @@ def check_channels_supported(spec: Spec) -> None:
             "limit input_power, its mean a sample",
         )
     if spec.closed_loop:
-        raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
+        _check_loop_supported(spec, refuse)
     if spec.solver.method != "exchange":
         raise refuse("solver.method", f"use the {spec.solver.method} method here", "use exchange")
     if spec.signal.type not in _SIGNALS:
@@ -163,6 +173,16 @@ def check_channels_supported(spec: Spec) -> None:
         if getattr(spec.signal, name) is not None:
             raise refuse(f"signal.{name}", f"apply signal.{name} here", "remove it")
     _check_band(spec)
+
+
+def _check_loop_supported(spec: Spec, refuse: Callable[[str, str, str], Exception]) -> None:
+    if not isinstance(spec.plant, PolynomialPlant):
+        raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
+    bound = spec.limits.amplitude
+    if bound is not None and bound.input is not None:
+        raise refuse("limits.amplitude.input", "limit single samples of u in this loop", "limit input_power")
+    if spec.limits.rate is not None:
+        raise refuse("limits.rate", "limit the moves of u in this loop", "limit input_power")
 
 
 def _check_band(spec: Spec) -> None:

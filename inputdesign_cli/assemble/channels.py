@@ -6,9 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.plant import ChannelModel, ContinuousChannels, PolynomialChannels, SampledChannels
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import (
+    ChannelLoop,
+    ChannelModel,
+    ContinuousChannels,
+    MatrixController,
+    PolynomialChannels,
+    SampledChannels,
+)
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.controller import ControllerMatrix
 from inputdesign_cli.spec.experiment import NoiseShape
 from inputdesign_cli.spec.plant import ContinuousPlant, PolynomialPlant
 from inputdesign_cli.spec.spectrum import (
@@ -175,6 +184,27 @@ def line_frequencies(spec: Spec, spectrum: MultisineSpectrum, band: tuple[float,
             key="spectrum.lines",
         )
     return inside
+
+
+def excitation_symbol(spec: Spec) -> str:
+    """What is designed: r in closed loop, u in open loop."""
+    return "r" if spec.closed_loop else "u"
+
+
+def channel_experiment(spec: Spec) -> ChannelExperiment:
+    """The experiment but for its prior, its loop checked for stability.
+
+    Raises:
+        SpecError: `needs-band`; an unstable or algebraic loop.
+    """
+    model, controller, loop = build_channel_model(spec), spec.experiment.controller, None
+    if isinstance(controller, ControllerMatrix):
+        assert isinstance(model, PolynomialChannels)
+        loop = ChannelLoop(
+            model, MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
+        )
+        loop.check_stability()
+    return ChannelExperiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
 
 
 def frequency_unit(spec: Spec) -> float:
