@@ -39,12 +39,14 @@ class SpectrumCurves:
 
 @dataclass(frozen=True)
 class MatrixSpectrumCurves:
-    """The spectrum of several inputs over frequency: a density, or the masses of lines."""
+    """The spectrum of several inputs over frequency: a density, or the powers of lines."""
 
     frequency: Array  # (n,) rad per time unit
     spectrum: NDArray[np.complex128]  # (n, inputs, inputs), Hermitian
     white: float | None = None  # the level of white noise of the same total power
     lines: bool = False
+    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
+    logarithmic: bool = False  # the axis of frequency
 
 
 @dataclass(frozen=True)
@@ -87,17 +89,6 @@ class OptimalityCurves:
     frequency: Array
     ratio: Array
     support: Array
-
-
-@dataclass(frozen=True)
-class ChannelSpectrumCurves:
-    """A Hermitian spectrum over frequency: moduli of its entries and its eigenvalues; lines as stems."""
-
-    frequency: Array  # (n,) rad per time unit
-    moduli: Mapping[str, Array]  # "11" -> |Phi_11| (n,), "12" -> |Phi_12|, ..; of lines their powers
-    eigenvalues: Array  # (n, r), ascending
-    lines: bool = False
-    symbol: str = "u"
 
 
 @dataclass(frozen=True)
@@ -213,7 +204,6 @@ Curves = (
     | BoundCurves
     | OptimalityCurves
     | SignalCurves
-    | ChannelSpectrumCurves
     | ChannelBoundCurves
     | EllipseCurves
     | ErrorCurves

@@ -27,13 +27,12 @@ from inputdesign_cli.assemble.channel_record import record_sizes
 from inputdesign_cli.assemble.channel_requirements import required_band
 from inputdesign_cli.assemble.channel_task import (
     channel_cost,
-    channel_prior,
     channel_requirements,
     check_channels_supported,
+    with_prior,
 )
 from inputdesign_cli.assemble.channels import (
-    build_channel_model,
-    excitation_band,
+    channel_experiment,
     frequency_unit,
     record_step,
 )
@@ -59,11 +58,9 @@ def build_channel_analysis(spec: Spec) -> Task:
     """
     check_channels_supported(spec)
     record_step(spec)
-    model, band = build_channel_model(spec), excitation_band(spec)
     # Any: requirements ask for no more than both kinds of experiments have.
-    experiment: Any = ChannelExperiment(
-        model, spec.experiment.samples, band, channel_prior(spec, ChannelExperiment(model, 1, band))
-    )
+    experiment: Any = with_prior(spec, channel_experiment(spec))
+    model, band = experiment.model, experiment.band
     requirements = channel_requirements(spec, experiment)
     experiment.whitened(1.0)  # says which parameters cannot be told apart
     check_pairs(spec, model.names)

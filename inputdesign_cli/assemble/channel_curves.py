@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import EntryOfPlant
-from inputdesign_cli.assemble.channels import excitation_band, frequency_unit
+from inputdesign_cli.assemble.channels import excitation_band, excitation_symbol, frequency_unit
 from inputdesign_cli.assemble.curves import distinct, frequency_header
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
-    ChannelSpectrumCurves,
+    MatrixSpectrumCurves,
     OptimalityCurves,
     SignalCurves,
     SpectrumCurves,
@@ -53,21 +53,21 @@ def hermitian_columns(values: NDArray, symbol: str) -> dict[str, Array]:
 
 def density_curves(
     spec: Spec, basis: object, x: Array
-) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+) -> tuple[Table, SpectrumCurves | MatrixSpectrumCurves]:
     """spectrum.csv and its plot of a basis with a density: over the band of the excitation."""
-    w = np.linspace(*excitation_band(spec), _POINTS)
+    w, symbol = np.linspace(*excitation_band(spec), _POINTS), excitation_symbol(spec)
     phi = basis.density(x, w)  # type: ignore[attr-defined]
     frequency = w / frequency_unit(spec)
     table = Table({frequency_header(spec): frequency, **hermitian_columns(phi, "phi")})
     if phi.ndim == 1:
         inside = frequency > 0
-        return table, SpectrumCurves(frequency[inside], density=phi[inside])
-    return table, _moduli(frequency, phi, lines=False)
+        return table, SpectrumCurves(frequency[inside], density=phi[inside], symbol=symbol)
+    return table, MatrixSpectrumCurves(frequency, phi, symbol=symbol)
 
 
 def line_curves(
     spec: Spec, basis: LinesBasis | DirectedLines, x: Array
-) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+) -> tuple[Table, SpectrumCurves | MatrixSpectrumCurves]:
     """spectrum.csv and its plot of sinusoids: powers, or Hermitian power matrices, ascending in frequency."""
     powers: Any
     if isinstance(basis, LinesBasis):
@@ -76,18 +76,11 @@ def line_curves(
         frequencies, powers = basis.frequencies[order], x[order]
     else:
         frequencies, powers = basis.lines(x)
-    frequency = frequencies / frequency_unit(spec)
+    frequency, symbol = frequencies / frequency_unit(spec), excitation_symbol(spec)
     table = Table({frequency_header(spec): frequency, **hermitian_columns(powers, "power")})
     if powers.ndim == 1:
-        return table, SpectrumCurves(frequency, line_frequency=frequency, line_power=powers)
-    return table, _moduli(frequency, powers, lines=True)
-
-
-def _moduli(frequency: Array, phi: NDArray, *, lines: bool) -> ChannelSpectrumCurves:
-    r = phi.shape[1]
-    pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
-    moduli = {f"{i + 1}{j + 1}": np.abs(phi[:, i, j]) for i, j in pairs}
-    return ChannelSpectrumCurves(frequency, moduli, np.linalg.eigvalsh(phi), lines)
+        return table, SpectrumCurves(frequency, line_frequency=frequency, line_power=powers, symbol=symbol)
+    return table, MatrixSpectrumCurves(frequency, powers, lines=True, symbol=symbol)
 
 
 def entry_bound_curves(
@@ -143,10 +136,11 @@ def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | 
 
 
 def channel_signal_curves(spec: Spec, record: Array) -> tuple[Table, SignalCurves]:
-    """signal.csv and its plot: time, u1, u2, .."""
+    """signal.csv and its plot: time, u1, u2, .., in closed loop r1, r2, .."""
     time = spec.sample_time * np.arange(len(record), dtype=np.float64)
     offset = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), record.shape[1])
-    channels = {f"u{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
+    symbol = excitation_symbol(spec)
+    channels = {f"{symbol}{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
     limits = {}
     if spec.limits.amplitude is not None and spec.limits.amplitude.input is not None:
         most = np.broadcast_to(np.asarray(spec.limits.amplitude.input, dtype=float), record.shape[1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.assemble.channels import frequency_unit, record_step
+from inputdesign_cli.assemble.channels import excitation_symbol, frequency_unit, record_step
 from inputdesign_cli.assemble.given import bad_table, read_spectrum_table
 from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.design.problem import Weight, weights_of
@@ -16,6 +16,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     ChannelPhases,
     blocks_of,
+    channel_inputs,
     channel_outputs,
     channel_record_information,
     grid_lines,
@@ -121,23 +122,24 @@ def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
 
 
 def _recorded(spec: Spec, experiment: ChannelExperiment, given: GivenSignal) -> ChannelExcitation:
-    names = channel_columns(experiment.inputs)
+    names = channel_columns(experiment.inputs, excitation_symbol(spec))
     path, step = spec.resolve_path(given.signal), record_step(spec)
     columns = read_columns(path, {name: name for name in names}, key="spectrum.given.signal")
     samples = np.stack([columns[name] for name in names], axis=1)
-    u = np.mean(samples**2, axis=0).tolist()
+    r = np.mean(samples**2, axis=0).tolist()
+    u = np.mean(channel_inputs(experiment, samples, step) ** 2, axis=0).tolist()
     y = np.mean(channel_outputs(experiment, samples, step) ** 2, axis=0).tolist()
     return ChannelExcitation(
         "signal",
-        {"input": u, "output": y, "excitation": u},
+        {"input": u, "output": y, "excitation": r},
         lambda coordinates: channel_record_information(coordinates, samples, step),
         samples=samples,
     )
 
 
-def channel_columns(inputs: int) -> Sequence[str]:
-    """How the columns of a recorded signal begin: u1, u2, ..; u for one input."""
-    return ["u"] if inputs == 1 else [f"u{i + 1}" for i in range(inputs)]
+def channel_columns(inputs: int, symbol: str) -> Sequence[str]:
+    """How the columns of a recorded signal begin: u1, u2, ..; u for one input; in closed loop r1, r2, .."""
+    return [symbol] if inputs == 1 else [f"{symbol}{i + 1}" for i in range(inputs)]
 
 
 def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedChannels:
@@ -185,5 +187,5 @@ def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
     total = float(np.trace(lines.powers.sum(axis=0)).real)
     if total == 0.0:  # the band lies between two lines of the record
         return None
-    lines = lines.scaled(sum(excitation.power["input"]) / total)
+    lines = lines.scaled(sum(excitation.power["excitation"]) / total)
     return multisine_record(lines, samples, rng, phases)

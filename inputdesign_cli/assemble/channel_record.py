@@ -13,7 +13,7 @@ from inputdesign_cli.assemble.record import worst_ratio
 from inputdesign_cli.assemble.result import powers
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.errors import Complaint, InfeasibleError
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.information import POWER_KINDS, ChannelExperiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     ChannelBounds,
@@ -21,6 +21,7 @@ from inputdesign_cli.signal import (
     ChannelRecord,
     Lines,
     blocks_of,
+    channel_inputs,
     channel_outputs,
     channel_record_information,
     grid_lines,
@@ -110,7 +111,7 @@ def _angles(
         return None
     outputs = []
     if bounds.output is not None:
-        response = experiment.model.plant_at(lines.frequencies / step)
+        response = experiment.response("output", lines.frequencies / step)
         outputs = [(response[:, i], float(bound)) for i, bound in enumerate(bounds.output)]
 
     def lowered(rng: np.random.Generator) -> Array:
@@ -140,7 +141,7 @@ def _too_tight(spec: Spec, record: ChannelRecord) -> InfeasibleError:
 
 
 def design_lines(design: Design, experiment: ChannelExperiment, period: int, step: float) -> Lines:
-    """The sinusoids that stand for the design, no stronger at input or output than the design is."""
+    """The sinusoids that stand for the design, no stronger at input, output or excitation than it is."""
     basis, x = design.result.basis, design.result.x
     if isinstance(basis, LinesBasis):
         order = np.argsort(basis.frequencies)
@@ -156,12 +157,11 @@ def design_lines(design: Design, experiment: ChannelExperiment, period: int, ste
 
 
 def _fitting(design: Design, experiment: ChannelExperiment, lines: Lines, step: float) -> float:
-    """What the lines are scaled by, so that neither power exceeds that of the design."""
+    """What the lines are scaled by, so that no power exceeds that of the design."""
     at = lines.frequencies / step
     designed = powers(design.problem, design.result.basis, design.result.x)
     factors = []
-    kinds: tuple[PowerKind, ...] = ("input", "output")
-    for kind in kinds:
+    for kind in POWER_KINDS:
         density = experiment.power_density(kind, at)
         values = density[:, None, None] if density.ndim == 1 else density
         realised = float(np.einsum("nab,nba->", values, lines.powers).real)
@@ -193,7 +193,7 @@ def channel_signal_entry(
 def record_sizes(spec: Spec, experiment: ChannelExperiment, samples: Array) -> dict[str, Any]:
     """Length, powers and peaks by channel of a record (n, r)."""
     step = record_step(spec)
-    y = channel_outputs(experiment, samples, step)
+    y, u = channel_outputs(experiment, samples, step), channel_inputs(experiment, samples, step)
     peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
     return {
         "samples": len(samples),
@@ -201,9 +201,9 @@ def record_sizes(spec: Spec, experiment: ChannelExperiment, samples: Array) -> d
         "power": (rms**2).tolist(),
         "peak": peak.tolist(),
         "crest_factor": (peak / np.maximum(rms, 1e-300)).tolist(),
-        "input_power": (rms**2).tolist(),
+        "input_power": np.mean(u**2, axis=0).tolist(),
         "output_power": np.mean(y**2, axis=0).tolist(),
-        "input_peak": peak.tolist(),
-        "input_move": np.abs(np.diff(samples, axis=0, prepend=0.0)).max(axis=0).tolist(),
+        "input_peak": np.abs(u).max(axis=0).tolist(),
+        "input_move": np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0).tolist(),
         "output_peak": np.abs(y).max(axis=0).tolist(),
     }

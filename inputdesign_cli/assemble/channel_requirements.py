@@ -112,11 +112,18 @@ def any_weight(
     """A weight in the time of the plant.
 
     Raises:
-        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled.
+        SpecError: `not-sampled` for a weight in s of a sampled plant that does not say how it is sampled;
+            `unsuitable-key` for one in q^-1 of a plant in continuous time.
     """
     if spec.plant.sampled:
         return weight(spec, transfer, key)
-    assert isinstance(transfer, ContinuousTransfer)
+    if not isinstance(transfer, ContinuousTransfer):
+        raise spec.complain(
+            "unsuitable-key",
+            f"{key} is in q^-1, but the plant is in continuous time",
+            hint="write continuous: {numerator: [..], denominator: [..]} in s",
+            key=key,
+        )
     ratio = transfer.continuous
     return ContinuousWeight(np.array(ratio.numerator), np.array(ratio.denominator_polynomial))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,16 +10,17 @@ import numpy as np
 
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, build_entry_variances
 from inputdesign_cli.assemble.channels import (
-    build_channel_model,
-    excitation_band,
+    channel_experiment,
+    excitation_symbol,
     record_step,
     spectrum_basis,
 )
 from inputdesign_cli.assemble.ellipses import check_pairs
 from inputdesign_cli.assemble.experiment import embedded
-from inputdesign_cli.assemble.limits import build_power_limits
+from inputdesign_cli.assemble.limits import build_density_limits, build_power_limits
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.requirements import build_criterion, build_requirements
+from inputdesign_cli.assemble.spectra import check_has_density
 from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Question
@@ -27,6 +29,7 @@ from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import channel_record_information
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.plant import PolynomialPlant
 from inputdesign_cli.spec.spectrum import FirSpectrum, PolynomialSpectrum
 from inputdesign_cli.spectrum import PolynomialBasis
 
@@ -42,12 +45,9 @@ def build_channel_task(spec: Spec) -> Task:
             `not-identifiable`.
     """
     check_channels_supported(spec)
-    model = build_channel_model(spec)
-    band = excitation_band(spec)
     # Any: designs and requirements ask for no more than both kinds of experiments have.
-    experiment: Any = ChannelExperiment(
-        model, spec.experiment.samples, band, channel_prior(spec, ChannelExperiment(model, 1, band))
-    )
+    experiment: Any = with_prior(spec, channel_experiment(spec))
+    model, band = experiment.model, experiment.band
     requirements = channel_requirements(spec, experiment)
     criterion = build_criterion(spec, experiment)
     goal = _GOALS[spec.goal]
@@ -55,6 +55,7 @@ def build_channel_task(spec: Spec) -> Task:
     check_pairs(spec, model.names)
     basis = spectrum_basis(spec, experiment.inputs, band)
     _check_columns(spec, basis)
+    check_has_density(spec, basis)
     cost = channel_cost(spec)
     question = Question(
         experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
@@ -64,6 +65,7 @@ def build_channel_task(spec: Spec) -> Task:
         side=[] if criterion is None else requirements,
         cost=cost if goal == "cost" else {},
         limits=build_power_limits(spec),
+        densities=build_density_limits(spec, experiment),
         band=band,
     )
     return Task(question, experiment, cost, model_error_alpha(spec, experiment), None)  # type: ignore[arg-type]
@@ -90,8 +92,19 @@ def _without_variance(spec: Spec) -> Spec:
     return spec.model_copy(update={"accuracy": accuracy})
 
 
+def with_prior(spec: Spec, experiment: ChannelExperiment) -> ChannelExperiment:
+    """The experiment with what `experiment.prior` adds to it.
+
+    Raises:
+        SpecError, DataError: see `channel_prior`.
+    """
+    return replace(experiment, prior=channel_prior(spec, experiment))
+
+
 def channel_prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
-    """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment (u1, u2, ..).
+    """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment.
+
+    Its columns are u1, u2, .., in closed loop r1, r2, ..
 
     Raises:
         SpecError, DataError: the matrix does not fit the parameters, the file cannot be used.
@@ -101,7 +114,7 @@ def channel_prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
         return None
     key = "experiment.prior.information"
     if isinstance(prior.information, str):
-        channels = [f"u{i + 1}" for i in range(experiment.inputs)]
+        channels = [f"{excitation_symbol(spec)}{i + 1}" for i in range(experiment.inputs)]
         columns = read_columns(
             spec.resolve_path(prior.information), {name: name for name in channels}, key=key
         )
@@ -123,7 +136,6 @@ def channel_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 _SIGNALS = (None, "multisine")
 _SIGNAL_KEYS = (*("periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "also"),)
-_LIMITS = ("energy", "spectrum")
 
 
 def check_channels_supported(spec: Spec) -> None:
@@ -141,15 +153,14 @@ def check_channels_supported(spec: Spec) -> None:
             raise refuse(
                 f"accuracy.{name}", f"handle {name} here", "state the accuracy as model_error or a criterion"
             )
-    for name in _LIMITS:
-        if getattr(spec.limits, name) is not None:
-            raise refuse(
-                f"limits.{name}",
-                f"enforce limits.{name} for several channels or in continuous time",
-                "limit the powers instead",
-            )
+    if spec.limits.energy is not None:
+        raise refuse(
+            "limits.energy",
+            "enforce limits.energy for several channels or in continuous time",
+            "limit input_power, its mean a sample",
+        )
     if spec.closed_loop:
-        raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
+        _check_loop_supported(spec, refuse)
     if spec.solver.method != "exchange":
         raise refuse("solver.method", f"use the {spec.solver.method} method here", "use exchange")
     if spec.signal.type not in _SIGNALS:
@@ -162,6 +173,16 @@ def check_channels_supported(spec: Spec) -> None:
         if getattr(spec.signal, name) is not None:
             raise refuse(f"signal.{name}", f"apply signal.{name} here", "remove it")
     _check_band(spec)
+
+
+def _check_loop_supported(spec: Spec, refuse: Callable[[str, str, str], Exception]) -> None:
+    if not isinstance(spec.plant, PolynomialPlant):
+        raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
+    bound = spec.limits.amplitude
+    if bound is not None and bound.input is not None:
+        raise refuse("limits.amplitude.input", "limit single samples of u in this loop", "limit input_power")
+    if spec.limits.rate is not None:
+        raise refuse("limits.rate", "limit the moves of u in this loop", "limit input_power")
 
 
 def _check_band(spec: Spec) -> None:
@@ -195,7 +216,7 @@ def _check_columns(spec: Spec, basis: object) -> None:
     assert isinstance(basis, PolynomialBasis)
     plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
     floors = any(not limit.upper for limit in build_power_limits(spec))
-    if not plain or floors:
+    if not plain or floors or spec.limits.spectrum is not None:
         raise spec.complain(
             "not-supported",
             "factor_columns is for a criterion under upper limits on powers",

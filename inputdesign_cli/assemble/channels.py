@@ -6,9 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.plant import ChannelModel, ContinuousChannels, PolynomialChannels, SampledChannels
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import (
+    ChannelLoop,
+    ChannelModel,
+    ContinuousChannels,
+    MatrixController,
+    PolynomialChannels,
+    SampledChannels,
+)
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.controller import ControllerMatrix
+from inputdesign_cli.spec.experiment import NoiseShape
 from inputdesign_cli.spec.plant import ContinuousPlant, PolynomialPlant
 from inputdesign_cli.spec.spectrum import (
     FirSpectrum,
@@ -59,13 +69,17 @@ def build_channel_model(spec: Spec) -> ChannelModel:
         )
         return SampledChannels(continuous, spec.sample_time) if plant.sampled else continuous
     assert isinstance(plant, PolynomialPlant)
-    noise = spec.noise
+    return polynomial_channels(plant, spec.noise, covariance)
+
+
+def polynomial_channels(plant: PolynomialPlant, noise: NoiseShape, covariance: Array) -> PolynomialChannels:
+    """A plant in q^-1; A, C and D that the spec states once are common to the outputs."""
     return PolynomialChannels(
         B=_arrays(plant.B_matrix),
-        A=_rows(plant.A),
+        A=rows_of(plant.A),
         F=_arrays(plant.F_matrix),
-        C=_rows(noise.C),
-        D=_rows(noise.D),
+        C=rows_of(noise.C),
+        D=rows_of(noise.D),
         covariance=covariance,
     )
 
@@ -172,6 +186,27 @@ def line_frequencies(spec: Spec, spectrum: MultisineSpectrum, band: tuple[float,
     return inside
 
 
+def excitation_symbol(spec: Spec) -> str:
+    """What is designed: r in closed loop, u in open loop."""
+    return "r" if spec.closed_loop else "u"
+
+
+def channel_experiment(spec: Spec) -> ChannelExperiment:
+    """The experiment but for its prior, its loop checked for stability.
+
+    Raises:
+        SpecError: `needs-band`; an unstable or algebraic loop.
+    """
+    model, controller, loop = build_channel_model(spec), spec.experiment.controller, None
+    if isinstance(controller, ControllerMatrix):
+        assert isinstance(model, PolynomialChannels)
+        loop = ChannelLoop(
+            model, MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
+        )
+        loop.check_stability()
+    return ChannelExperiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+
+
 def frequency_unit(spec: Spec) -> float:
     """What an experiment's frequency is divided by to be in rad per time unit."""
     return spec.sample_time if spec.plant.sampled else 1.0
@@ -205,6 +240,6 @@ def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, .
     return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
 
 
-def _rows(value: tuple) -> tuple[Array, ...]:
+def rows_of(value: tuple) -> tuple[Array, ...]:
     """One polynomial, common to all outputs, or a list of one an output."""
     return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from inputdesign_cli.assemble.channel_curves import hermitian_columns
 from inputdesign_cli.assemble.closed_loop_design import ClosedLoopDesign
 from inputdesign_cli.outcome import DirectionCurves, MatrixSpectrumCurves, Table
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -28,28 +29,16 @@ def spectrum_tables(spec: Spec, design: ClosedLoopDesign) -> tuple[dict[str, Tab
         shown = np.geomspace(max(lo, _DECADES * hi), hi, _POINTS)
         drawn = design.density(shown)
     header = f"frequency_rad_per_{spec.time_unit}"
-    table = Table({header: w / spec.sample_time, **matrix_columns(Phi)})
+    table = Table({header: w / spec.sample_time, **hermitian_columns(Phi, "phi")})
     lined = design.lines is not None
     white = None if lined else design.white_level
     curves: dict[str, Any] = {
-        "spectrum": MatrixSpectrumCurves(shown / spec.sample_time, drawn, white=white, lines=lined),
+        "spectrum": MatrixSpectrumCurves(
+            shown / spec.sample_time, drawn, white=white, lines=lined, logarithmic=True
+        ),
         "directions": _directions(spec, design, shown, drawn, white),
     }
     return {"spectrum": table}, curves
-
-
-def matrix_columns(Phi: ComplexArray) -> dict[str, Array]:
-    """phi_11, phi_12_re, phi_12_im, .. of the upper triangle; the rest follows by symmetry."""
-    columns: dict[str, Array] = {}
-    n = Phi.shape[1]
-    if n == 1:
-        return {"phi": Phi[:, 0, 0].real}
-    for i in range(n):
-        columns[f"phi_{i + 1}{i + 1}"] = Phi[:, i, i].real
-        for j in range(i + 1, n):
-            columns[f"phi_{i + 1}{j + 1}_re"] = Phi[:, i, j].real
-            columns[f"phi_{i + 1}{j + 1}_im"] = Phi[:, i, j].imag
-    return columns
 
 
 def _directions(

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from inputdesign_cli.assemble.channels import polynomial_channels, rows_of
 from inputdesign_cli.design.asymptotic import (
     ClosedLoopProblem,
     InternalModel,
@@ -28,7 +29,6 @@ from inputdesign_cli.spec import (
     Spec,
 )
 from inputdesign_cli.spec.experiment import NoiseShape, covariance_of
-from inputdesign_cli.spec.values import depth
 
 KEY = "accuracy.closed_loop_error"
 
@@ -60,28 +60,6 @@ def build_problem(spec: Spec) -> ClosedLoopProblem:
 
 def build_plant(spec: Spec, plant: object, noise: NoiseShape, key: str) -> MatrixPlant:
     """The matrix of polynomials of `plant` or of the true system `simulation.plant`."""
-    if isinstance(plant, PolynomialPlant):
-        outputs = plant.outputs
-        B, F, A = plant.B_matrix, plant.F_matrix, plant.A_per_output
-        common = depth(plant.A) == 1
-    elif isinstance(plant, ContinuousPlant) and plant.sampled:
-        outputs, common = plant.outputs, True
-        A = ((1.0,),) * outputs
-        pairs = [
-            [sampled(above, below, spec.sample_time) for above, below in zip(*rows, strict=True)]
-            for rows in zip(
-                plant.continuous.numerator_matrix, plant.continuous.denominator_matrix, strict=True
-            )
-        ]
-        B = tuple(tuple(tuple(map(float, entry[0])) for entry in row) for row in pairs)
-        F = tuple(tuple(tuple(map(float, entry[1])) for entry in row) for row in pairs)
-    else:
-        raise spec.complain(
-            "not-supported",
-            "this version designs for the closed-loop error of sampled plants only",
-            hint="add sample: zoh to a continuous-time plant",
-            key=key,
-        )
     variance = getattr(noise, "variance", None)
     if variance is None:
         raise spec.complain(
@@ -90,14 +68,28 @@ def build_plant(spec: Spec, plant: object, noise: NoiseShape, key: str) -> Matri
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
-    return MatrixPlant.build(
-        A=A,
-        B=B,
-        F=F,
-        C=noise.C_per_output(outputs),
-        D=noise.D_per_output(outputs),
-        covariance=covariance_of(variance, outputs),
-        common_A=common,
+    if isinstance(plant, PolynomialPlant):
+        covariance = covariance_of(variance, plant.outputs)
+        return MatrixPlant.of(polynomial_channels(plant, noise, covariance))
+    if not isinstance(plant, ContinuousPlant) or not plant.sampled:
+        raise spec.complain(
+            "not-supported",
+            "this version designs for the closed-loop error of sampled plants only",
+            hint="add sample: zoh to a continuous-time plant",
+            key=key,
+        )
+    matrix = plant.continuous
+    pairs = [
+        [sampled(above, below, spec.sample_time) for above, below in zip(*rows, strict=True)]
+        for rows in zip(matrix.numerator_matrix, matrix.denominator_matrix, strict=True)
+    ]
+    return MatrixPlant(
+        B=tuple(tuple(above for above, _ in row) for row in pairs),
+        A=(np.ones(1),),
+        F=tuple(tuple(below for _, below in row) for row in pairs),
+        C=rows_of(noise.C),
+        D=rows_of(noise.D),
+        covariance=covariance_of(variance, plant.outputs),
     )
 
 

@@ -11,6 +11,7 @@ from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, zero_order_hold
 from inputdesign_cli.signal import record_information
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.controller import ControllerMatrix
 from inputdesign_cli.spec.plant import PolynomialPlant
 from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer
 
@@ -81,6 +82,7 @@ def build_experiment(spec: Spec) -> Experiment:
     """
     model = build_model(spec)
     controller = spec.experiment.controller
+    assert not isinstance(controller, ControllerMatrix)  # the spec has been checked
     loop = Loop(model, None if controller is None else rational(controller))
     loop.check_stability()
     return Experiment(loop, spec.experiment.samples, _prior(spec, loop))

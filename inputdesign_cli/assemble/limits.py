@@ -6,12 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from inputdesign_cli.assemble.experiment import weight
+from inputdesign_cli.accuracy.continuous_weight import weight_singularities
+from inputdesign_cli.assemble.channel_requirements import any_weight
+from inputdesign_cli.assemble.channels import frequency_unit
 from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.design.limits import DensityLimit, PowerLimit
 from inputdesign_cli.errors import Complaint, DataError
-from inputdesign_cli.information import POWER_KINDS, Experiment
-from inputdesign_cli.plant import graded_grid, logarithmic_distance
+from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, Experiment
+from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.limits import Curve, TableFile
@@ -39,8 +41,8 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
     return limits
 
 
-def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
-    """Bounds on the density of the excitation at every frequency.
+def build_density_limits(spec: Spec, experiment: Experiment | ChannelExperiment) -> list[DensityLimit]:
+    """Bounds on the density of the excitation at every frequency of its band.
 
     Raises:
         SpecError, DataError: a curve cannot be used, or the lower bound crosses the upper one.
@@ -48,19 +50,21 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
     stated = spec.limits.spectrum
     if stated is None:
         return []
-    limits = []
+    unit, limits = frequency_unit(spec), []
     for curve, upper in ((stated.max, True), (stated.min, False)):
         if curve is None or curve == 0.0:
             continue
         key = f"{_KEY}.{'max' if upper else 'min'}" if stated.min is not None else _KEY
         level, knots, singular = _level(spec, curve, key)
-        grid = graded_grid(np.concatenate([experiment.singularities, singular]), 0.0, np.pi, knots=knots)
+        grid = graded_grid(
+            np.concatenate([experiment.singularities, singular]), *experiment.band, knots=knots
+        )
         if upper and level(grid).min() <= 0:
-            at = grid[int(np.argmin(level(grid)))] / spec.sample_time
+            at = grid[int(np.argmin(level(grid)))] / unit
             raise spec.complain(
                 "bad-limit",
-                f"the upper bound vanishes at {at:.6g} rad/{spec.time_unit}: no FIR spectrum vanishes there "
-                "and stays positive around",
+                f"the upper bound vanishes at {at:.6g} rad/{spec.time_unit}: no spectrum with a density "
+                "vanishes there and stays positive around",
                 hint="give a small positive bound instead",
                 key=key,
             )
@@ -69,7 +73,7 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
         grid = np.union1d(limits[0].grid, limits[1].grid)
         room = limits[0].level(grid) - limits[1].level(grid)
         if room.min() <= 0:
-            at = grid[int(np.argmin(room))] / spec.sample_time
+            at = grid[int(np.argmin(room))] / unit
             raise spec.complain(
                 "bad-limit",
                 f"min reaches max at {at:.6g} rad/{spec.time_unit}: no spectrum fits in between",
@@ -88,15 +92,14 @@ def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array]
     if isinstance(curve, TableFile):
         frequency, value = _table(spec, curve.table, key)
         return lambda w: np.interp(w, frequency, value), frequency, smooth
-    W = weight(spec, curve, key)
-    singular = logarithmic_distance(np.concatenate([W.poles, W.zeros]))
-    return lambda w: np.abs(W.at(w)) ** 2, nowhere, singular
+    W = any_weight(spec, curve, key)
+    return lambda w: np.abs(W.at(w)) ** 2, nowhere, weight_singularities(W)
 
 
 def _table(spec: Spec, name: str, key: str) -> tuple[Array, Array]:
     path = spec.resolve_path(name)
     columns = read_columns(path, {"frequency": "frequency", "value": "phi"}, key=key)
-    frequency, value = columns["frequency"] * spec.sample_time, columns["value"]
+    frequency, value = columns["frequency"] * frequency_unit(spec), columns["value"]
     if np.any(np.diff(frequency) <= 0) or frequency[0] < 0 or np.any(value < 0):
         raise DataError(
             Complaint(

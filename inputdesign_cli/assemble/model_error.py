@@ -23,6 +23,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Rational
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.accuracy import DEFAULT_CONFIDENCE
+from inputdesign_cli.spec.controller import ControllerMatrix
 
 _KEY = "accuracy.model_error"
 
@@ -93,6 +94,7 @@ def _admissible(spec: Spec, experiment: Experiment, band: tuple[float, float]) -
     sensitivity = error.sensitivity
     assert sensitivity is not None
     given = sensitivity.controller or spec.experiment.controller
+    assert not isinstance(given, ControllerMatrix)  # the spec has been checked
     assert given is not None
     controller = rational(given)
     Loop(model, controller).check_stability()

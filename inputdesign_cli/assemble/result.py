@@ -19,7 +19,7 @@ from inputdesign_cli.design.problem import Problem, weights_of
 from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
-from inputdesign_cli.spectrum import Basis, FirBasis, LinesBasis, flat_basis
+from inputdesign_cli.spectrum import Basis, DirectedLines, FirBasis, LinesBasis, flat_basis
 
 # A limit binds when the design uses all but this share of it.
 _BINDS = 1e-6
@@ -228,14 +228,14 @@ def _limits(spec: Spec, task: Task, design: Design) -> list[dict[str, Any]]:
         }
         entries.append(entry)
     for index, density in enumerate(task.question.densities):
-        breaches = [b for b in at.density_breaches(found.x, 1.0, above=-np.inf) if b.limit == index]
+        breaches = [b for b in at.density_breaches(found.x, 1.0, above=-np.inf) if b.place.limit == index]
         tightest = max(breaches, key=lambda b: b.ratio)
         entries.append(
             {
                 "name": "spectrum",
                 "kind": "max" if density.upper else "min",
                 "worst_ratio": tightest.ratio,
-                "frequency": tightest.frequency / frequency_unit(spec),
+                "frequency": tightest.place.frequency / frequency_unit(spec),
                 "binding": tightest.ratio >= 1.0 - _BINDS,
             }
         )
@@ -246,10 +246,11 @@ def _notes(spec: Spec, design: Design) -> list[str]:
     """What a user should know before trusting a number."""
     found, problem = design.result, design.problem
     notes = []
-    if spec.closed_loop and isinstance(found.basis, LinesBasis) and found.x.any():
+    if spec.closed_loop and isinstance(found.basis, LinesBasis | DirectedLines) and found.x.any():
         frequencies, power = found.basis.frequencies, found.x
-        price = problem.price.density(frequencies)
-        cheap = (price < _FREE * problem.price.density(problem.grid).max()) & (power > _SUPPORT * power.sum())
+        price = found.basis.integrals(problem.price.density, problem.experiment.singularities)
+        dearest = np.abs(problem.price.density(problem.grid)).max()
+        cheap = (price < _FREE * dearest) & (power > _SUPPORT * power.sum())
         if np.any(cheap):
             at = float(frequencies[cheap].max()) / frequency_unit(spec)
             near_zero = at < 1e-6 * np.pi / frequency_unit(spec)

@@ -8,7 +8,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.spectrum import FirSpectrum, FreeSpectrum, MultisineSpectrum, WhiteSpectrum
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from inputdesign_cli.spectrum import Basis, DirectedLines, FirBasis, LinesBasis
 
 DEFAULT_ORDER = 20
 _SAME = 1e-9
@@ -78,7 +78,12 @@ def _check_limits(spec: Spec, basis: FirBasis | LinesBasis) -> None:
             hint="use type: multisine or type: free, or bound the density outside by limits.spectrum",
             key="limits.band",
         )
-    if isinstance(basis, LinesBasis) and spec.limits.spectrum is not None:
+    check_has_density(spec, basis)
+
+
+def check_has_density(spec: Spec, basis: Basis) -> None:
+    """Raise `SpecError` (`bad-limit`) for a bound on the density of sinusoids, which have none."""
+    if isinstance(basis, LinesBasis | DirectedLines) and spec.limits.spectrum is not None:
         raise spec.complain(
             "bad-limit",
             "sinusoids have no density, so that limits.spectrum says nothing about them",

@@ -51,7 +51,7 @@ def least_scale(problem: Problem, z: Array) -> float:
         if limit.upper
     ]
     breaches = problem.density_breaches(z, 1.0, above=-np.inf) if problem.densities else []
-    used += [breach.ratio for breach in breaches if problem.densities[breach.limit].upper]
+    used += [breach.ratio for breach in breaches if problem.densities[breach.place.limit].upper]
     return max(used, default=0.0)
 
 
@@ -89,7 +89,7 @@ def missing_floor(problem: Problem, z: Array) -> float:
     ]
     if problem.densities:
         breaches = problem.density_breaches(z, 1.0, above=-np.inf)
-        lower = [2.0 - b.ratio for b in breaches if not problem.densities[b.limit].upper]
+        lower = [2.0 - b.ratio for b in breaches if not problem.densities[b.place.limit].upper]
         shares += [1.0 / max(share, 1e-12) for share in lower]
     return max(shares, default=0.0)
 

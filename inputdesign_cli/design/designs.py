@@ -109,7 +109,7 @@ def whitened_problem(question: Question, power: float) -> Problem:
     """The problem in coordinates where white excitation of this power (if any) gives M = I."""
     coordinates = question.experiment.whitened(power or 1.0)
     densities = tuple(question.densities)
-    implied = [implied_power(d) for d in densities if d.upper]
+    implied = [implied_power(d, question.experiment.inputs) for d in densities if d.upper]
     return Problem(
         experiment=coordinates,
         basis=question.basis,

@@ -19,7 +19,7 @@ from inputdesign_cli.design.certificate import Certificate, certify
 from inputdesign_cli.design.limits import DensityBreach
 from inputdesign_cli.design.master import Proof, Row, solve_master
 from inputdesign_cli.design.problem import Problem
-from inputdesign_cli.design.rows import alike, density_row, on_basis, power_rows
+from inputdesign_cli.design.rows import alike, density_row, first_density_rows, on_basis, power_rows
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Face
 
@@ -249,10 +249,11 @@ class _State:
         self.cuts += [self.problem.requirement(i).cut(w) for i, w in keys]
 
     def _add_rows(self, breaches: list[DensityBreach]) -> None:
-        for breach in sorted(breaches, key=lambda b: -b.ratio)[:_MOST_ROWS]:
+        most = _MOST_ROWS * self.problem.experiment.inputs
+        for breach in sorted(breaches, key=lambda b: -b.ratio)[:most]:
             # Rows that nearly coincide spoil the solver's linear algebra: the new one replaces its like.
-            self.rows = [row for row in self.rows if not alike(row, breach)]
-            self.rows.append(density_row(self.problem, breach.limit, breach.frequency))
+            self.rows = [row for row in self.rows if not alike(self.problem, row, breach.place)]
+            self.rows.append(density_row(self.problem, breach.place))
 
 
 def _first_state(problem: Problem, start: Array, interior: Array | None) -> _State:
@@ -281,10 +282,7 @@ def _first_state(problem: Problem, start: Array, interior: Array | None) -> _Sta
         close = problem.side_violations(best.information / best.s, above=_FIRST_CUTS)
         state._add(_most_violated(close, state.keys, problem.experiment.size + _MORE_CUTS))
     if problem.densities:
-        spread = np.linspace(0.0, np.pi, 2 * size + _MORE_CUTS)
-        state.rows += [
-            density_row(problem, index, float(w)) for index in range(len(problem.densities)) for w in spread
-        ]
+        state.rows += first_density_rows(problem)
     return state
 
 

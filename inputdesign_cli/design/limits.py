@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.information import PowerKind
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,11 @@ class PowerLimit:
 
 @dataclass(frozen=True)
 class DensityLimit:
-    """Phi(w) is at most (`upper`) or at least `level`(w) at every frequency.
+    """Phi(w) is at most (`upper`) or at least `level`(w) at every frequency of [grid[0], grid[-1]].
 
-    `level` maps frequencies (n,) in rad/sample to (n,); `grid` is where to look for violations.
+    Of several inputs so is v^* Phi(w) v for every direction v of length one: an eigenvalue condition,
+    Phi(w) <= level(w) I or Phi(w) >= level(w) I. `level` maps frequencies (n,) of the experiment to (n,);
+    `grid` is where to look for violations.
     """
 
     level: Callable[[Array], Array]
@@ -42,30 +45,58 @@ class DensityLimit:
     key = "limits.spectrum"
 
 
-def implied_power(density: DensityLimit) -> PowerLimit:
+def implied_power(density: DensityLimit, inputs: int = 1) -> PowerLimit:
     """The power of the excitation that an upper density limit allows at most; it keeps programs bounded."""
     grid = density.grid
     middle = 0.5 * (grid[1:] + grid[:-1])
     highest = np.maximum(np.maximum(density.level(grid[1:]), density.level(grid[:-1])), density.level(middle))
-    return PowerLimit("excitation", float(np.sum(np.diff(grid) * highest) / np.pi))
+    return PowerLimit("excitation", inputs * float(np.sum(np.diff(grid) * highest) / np.pi))
+
+
+@dataclass(frozen=True)
+class DensityPlace:
+    """Where a density limit (by its index) is looked at: a frequency and a direction (r,) of length one."""
+
+    limit: int
+    frequency: float
+    direction: ComplexArray
 
 
 @dataclass(frozen=True)
 class DensityBreach:
-    """How a density limit is used at a frequency: `ratio` is Phi over the level, or for a lower limit two
+    """How a density limit is used at a place: `ratio` is v^* Phi v over the level, or for a lower limit two
     minus that, so that it exceeds one where the limit is missed and is affine in Phi."""
 
-    limit: int
-    frequency: float
+    place: DensityPlace
     ratio: float
 
 
 _TINY = np.finfo(float).tiny
 
 
-def breach_ratio(limit: DensityLimit, phi: Array, w: Array) -> Array:
-    """The ratio (n,) that must not exceed one."""
-    level = limit.level(w)
+def breach_ratio(limit: DensityLimit, phi: NDArray, w: Array) -> Array:
+    """The ratio (n,) that must not exceed one, of the worst direction where Phi is (n, r, r)."""
+    if phi.ndim > 1:
+        phi = np.linalg.eigvalsh(phi)[:, -1 if limit.upper else 0]
+    return _ratio(limit, phi, limit.level(w))
+
+
+def breaches_at(
+    limit: DensityLimit, index: int, phi: NDArray, w: Array, *, above: float
+) -> list[DensityBreach]:
+    """The breaches above `above` at frequencies `w` (n,): one for each principal direction of Phi there."""
+    if phi.ndim == 1:
+        values, vectors = phi[:, None], np.ones((w.size, 1, 1), dtype=complex)
+    else:
+        values, vectors = np.linalg.eigh(phi)
+    ratios = _ratio(limit, values, limit.level(w)[:, None])
+    return [
+        DensityBreach(DensityPlace(index, float(w[n]), vectors[n, :, i]), float(ratios[n, i]))
+        for n, i in np.argwhere(ratios > above)
+    ]
+
+
+def _ratio(limit: DensityLimit, phi: Array, level: Array) -> Array:
     if limit.upper:
         return phi / np.maximum(level, _TINY)
     return np.where(level > 0, 2.0 - phi / np.maximum(level, _TINY), 0.0)

@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from inputdesign_cli.accuracy import Cut, positive_part
 from inputdesign_cli.design.candidate import Candidate
 from inputdesign_cli.design.conic import Block, solve_conic
+from inputdesign_cli.design.limits import DensityPlace
 from inputdesign_cli.design.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
@@ -33,14 +34,14 @@ _INDEFINITE = 1e-3
 class Row:
     """One linear limit of the finite program: `functional` at most (`upper`) or at least `bound`.
 
-    `limit` is the index of the power limit; `density` is (index, frequency) of a density limit.
+    `limit` is the index of the power limit; `density` says where a density limit is looked at.
     """
 
     functional: Functional
     bound: float
     upper: bool
     limit: int | None = None
-    density: tuple[int, float] | None = None
+    density: DensityPlace | None = None
 
 
 @dataclass(frozen=True)

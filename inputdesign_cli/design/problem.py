@@ -9,17 +9,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Criterion, Requirement, Violation, worst
-from inputdesign_cli.design.limits import DensityBreach, DensityLimit, PowerLimit, breach_ratio
+from inputdesign_cli.design.limits import (
+    DensityBreach,
+    DensityLimit,
+    DensityPlace,
+    PowerLimit,
+    breach_ratio,
+    breaches_at,
+)
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, FirBasis, Functional
+from inputdesign_cli.spectrum import Basis, Functional
 
 RequirementFactory = Callable[[Experiment], Requirement]
 Goal = Literal["cost", "factor", "samples"]
@@ -171,28 +178,34 @@ class Problem:
             lambda w: self.experiment.value_density(weight, w),
         )
 
-    def density_at(self, frequency: float) -> Functional:
-        """Phi at one frequency as a functional; it has no density over frequency."""
-        assert isinstance(self.basis, FirBasis)
-        vector = self.basis.functions(np.array([frequency]))[0]
-        return Functional(vector, lambda w: np.zeros(np.shape(w)), concentrated=True)
+    def density_at(self, place: DensityPlace) -> Functional:
+        """v^* Phi v at one frequency as a functional; it has no density over frequency."""
+        r = self.experiment.inputs
+        vector = self.basis.directed(place.frequency, place.direction)  # type: ignore[attr-defined]
+        shape = () if r == 1 else (r, r)
+        return Functional(vector, lambda w: np.zeros((np.size(w), *shape)), concentrated=True)
 
     def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
         """Local maxima of Phi over its limits times s (or once, for fixed ones), if above `above`."""
         found = []
+        basis: Any = self.basis  # one of those with a density
         for index, limit in enumerate(self.densities):
-            assert isinstance(self.basis, FirBasis)
-            basis, factor = self.basis, self.bound_factor(limit.upper, s)
-            grid = np.union1d(limit.grid, np.linspace(0.0, np.pi, 16 * basis.size))
+            factor = self.bound_factor(limit.upper, s)
 
-            def ratio(
-                w: Array, limit: DensityLimit = limit, basis: FirBasis = basis, factor: float = factor
-            ) -> Array:
+            def ratio(w: Array, limit: DensityLimit = limit, factor: float = factor) -> Array:
                 return breach_ratio(limit, basis.density(x, w) / factor, w)
 
-            w, heights = local_maxima(ratio, grid, ratio(grid), above=above)
-            found += [DensityBreach(index, float(a), float(h)) for a, h in zip(w, heights, strict=True)]
+            grid = np.union1d(limit.grid, self._fine_grid)
+            w, _ = local_maxima(ratio, grid, ratio(grid), above=above)
+            found += breaches_at(limit, index, basis.density(x, w) / factor, w, above=above)
         return found
+
+    @cached_property
+    def _fine_grid(self) -> Array:
+        """Even, and denser at the ends of the band as polynomials oscillate: sixteen points a degree."""
+        lo, hi = self.experiment.band
+        even = np.linspace(0.0, 1.0, 16 * (self.basis.order + 1))  # type: ignore[attr-defined]
+        return lo + (hi - lo) * np.union1d(even, 0.5 - 0.5 * np.cos(np.pi * even))
 
     def bound_factor(self, upper: bool, s: float) -> float:
         """What a limit is multiplied by: s where limits scale, else one."""

@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.design.limits import DensityBreach
+from inputdesign_cli.design.limits import DensityPlace
 from inputdesign_cli.design.master import Row
 from inputdesign_cli.design.problem import Problem
+from inputdesign_cli.spectrum import first_directions
 
-# Rows that nearly coincide (rad/sample) spoil the solver's linear algebra.
-_SAME_ROW = 1e-5
+# Rows that nearly coincide, in frequency (of the band) and direction, spoil the solver's linear algebra.
+_SAME_ROW = 3e-6
+_SAME_DIRECTION = 1e-8
+_MORE = 6
 
 
 def power_rows(problem: Problem) -> list[Row]:
@@ -23,11 +26,23 @@ def power_rows(problem: Problem) -> list[Row]:
     ]
 
 
-def density_row(problem: Problem, index: int, frequency: float) -> Row:
-    """The density limit of this index at one frequency (rad/sample)."""
-    limit = problem.densities[index]
-    level = float(limit.level(np.array([frequency]))[0])
-    return Row(problem.density_at(frequency), level, limit.upper, density=(index, frequency))
+def density_row(problem: Problem, place: DensityPlace) -> Row:
+    """A density limit at one frequency in one direction."""
+    limit = problem.densities[place.limit]
+    level = float(limit.level(np.array([place.frequency]))[0])
+    return Row(problem.density_at(place), level, limit.upper, density=place)
+
+
+def first_density_rows(problem: Problem) -> list[Row]:
+    """Rows to begin with: spread over the band, along each channel and pair of channels."""
+    w = np.linspace(*problem.experiment.band, 2 * (problem.basis.order + 1) + _MORE)  # type: ignore[attr-defined]
+    directions = first_directions(problem.experiment.inputs)
+    return [
+        density_row(problem, DensityPlace(index, float(frequency), v))
+        for index in range(len(problem.densities))
+        for frequency in w
+        for v in directions
+    ]
 
 
 def on_basis(problem: Problem, row: Row) -> Row:
@@ -35,11 +50,15 @@ def on_basis(problem: Problem, row: Row) -> Row:
     if row.limit is not None:
         return replace(row, functional=problem.limit_functionals[row.limit])
     assert row.density is not None
-    return density_row(problem, *row.density)
+    return density_row(problem, row.density)
 
 
-def alike(row: Row, breach: DensityBreach) -> bool:
-    """Whether the row stands for the same limit at nearly the same frequency."""
-    if row.density is None or row.density[0] != breach.limit:
+def alike(problem: Problem, row: Row, place: DensityPlace) -> bool:
+    """Whether the row stands for the same limit at nearly the same place."""
+    if row.density is None or row.density.limit != place.limit:
         return False
-    return abs(row.density[1] - breach.frequency) < _SAME_ROW
+    lo, hi = problem.experiment.band
+    if abs(row.density.frequency - place.frequency) >= _SAME_ROW * (hi - lo):
+        return False
+    along = float(np.abs(np.vdot(row.density.direction, place.direction)))
+    return along**2 > 1.0 - _SAME_DIRECTION

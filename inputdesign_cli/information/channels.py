@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
 from inputdesign_cli.information.experiment import PowerKind
 from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, integrate
-from inputdesign_cli.plant.channels import ChannelModel
+from inputdesign_cli.plant import ChannelLoop, ChannelModel
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _NODES_AT_ONCE = 256
@@ -25,10 +25,12 @@ _NODES_AT_ONCE = 256
 
 @dataclass(frozen=True)
 class ChannelExperiment(Coordinates):
-    """N samples of a model with r inputs and p outputs in open loop, excited within `band`.
+    """N samples of a model with r inputs and p outputs, excited within `band`.
+
+    The excitation x is u in open loop (`loop` None) and r in closed loop, u = r - C y.
 
     A density D over frequency stands for the functional (1 / 2 pi) integral of tr(D(w) Phi(w)) dw of
-    the input spectrum Phi. Its values are (n,) for one input, and Hermitian (n, r, r) for several.
+    the spectrum Phi of x. Its values are (n,) for one input, and Hermitian (n, r, r) for several.
 
     `prior` (k, k) is information already at hand, in raw parameters; `factor` sets the `Coordinates`.
     """
@@ -38,6 +40,7 @@ class ChannelExperiment(Coordinates):
     band: tuple[float, float] = (0.0, np.pi)
     prior: Array | None = None
     factor: Array | None = None
+    loop: ChannelLoop | None = None
 
     @property
     def inputs(self) -> int:
@@ -46,7 +49,11 @@ class ChannelExperiment(Coordinates):
     @cached_property
     def singularities(self) -> ComplexArray:
         """Poles of all densities below, as points frequency + j damping of the frequency plane."""
-        return self.model.singularities
+        return self._source.singularities
+
+    @property
+    def _source(self) -> ChannelModel | ChannelLoop:
+        return self.model if self.loop is None else self.loop
 
     @cached_property
     def _noise_whitener(self) -> Array:
@@ -54,13 +61,14 @@ class ChannelExperiment(Coordinates):
         return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, r): what u contributes to the gradient of the prediction, noise whitened to I."""
-        return self._whiten(np.einsum("pq,nkqr->nkpr", self._noise_whitener, self.model.input_gradient(w)))
+        """(n, k, p, r): what x contributes to the gradient of the prediction, noise whitened to I."""
+        gradient = self.model.input_gradient(w) if self.loop is None else self.loop.excitation_gradient(w)
+        return self._whiten(np.einsum("pq,nkqr->nkpr", self._noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
         K = self._noise_whitener
-        gradient = self.model.noise_gradient(w)
+        gradient = self._source.noise_gradient(w)
         return self._whiten(np.einsum("pq,nkqs,st->nkpt", K, gradient, np.linalg.inv(K), optimize=True))
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
@@ -91,20 +99,29 @@ class ChannelExperiment(Coordinates):
         return self._squeezed(value)
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
-        """(n,) or (n, r, r): tr(D Phi) is the power of input or output, of all channels or of one."""
-        if kind == "output":
-            G = self.model.plant_at(w)
+        """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x or x, of all channels or of one."""
+        if kind == "output" or (kind == "input" and self.loop is not None):
+            G = self.response(kind, w)
             rows = G if channel is None else G[:, channel : channel + 1]
             return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
         return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
+
+    def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
+        """(n, p or r, r): from x to the outputs, the inputs or x itself."""
+        if kind == "excitation" or (kind == "input" and self.loop is None):
+            return np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
+        if self.loop is None:
+            return self.model.plant_at(w)
+        t = self.loop.responses(w)
+        return t.y_x if kind == "output" else t.u_x
 
     def _squeezed(self, density: NDArray) -> NDArray:
         return density[:, 0, 0].real if self.inputs == 1 else density
 
     @cached_property
     def noise_information(self) -> Array:
-        """(k, k): what N samples tell without any excitation, by the noise alone (A, C, D)."""
+        """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
         if self.model.continuous or np.all(self._silent):
             return np.zeros((self.size, self.size))
 
@@ -126,7 +143,7 @@ class ChannelExperiment(Coordinates):
     @cached_property
     def _silent(self) -> NDArray[np.bool_]:
         """(k,): the parameters of which noise alone says nothing."""
-        probe = np.abs(self.model.noise_gradient(np.array([0.3, 1.1, 2.3])))
+        probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
         return ~np.any(probe > 0, axis=(0, 2, 3))
 
     def whitened(self, power: float) -> ChannelExperiment:

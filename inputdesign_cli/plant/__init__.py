@@ -1,6 +1,8 @@
 """Plants: G, H, their parameter gradients and the loop around them, at any frequencies."""
 
-from inputdesign_cli.plant.channels import ChannelModel as ChannelModel
+from inputdesign_cli.plant.channel_loop import ChannelLoop as ChannelLoop
+from inputdesign_cli.plant.channel_loop import MatrixController as MatrixController
+from inputdesign_cli.plant.channel_model import ChannelModel as ChannelModel
 from inputdesign_cli.plant.channels import PolynomialChannels as PolynomialChannels
 from inputdesign_cli.plant.continuous import ContinuousChannels as ContinuousChannels
 from inputdesign_cli.plant.continuous import SampledChannels as SampledChannels

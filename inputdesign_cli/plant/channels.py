@@ -1,15 +1,15 @@
-"""Plants with several inputs and outputs: what every model of them answers, and the polynomial model."""
+"""Polynomial plants with several inputs and outputs: G, H and their gradients."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.plant.channel_model import Parameter, Parametrised, entry_label
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Fraction
 from inputdesign_cli.plant.polynomial import (
@@ -24,93 +24,8 @@ from inputdesign_cli.plant.polynomial import (
 Rows = tuple[tuple[Array, ...], ...]
 
 
-class ChannelModel(Protocol):
-    """y = G(theta) u + H(theta) e with p outputs, r inputs, k parameters and e of a full covariance.
-
-    Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
-    plane are frequency + j damping (see `logarithmic_distance`).
-    """
-
-    continuous: bool
-
-    @property
-    def inputs(self) -> int: ...
-
-    @property
-    def outputs(self) -> int: ...
-
-    @property
-    def covariance(self) -> Array:
-        """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
-        ...
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-
-    @property
-    def theta(self) -> Array: ...
-
-    @property
-    def in_plant(self) -> NDArray[np.bool_]:
-        """(k,): the parameters on which G depends."""
-        ...
-
-    @property
-    def singularities(self) -> ComplexArray:
-        """Poles of G and of all gradients, as points of the frequency plane."""
-        ...
-
-    def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        """Poles and zeros of one entry of G, as points of the frequency plane."""
-        ...
-
-    def is_fraction(self, output: int, input: int) -> bool:
-        """Whether numerator and denominator of an entry of G are affine in theta."""
-        ...
-
-    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as such a fraction, where `is_fraction`."""
-        ...
-
-    def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G (n, p, r)."""
-        ...
-
-    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta (n, k, p, r)."""
-        ...
-
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dG/dtheta (n, k, p, r): the gradient of the one-step prediction that u causes."""
-        ...
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
-        ...
-
-
 @dataclass(frozen=True)
-class Parameter:
-    """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
-
-    letter: str
-    power: int
-    places: tuple[tuple[int, int], ...]  # (output, input); (output, output) for noise polynomials
-    label: str
-    value: float
-
-    @property
-    def name(self) -> str:
-        return f"{self.letter}{self.power}{self.label}"
-
-
-def entry_label(output: int, input: int, *, single: bool) -> str:
-    """The channels of a parameter as they stand in its name, counted from one: `[2,1]`."""
-    return "" if single else f"[{output + 1},{input + 1}]"
-
-
-@dataclass(frozen=True)
-class PolynomialChannels:
+class PolynomialChannels(Parametrised):
     """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. An
@@ -179,16 +94,12 @@ class PolynomialChannels:
         return found
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        return tuple(parameter.name for parameter in self.parameters)
-
-    @cached_property
-    def theta(self) -> Array:
-        return np.array([parameter.value for parameter in self.parameters])
-
-    @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
+
+    def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
+        """A, C or D as one polynomial an output, a common one repeated."""
+        return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
 
     def _row(self, rows: Sequence[Array], output: int) -> Array:
         return rows[0] if len(rows) == 1 else rows[output]
@@ -205,6 +116,14 @@ class PolynomialChannels:
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         q = unit_circle(w)
         return self._entries(q, lambda i, j: evaluate(self.B[i][j], q) / self._denominator(q, i, j))
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
+        q = unit_circle(w)
+        H = np.zeros((q.size, self.outputs, self.outputs), dtype=complex)
+        for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
+            H[:, i, i] = evaluate(c, q) / (evaluate(a, q) * evaluate(d, q))
+        return H
 
     def is_fraction(self, output: int, input: int) -> bool:
         """Whether an entry is a fraction of two polynomials that are affine in theta."""
@@ -230,13 +149,6 @@ class PolynomialChannels:
         return np.moveaxis(np.array(rows, dtype=complex), -1, 0)
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        return self._input_gradient(w, predictor=False)
-
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        return self._input_gradient(w, predictor=True)
-
-    def _input_gradient(self, w: ArrayLike, *, predictor: bool) -> ComplexArray:
-        """dG/dtheta, times H_i^-1 = A_i D_i / C_i for the `predictor`."""
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
         for index, parameter in enumerate(self.parameters):
@@ -245,23 +157,40 @@ class PolynomialChannels:
             for i, j in parameter.places:
                 A, F = evaluate(self._row(self.A, i), q), evaluate(self.F[i][j], q)
                 B = evaluate(self.B[i][j], q)
-                factor = {"a": -B / (A * F), "b": 1.0 / F, "f": -B / (F * F)}[parameter.letter]
-                if predictor:
-                    factor = factor * evaluate(self._row(self.D, i), q) / evaluate(self._row(self.C, i), q)
-                else:
-                    factor = factor / A
+                factor = {"a": -B / (A * F), "b": 1.0 / F, "f": -B / (F * F)}[parameter.letter] / A
                 gradient[:, index, i, j] = factor * q**parameter.power
         return gradient
 
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        G = self.plant_at(w)
+        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (G.shape[0], self.inputs, self.inputs))
+        return self.prediction_gradient(w, G, u, np.zeros_like(G))
+
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        H = self.noise_at(w)
+        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), H.shape)
+        return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """Gradient psi = -d epsilon / d theta of the one-step prediction: (n, k, p, m).
+
+        `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
+        outputs, inputs and prediction errors epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j). Written
+        with the polynomials of the predictor alone, as `PolynomialModel.prediction_gradient`.
+        """
         q = unit_circle(w)
-        gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.outputs), dtype=complex)
-        rows = {"a": self.A, "c": self.C, "d": self.D}
+        gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)
+        C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
         for index, parameter in enumerate(self.parameters):
-            if parameter.letter not in rows:
+            letter, shift = parameter.letter, (q**parameter.power)[:, None]
+            if letter in "bf":
+                (i, j) = parameter.places[0]
+                F = evaluate(self.F[i][j], q)
+                filtered = D[i] / (C[i] * F) * (1.0 if letter == "b" else -evaluate(self.B[i][j], q) / F)
+                gradient[:, index, i] = shift * filtered[:, None] * u[:, j]
                 continue
-            sign = 1.0 if parameter.letter == "c" else -1.0
             for i in {place[0] for place in parameter.places}:
-                polynomial = evaluate(self._row(rows[parameter.letter], i), q)
-                gradient[:, index, i, i] = sign * q**parameter.power / polynomial
+                source = y[:, i] if letter == "a" else e[:, i]
+                filtered = {"a": -D[i] / C[i], "c": 1.0 / C[i], "d": -1.0 / D[i]}[letter]
+                gradient[:, index, i] = shift * filtered[:, None] * source
         return gradient

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.channels import Parameter, Rows, entry_label
+from inputdesign_cli.plant.channel_model import Parameter, Parametrised, entry_label
+from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.model import Fraction
@@ -20,7 +21,7 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
 @dataclass(frozen=True)
-class ContinuousChannels:
+class ContinuousChannels(Parametrised):
     """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
 
     `numerator` and `denominator` hold ascending coefficients, those of s^0 first; denominators are
@@ -88,14 +89,6 @@ class ContinuousChannels:
                 for power, value in enumerate(self.denominator[i][j][:-1])
             ]
         return tuple(found)
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        return tuple(parameter.name for parameter in self.parameters)
-
-    @cached_property
-    def theta(self) -> Array:
-        return np.array([parameter.value for parameter in self.parameters])
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:

@@ -23,7 +23,8 @@ from inputdesign_cli.plant.polynomial import (
 
 @dataclass(frozen=True)
 class LoopResponse:
-    """Transfer functions (n,) from the excitation x (r in closed loop, u in open loop) and from e."""
+    """Transfer functions (n,), of several channels matrices (n, to, from), from the excitation x (r in closed
+    loop, u in open loop) and from e."""
 
     y_x: ComplexArray
     u_x: ComplexArray

@@ -1,4 +1,4 @@
-"""spectrum.png and bound.png of several channels: entries and eigenvalues, a panel an entry."""
+"""bound.png of several channels: a panel an entry."""
 
 from __future__ import annotations
 
@@ -8,67 +8,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 
-from inputdesign_cli.outcome import Array, ChannelBoundCurves, ChannelSpectrumCurves
+from inputdesign_cli.outcome import ChannelBoundCurves
 from inputdesign_cli.report.bound import plot_bound
-from inputdesign_cli.report.spectrum import DECADES, LOG_FROM
-from inputdesign_cli.report.style import BLUE, GREEN, GREY, ORANGE, figure, legend_above
-
-PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#56B4E9", "#E69F00")
-STYLES = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (5, 1, 1, 1)))
-MARGIN = 0.02  # beside the outermost lines, of the width between them
-MOST = 6  # entries that stay apart in one panel
-
-
-def draw_channel_spectrum(curves: ChannelSpectrumCurves, path: Path, time_unit: str) -> None:
-    """Moduli of the entries above, eigenvalues below: where the power is, and in how many directions."""
-    with figure(path) as page:
-        above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-        w = curves.frequency
-        handles: list[Artist] = []
-        for number, (name, values) in enumerate(list(curves.moduli.items())[:MOST]):
-            label = rf"$|\Phi_{{{name}}}|$"
-            handles += _curve(above, w, values, PALETTE[number], STYLES[number % 4], label, curves.lines)
-        what = "power of each line" if curves.lines else rf"density of ${curves.symbol}$"
-        above.set_ylabel(what)
-        _scale(above, np.concatenate(list(curves.moduli.values())))
-        legend_above(above, handles)
-        shades: list[Artist] = []
-        for number, values in enumerate(curves.eigenvalues.T[::-1][:MOST]):
-            label = rf"$\lambda_{{{number + 1}}}$"
-            shades += _curve(below, w, values, PALETTE[number], STYLES[number % 4], label, curves.lines)
-        peak = float(curves.eigenvalues.max(initial=0.0))
-        if peak > 0:
-            below.set_yscale("log")
-            below.set_ylim(peak * 10.0**-DECADES, 2.0 * peak)
-        below.set_ylabel("eigenvalues")
-        legend_above(below, shades)
-        below.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
-        lo, hi = float(w.min()), float(w.max()) if w.max() > w.min() else float(w.min()) + 1.0
-        margin = MARGIN * (hi - lo) if curves.lines else 0.0
-        below.set_xlim(lo - margin, hi + margin)
-
-
-def _scale(axes: Axes, values: Array) -> None:
-    """A linear axis, or a logarithmic one where a linear one would show nothing but its peaks."""
-    peak = float(values.max(initial=0.0))
-    if peak > LOG_FROM * float(np.median(values)):
-        axes.set_yscale("log")
-        axes.set_ylim(peak * 10.0**-DECADES, 2.0 * peak)
-    else:
-        axes.set_ylim(bottom=0.0)
-
-
-def _curve(
-    axes: Axes, w: Array, values: Array, color: str, style: object, label: str, lines: bool
-) -> list[Artist]:
-    if lines:
-        axes.vlines(w, 0.0, values, color=color, linewidth=1.0, alpha=0.6)
-        return list(
-            axes.plot(w, values, linestyle="none", marker="o", markersize=4, color=color, label=label)
-        )
-    return list(axes.plot(w, values, color=color, linestyle=style, linewidth=1.8, label=label))
+from inputdesign_cli.report.style import GREY, figure
 
 
 def draw_channel_bounds(curves: ChannelBoundCurves, path: Path, time_unit: str) -> None:

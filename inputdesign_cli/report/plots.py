@@ -7,7 +7,6 @@ from pathlib import Path
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
-    ChannelSpectrumCurves,
     CloudCurves,
     Curves,
     DirectionCurves,
@@ -24,7 +23,7 @@ from inputdesign_cli.outcome import (
     SpectrumCurves,
 )
 from inputdesign_cli.report.bound import draw_bound
-from inputdesign_cli.report.channels import draw_channel_bounds, draw_channel_spectrum
+from inputdesign_cli.report.channels import draw_channel_bounds
 from inputdesign_cli.report.data import draw_fit, draw_residuals
 from inputdesign_cli.report.ellipses import draw_ellipses
 from inputdesign_cli.report.error import draw_error
@@ -64,8 +63,6 @@ def draw(curves: Curves, path: Path, time_unit: str = "s") -> None:
             draw_error(curves, path)
         case MomentsCurves():
             draw_moments(curves, path, time_unit)
-        case ChannelSpectrumCurves():
-            draw_channel_spectrum(curves, path, time_unit)
         case ChannelBoundCurves():
             draw_channel_bounds(curves, path, time_unit)
         case EllipseCurves():

@@ -5,6 +5,7 @@ from inputdesign_cli.signal.achieved import prediction_gradient as prediction_gr
 from inputdesign_cli.signal.achieved import record_information as record_information
 from inputdesign_cli.signal.channel_crest import low_peak_angles as low_peak_angles
 from inputdesign_cli.signal.channel_crest import schroeder_angles as schroeder_angles
+from inputdesign_cli.signal.channel_information import channel_inputs as channel_inputs
 from inputdesign_cli.signal.channel_information import channel_outputs as channel_outputs
 from inputdesign_cli.signal.channel_information import (
     channel_record_information as channel_record_information,

@@ -9,7 +9,11 @@ import numpy as np
 
 from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.channel_information import channel_outputs, channel_record_information
+from inputdesign_cli.signal.channel_information import (
+    channel_inputs,
+    channel_outputs,
+    channel_record_information,
+)
 from inputdesign_cli.signal.settle import least_level
 
 _INSIDE = 1.0 - 1e-12
@@ -50,8 +54,9 @@ class ChannelBounds:
             ),
             default=np.inf,
         )
-        means = {"input": np.mean(record**2, axis=0), "output": np.mean(y**2, axis=0)}
-        means["excitation"] = means["input"]
+        u = channel_inputs(experiment, record, step)
+        signals = {"input": u, "output": y, "excitation": record}
+        means = {kind: np.mean(signal**2, axis=0) for kind, signal in signals.items()}
         spent = [
             (bound, means[kind].sum() if channel is None else means[kind][channel])
             for kind, channel, bound in self.powers

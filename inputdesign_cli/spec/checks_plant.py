@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from inputdesign_cli.spec.control import ContinuousMatrixTransfer, DiscreteMatrix
+from inputdesign_cli.spec.controller import ControllerMatrix
 from inputdesign_cli.spec.experiment import NoiseShape
 from inputdesign_cli.spec.findings import Finding
 from inputdesign_cli.spec.model import Spec
@@ -37,7 +38,7 @@ def _stable_A(spec: Spec, plant: object, path: Path) -> Iterator[Finding]:  # no
 
 
 def controller_fits(spec: Spec) -> Iterator[Finding]:
-    """A controller is one discrete-time transfer function, so the plant is sampled and SISO."""
+    """A controller works in discrete time and has a row an input and a column an output of the plant."""
     if not spec.closed_loop:
         return
     path = ("experiment", "controller")
@@ -51,13 +52,35 @@ def controller_fits(spec: Spec) -> Iterator[Finding]:
             "add sample: zoh to the plant",
             path,
         )
-    if not isinstance(plant, RegressionPlant) and (plant.inputs, plant.outputs) != (1, 1):
+    if isinstance(plant, RegressionPlant):
+        return
+    controller, channels = spec.experiment.controller, (plant.inputs, plant.outputs)
+    if not isinstance(controller, ControllerMatrix):
+        if channels != (1, 1):
+            yield Finding(
+                "wrong-shape",
+                f"{{key}} is a single transfer function, but the plant has {_count(plant.inputs, 'input')} "
+                f"and {_count(plant.outputs, 'output')}",
+                "write numerator as rows (inputs) of columns (outputs) of coefficients, and "
+                "denominator likewise or as one for all entries",
+                path,
+            )
+        return
+    shape = (len(controller.numerator), len(controller.numerator[0]))
+    if channels == (1, 1):
         yield Finding(
             "wrong-shape",
-            f"{{key}} is a single transfer function, but the plant has {plant.inputs} inputs "
-            f"and {plant.outputs} outputs",
-            "closed-loop designs are for one input and one output",
-            path,
+            "{key} is a matrix, but the plant has one input and one output",
+            "write numerator: [..] and denominator: [..]",
+            (*path, "numerator"),
+        )
+    elif shape != channels:
+        yield Finding(
+            "wrong-shape",
+            f"{{key}} is {shape[0]} x {shape[1]}, but the plant has {_count(plant.inputs, 'input')} and "
+            f"{_count(plant.outputs, 'output')}",
+            "write a row for each input u and in it a column for each output y",
+            (*path, "numerator"),
         )
 
 

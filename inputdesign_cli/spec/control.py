@@ -6,43 +6,27 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, PlainValidator, WithJsonSchema, model_validator
 
+from inputdesign_cli.spec.controller import MatrixRatio
 from inputdesign_cli.spec.experiment import exactly_one
-from inputdesign_cli.spec.fields import ContinuousDenominator, PositivePerChannel, RowsMatrix
+from inputdesign_cli.spec.fields import PositivePerChannel, RowsMatrix
 from inputdesign_cli.spec.findings import Findings, describe, fail
-from inputdesign_cli.spec.plant import ContinuousMatrix, check_shapes, denominators_of, with_paths
+from inputdesign_cli.spec.plant import ContinuousMatrix, with_paths
 from inputdesign_cli.spec.polynomials import check_delay_stable, check_left_half_plane
 from inputdesign_cli.spec.section import Section, needs_mapping, picker, tag
 from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer, Ratio, Transfer
-from inputdesign_cli.spec.values import PolynomialMatrix
 
 
-class DiscreteMatrix(Section, family="transfer", phrase="a transfer matrix in q^-1"):
-    """A transfer matrix in the delay operator: coefficients in ascending powers of q^-1."""
-
-    numerator: RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
-    denominator: ContinuousDenominator = Field(
-        default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
-    )
+class DiscreteMatrix(MatrixRatio, family="transfer", phrase="a transfer matrix in q^-1"):
+    """A stable transfer matrix in the delay operator, rows are outputs."""
 
     @model_validator(mode="after")
-    def _shapes(self) -> DiscreteMatrix:
+    def _stable(self) -> DiscreteMatrix:
         findings = Findings()
-        check_shapes(findings, self.numerator, self.denominator)
         for path, factor in with_paths(self.denominator):
             if finding := check_delay_stable(factor):
                 findings.add(finding.code, finding.message, finding.hint, "denominator", *path)
         findings.stop()
         return self
-
-    @property
-    def numerator_matrix(self) -> PolynomialMatrix:
-        """Rows of columns of coefficients."""
-        return self.numerator
-
-    @property
-    def denominator_matrix(self) -> PolynomialMatrix:
-        """The denominators in the same form, factors multiplied out."""
-        return denominators_of(self.numerator, self.denominator)
 
 
 class ContinuousTarget(ContinuousMatrix):

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
 
+from inputdesign_cli.spec.controller import Controller
 from inputdesign_cli.spec.fields import (
     Count,
     Names,
@@ -18,7 +19,6 @@ from inputdesign_cli.spec.findings import Finding, Findings, fail
 from inputdesign_cli.spec.plant import per_output
 from inputdesign_cli.spec.polynomials import Polynomial
 from inputdesign_cli.spec.section import Section
-from inputdesign_cli.spec.transfer import DiscreteTransfer
 from inputdesign_cli.spec.values import Matrix, matrix, number
 
 
@@ -143,9 +143,10 @@ class Experiment(Section):
     """How the data will be collected."""
 
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
-    controller: DiscreteTransfer | None = Field(
+    controller: Controller | None = Field(
         default=None,
-        description="C of the loop u = r - C y, in q^-1; present: the experiment is in closed loop.",
+        description="C of the loop u = r - C y, in q^-1; present: the experiment is in closed loop. With "
+        "several channels numerator and denominator are rows (inputs) of columns (outputs).",
     )
     prior: Prior | None = Field(default=None, description="Information already at hand.")
 

@@ -57,7 +57,8 @@ def directed_scale(
     """The largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
 
     Valid for every spectrum whatever on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of
-    some direction across the channels.
+    some direction across the channels. What a price picks up at single frequencies only adds to it and is
+    left out; a value that does proves nothing (s = 0).
 
     Returns:
         s, and at the local maxima of the largest generalised eigenvalue: frequencies, ratios, directions.
@@ -69,7 +70,16 @@ def directed_scale(
     peaks, heights = local_maxima(ratio, grid, ratio(grid))
     directions = best_directions(price.density(peaks), value.density(peaks))[1]
     top = heights.max(initial=0.0)
+    if value.concentrated:
+        return 0.0, peaks, heights, directions
     return (np.inf if top <= 0 else 1.0 / top), peaks, heights, directions
+
+
+def first_directions(inputs: int) -> ComplexArray:
+    """(number, r): along each channel, and along each pair of channels in phase and in counterphase."""
+    axes = np.eye(inputs)
+    both = [(axes[i], sign * axes[j]) for i in range(inputs) for j in range(i) for sign in (1.0, -1.0)]
+    return np.array([*axes, *((one + other) / np.sqrt(2.0) for one, other in both)], dtype=complex)
 
 
 def leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:

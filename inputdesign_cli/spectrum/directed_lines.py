@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
-from inputdesign_cli.spectrum.channels import best_directions, directed_scale, matrices
+from inputdesign_cli.spectrum.channels import (
+    best_directions,
+    directed_scale,
+    first_directions,
+    matrices,
+)
 
 _FIRST_LINES = 24
 _MOST_NEW = 16
@@ -44,14 +49,7 @@ class DirectedLines:
     @classmethod
     def at(cls, frequencies: Array, inputs: int) -> DirectedLines:
         """Lines at these frequencies, to begin with along each channel and pair of channels."""
-        axes = np.eye(inputs)
-        pairs = [
-            (axes[i] + sign * axes[j]) / np.sqrt(2.0)
-            for i in range(inputs)
-            for j in range(i)
-            for sign in (1.0, -1.0)
-        ]
-        start = np.array([*axes, *pairs], dtype=complex)
+        start = first_directions(inputs)
         return cls(np.repeat(frequencies, len(start)), np.tile(start, (frequencies.size, 1)), frequencies)
 
     @property

@@ -56,6 +56,10 @@ class FirBasis:
         """(n,): Phi at normalised frequencies `w`."""
         return self.functions(w) @ x
 
+    def directed(self, frequency: float, direction: ComplexArray) -> Array:
+        """(m + 1,): Phi at one frequency as a functional; one input has one direction."""
+        return self.functions(np.array([frequency]))[0]
+
     def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
         """(m + 1, ...): (1 / 2 pi) integral of density(w) times each basis function."""
 

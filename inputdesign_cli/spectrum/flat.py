@@ -24,6 +24,7 @@ class FlatBasis:
     band: tuple[float, float]
 
     size = 1
+    order = 0
 
     @property
     def white(self) -> Array:
@@ -41,6 +42,10 @@ class FlatBasis:
         inside = (at >= self.band[0] * (1 - 1e-12)) & (at <= self.band[1] * (1 + 1e-12))
         level = x[0] * self.level * inside
         return level if self.inputs == 1 else level[:, None, None] * np.eye(self.inputs, dtype=complex)
+
+    def directed(self, frequency: float, direction: ComplexArray) -> Array:
+        """(1,): v^* Phi v inside the band, the same for every direction v of length one."""
+        return np.array([self.level])
 
     def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
         """(1, ...): level times (1 / 2 pi) integral of the trace of the density."""

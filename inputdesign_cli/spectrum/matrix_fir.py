@@ -65,6 +65,11 @@ class MatrixFirBasis(GramBasis):
 
         return integrate(moments, singularities, highest_lag=self.order)
 
+    def directed(self, frequency: float, direction: ComplexArray) -> Array:
+        """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
+        turn = np.exp(-1j * frequency * np.arange(self.order + 1))
+        return self._functional((turn[:, None, None] * np.outer(direction, direction.conj())).real)
+
     def _functional(self, sums: NDArray[np.float64]) -> NDArray[np.float64]:
         """(size, ...) from the real parts (m + 1, r, r, ...) of the integrals of D(w) e^{-jwt}.
 

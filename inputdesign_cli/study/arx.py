@@ -34,14 +34,14 @@ class ArxStudy:
             v[i] *= root[i, i]
             for j in np.flatnonzero(root[i, :i]):
                 v[i] += root[i, j] * v[j]
-        for i, a in enumerate(plant.A):
+        for i, a in enumerate(plant.per_output(plant.A)):
             v[i] = scipy.signal.lfilter([1.0], a, v[i])
         return v
 
     def outputs(self, u: Array, noise: Array) -> Array:
         """y (n, runs, samples): the response to u from rest, and the noise."""
-        y = np.empty_like(noise)
-        for i, (a, row) in enumerate(zip(self.plant.A, self.plant.B, strict=True)):
+        plant, y = self.plant, np.empty_like(noise)
+        for i, (a, row) in enumerate(zip(plant.per_output(plant.A), plant.B, strict=True)):
             source = np.zeros_like(noise[i])
             for b, channel in zip(row, u, strict=True):
                 for lag in np.flatnonzero(b):

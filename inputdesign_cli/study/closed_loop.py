@@ -15,10 +15,10 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.design.asymptotic.plant import MatrixPlant
-from inputdesign_cli.design.asymptotic.polynomials import delay_of, determinant_and_adjugate, multiply
 from inputdesign_cli.design.asymptotic.problem import ClosedLoopProblem
 from inputdesign_cli.design.asymptotic.transfer import MatrixTransfer
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, multiply
 from inputdesign_cli.signal.pointwise import noise_drive, roots_of, shaped_noise
 from inputdesign_cli.study.arx import ArxStudy
 from inputdesign_cli.study.batches import Seed, run_batches
@@ -115,15 +115,16 @@ def error_filters(plant: MatrixPlant, target: MatrixTransfer, A: Array, B: Array
     """
     n, runs = plant.outputs, A.shape[0]
     T, d = target.numerator, target.denominator
-    common = all(np.array_equal(plant.A[0], a) for a in plant.A)
+    rows = plant.per_output(plant.A)
+    common = all(np.array_equal(rows[0], a) for a in rows)
     rho = np.ones(1)
-    for a in plant.A[:1] if common else plant.A:
+    for a in rows[:1] if common else rows:
         rho = np.convolve(rho, a)
     # rho R^-1 N, with R the diagonal of the A: a polynomial matrix again.
     scaled = np.zeros((1, n, n, plant.numerator.shape[-1] + rho.size - 1))
     for i in range(n):
         rest = np.ones(1)
-        for j, a in enumerate(plant.A):
+        for j, a in enumerate(rows):
             rest = np.convolve(rest, a) if j != i and not common else rest
         for j in range(n):
             product = np.convolve(rest, plant.numerator[i, j])

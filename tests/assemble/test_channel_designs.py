@@ -86,7 +86,7 @@ def test_record_has_two_channels_and_keeps_the_smallest_eigenvalue(design):
 
 def test_plots_are_there(design):
     assert {"spectrum", "signal", "optimality", "ellipses"} <= set(design.curves)
-    assert set(design.curves["spectrum"].moduli) == {"11", "22", "12"}
+    assert design.curves["spectrum"].spectrum.shape[1:] == (2, 2)
 
 
 @pytest.mark.slow

@@ -20,9 +20,9 @@ def column(*, limits=TOTAL, white_noise=False, variance=1e-10):
     """Errata: exact G_d of the gains; H = 1e-5/(z-a), or without its pole."""
     B = (1 - POLE) * GAINS
     plant = MatrixPlant.build(
-        A=[[1.0, -POLE]] * 2,
+        A=[[1.0, -POLE]],
         B=[[[0.0, b] for b in row] for row in B],
-        C=[[1.0, -POLE]] * 2 if white_noise else None,
+        C=[[1.0, -POLE]] * 2 if white_noise else [[1.0]],
         covariance=variance * np.eye(2),
     )
     above, below = sampled([1.0], [75.0, 1.0], 2.0)
@@ -55,4 +55,4 @@ def random_plant(rng, n, *, delay=1, radius=0.9):
         B.append(row)
     C = [np.poly(rng.uniform(-0.7, 0.7, 1)).tolist() for _ in range(n)]
     X = rng.standard_normal((n, n))
-    return MatrixPlant.build(A=A, B=B, C=C, covariance=X @ X.T + np.eye(n), common_A=False)
+    return MatrixPlant.build(A=A, B=B, C=C, covariance=X @ X.T + np.eye(n))

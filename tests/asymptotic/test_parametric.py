@@ -27,7 +27,6 @@ def full_plant():
         C=[[1, 0.3], [1]],
         D=[[1], [1, -0.6]],
         covariance=[[1.0, 0.2], [0.2, 0.5]],
-        common_A=False,
     )
 
 
@@ -42,14 +41,12 @@ def moved(plant, name, step):
     }
     target = parts[letter][index[0]] if len(index) == 1 else parts[letter][index[0]][index[1]]
     target[int(lag)] += step
-    if letter == "A" and plant.common_A:
-        parts["A"] = [target] * plant.outputs
-    return MatrixPlant.build(**parts, covariance=plant.covariance, common_A=plant.common_A)
+    return MatrixPlant.build(**parts, covariance=plant.covariance)
 
 
 @pytest.mark.parametrize("plant", [full_plant(), column().plant], ids=["all polynomials", "column"])
 def test_gradients_are_those_of_finite_differences(plant):
-    dG, dH = plant.gradients(W)
+    dG, dH = plant.plant_gradient(W), plant.noise_at(W)[:, None] @ plant.noise_gradient(W)
     step = 1e-6
     for k, name in enumerate(plant.names):
         up, down = moved(plant, name, step), moved(plant, name, -step)

@@ -1,5 +1,7 @@
 """The Monte Carlo study: exact filters, exact estimates, and losses that agree with theory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -7,12 +9,11 @@ import scipy.signal
 from asymptotic.column import column, random_plant
 from inputdesign_cli.design.asymptotic import (
     ClosedLoopProblem,
-    MatrixPlant,
     MatrixTransfer,
     ModelReference,
     PowerLimit,
 )
-from inputdesign_cli.design.asymptotic.polynomials import determinant_and_adjugate, multiply
+from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
 from inputdesign_cli.signal.pointwise import lines_of, masses_of_density
 from inputdesign_cli.study.arx import ArxStudy
 from inputdesign_cli.study.closed_loop import closed_loop_study, error_filters, prefilter
@@ -34,8 +35,7 @@ def target(n, *, matrix):
 
 def arx(plant):
     """The plant with white equation noise."""
-    ones = tuple(np.ones(1) for _ in plant.A)
-    return MatrixPlant(plant.A, plant.B, plant.F, ones, ones, plant.covariance, plant.common_A)
+    return replace(plant, C=(np.ones(1),), D=(np.ones(1),))
 
 
 def nominal(plant):
@@ -115,7 +115,7 @@ def test_least_squares_is_weighted_with_the_noise():
     problem = column(variance=1.0)
     covariance = np.array([[1.0, 0.6], [0.6, 2.0]])
     plant = arx(problem.plant)
-    plant = type(plant)(plant.A, plant.B, plant.F, plant.C, plant.D, covariance, True)
+    plant = replace(plant, covariance=covariance)
     study = ArxStudy(plant)
     rng = np.random.default_rng(2)
     u = rng.standard_normal((2, 1, 200))
@@ -163,7 +163,7 @@ def test_a_study_is_repeatable_and_treats_inputs_alike():
 
 def test_unstable_loops_are_counted_and_left_out():
     plant = arx(random_plant(np.random.default_rng(0), 1))
-    noisy = type(plant)(plant.A, plant.B, plant.F, plant.C, plant.D, np.array([[400.0]]), True)
+    noisy = replace(plant, covariance=np.array([[400.0]]))
     problem = ClosedLoopProblem(
         noisy, ModelReference(target(1, matrix=False)), (PowerLimit("input", 1.0),), np.ones(1)
     )

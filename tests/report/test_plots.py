@@ -11,7 +11,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
-    ChannelSpectrumCurves,
     DirectionCurves,
     Ellipse,
     EllipseCurves,
@@ -49,15 +48,9 @@ CURVES = {
     "directions of lines": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
     "loss": LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
     "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
-    "channels": ChannelSpectrumCurves(
-        W, {"11": DENSITY, "22": 2 * DENSITY, "12": 0.5 * DENSITY}, np.stack([DENSITY, 2 * DENSITY], axis=1)
-    ),
-    "channels with a peak": ChannelSpectrumCurves(
-        W, {"11": 1 / (1e-4 + (W - 1) ** 2)}, 1 / (1e-4 + (W[:, None] - 1) ** 2)
-    ),
-    "lines of channels": ChannelSpectrumCurves(
-        np.array([0.3]), {"11": np.ones(1), "12": np.ones(1)}, np.ones((1, 2)), lines=True
-    ),
+    "matrix on a logarithmic axis": MatrixSpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
+    "matrix with a peak": MatrixSpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
+    "one line of channels": MatrixSpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
     "bounds of entries": ChannelBoundCurves(
         {"[1,2]": BoundCurves(W, 0.008 * G, G, 0.01 * G), "[2,1]": BoundCurves(W, 0.008 * G, G)}
     ),

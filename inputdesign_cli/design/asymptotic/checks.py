@@ -6,15 +6,15 @@ import numpy as np
 
 from inputdesign_cli.design.asymptotic.laws import InternalModel, MinimumVariance, ModelReference
 from inputdesign_cli.design.asymptotic.plant import MatrixPlant
-from inputdesign_cli.design.asymptotic.polynomials import (
+from inputdesign_cli.design.asymptotic.transfer import MatrixTransfer
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant.polynomial import ComplexArray
+from inputdesign_cli.plant.polynomial_matrix import (
     at,
     delay_of,
     determinant_and_adjugate,
     multiply,
 )
-from inputdesign_cli.design.asymptotic.transfer import MatrixTransfer
-from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant.polynomial import ComplexArray
 
 # A zero this close to the unit circle counts as on it.
 _ON_CIRCLE = 1e-7

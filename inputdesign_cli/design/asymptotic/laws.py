@@ -14,10 +14,10 @@ import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.design.asymptotic.plant import MatrixPlant
-from inputdesign_cli.design.asymptotic.polynomials import determinant_and_adjugate
 from inputdesign_cli.design.asymptotic.transfer import MatrixTransfer
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z, unit_circle
+from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate
 
 
 class ControlLaw(Protocol):
@@ -168,7 +168,7 @@ class MinimumVariance:
         impulse[0] = 1.0
         return [
             scipy.signal.lfilter(c, np.convolve(a, d), impulse)
-            for a, c, d in zip(plant.A, plant.C, plant.D, strict=True)
+            for a, c, d in zip(*map(plant.per_output, (plant.A, plant.C, plant.D)), strict=True)
         ]
 
     @property

@@ -168,18 +168,18 @@ class ClosedLoopProblem:
 
         def sent(w: Array) -> tuple[ComplexArray, ComplexArray]:
             """X_l (K, k, n, n) of the loop, and H^-1 dH_l."""
-            dG, dH = plant.gradients(w)
+            dG, relative = plant.plant_gradient(w), plant.noise_gradient(w)
             G, T = plant.plant_at(w), law.complementary(w)
             S = sensitivity(T)
             X = -S[:, None] @ dG @ (np.linalg.inv(G) @ T)[:, None]
-            H = plant.noise_at(w)
             if isinstance(law, MinimumVariance):
                 n = plant.outputs
                 J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ law.noise_jacobian(G, w)
+                dH = plant.noise_at(w)[:, None] @ relative
                 columns = np.swapaxes(dH, 2, 3).reshape(*dH.shape[:2], n * n)
                 moved = np.einsum("kab,klb->kla", J, columns).reshape(*dH.shape[:2], n, n)
                 X = X + np.swapaxes(moved, 2, 3)
-            return X, np.linalg.inv(H)[:, None] @ dH
+            return X, relative
 
         def integrals(rule: Quadrature) -> tuple[Array, Array]:
             X, relative = sent(rule.nodes)
@@ -193,8 +193,7 @@ class ClosedLoopProblem:
         whitener = np.linalg.inv(np.linalg.cholesky(plant.covariance))
 
         def sources(w: Array) -> ComplexArray:
-            dG, _ = plant.gradients(w)
-            return np.asarray((whitener @ np.linalg.inv(plant.noise_at(w)))[:, None] @ dG)
+            return np.asarray(whitener @ plant.input_gradient(w))
 
         W, M0 = integrals(self.rule(1, band=False))
         return ParametricCriterion(W, M0, sources)

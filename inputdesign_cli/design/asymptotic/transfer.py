@@ -10,8 +10,8 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.design.asymptotic.polynomials import at, delay_of, stack
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, evaluate, roots_in_z, unit_circle
+from inputdesign_cli.plant.polynomial_matrix import at, delay_of, stack
 
 Entries = Sequence[Sequence[Sequence[float]]]
 

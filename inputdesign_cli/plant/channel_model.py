@@ -1,0 +1,115 @@
+"""What every model with several inputs and outputs answers, and how its parameters are named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.model import Fraction
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+
+class ChannelModel(Protocol):
+    """y = G(theta) u + H(theta) e with p outputs, r inputs, k parameters and e of a full covariance.
+
+    Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
+    plane are frequency + j damping (see `logarithmic_distance`).
+    """
+
+    continuous: bool
+
+    @property
+    def inputs(self) -> int: ...
+
+    @property
+    def outputs(self) -> int: ...
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def theta(self) -> Array: ...
+
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
+        ...
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        ...
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        ...
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Whether numerator and denominator of an entry of G are affine in theta."""
+        ...
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as such a fraction, where `is_fraction`."""
+        ...
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
+        ...
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
+        ...
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dtheta (n, k, p, r): the gradient of the one-step prediction that u causes."""
+        ...
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
+        ...
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
+
+    letter: str
+    power: int
+    places: tuple[tuple[int, int], ...]  # (output, input); (output, output) for noise polynomials
+    label: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.letter}{self.power}{self.label}"
+
+
+def entry_label(output: int, input: int, *, single: bool) -> str:
+    """The channels of a parameter as they stand in its name, counted from one: `[2,1]`."""
+    return "" if single else f"[{output + 1},{input + 1}]"
+
+
+class Parametrised:
+    """What a model knows by its list of `parameters`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def theta(self) -> Array:
+        return np.array([parameter.value for parameter in self.parameters])

@@ -1,0 +1,110 @@
+"""Designs with several channels in closed loop: against SISO designs, against their own files, bad input."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import solve
+from inputdesign_cli.assemble.channel_task import build_channel_task
+from inputdesign_cli.assemble.design import by_exchange
+from inputdesign_cli.assemble.task import build_task
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.record import write_run
+from inputdesign_cli.spec import parse_spec
+
+SPEC = """
+plant:
+  A: [[1, -1.1], [1, -0.6]]
+  B: [[[0, 1.0, 0.4], [0, -0.3]], [[0, 0.4], [0, 1.2, -0.5]]]
+noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
+experiment:
+  samples: 500
+  controller: {numerator: [[[0.3, -0.25], [0]], [[0], [0.3, -0.2]]], denominator: [1, -1]}
+cost: {input_power: 1, output_power: 0.1, excitation_power: 0.01}
+accuracy: {standard_deviation: {'a1[1]': 0.002, 'b1[1,2]': 0.01}}
+spectrum: {type: fir, order: 4}
+"""
+
+
+TWO_ALONE = """
+plant: {A: [[1, -1.1], [1, -0.6]], B: [[[0, 1, 0.4], [0]], [[0], [0, 0.7]]]}
+noise: {C: [[1, 0.3], [1]], variance: [[1, 0], [0, 0.5]]}
+experiment:
+  samples: 500
+  controller:
+    numerator: [[[0.3, -0.25], [0]], [[0], [0.3]]]
+    denominator: [[[1, -1], [1]], [[1], [1, -0.5]]]
+"""
+
+
+def changed(*overrides):
+    return parse_spec(SPEC, overrides=list(overrides))
+
+
+def test_decoupled_loops_cost_as_much_as_each_alone():
+    common = "cost: {input_power: 1, output_power: 0.2}\nspectrum: {type: fir, order: 5}\n"
+    common += "accuracy: {model_error: {relative: 0.05, alpha: 3}}\n"
+    both = parse_spec(TWO_ALONE + common)
+    alone = [
+        "plant: {A: [1, -1.1], B: [0, 1, 0.4]}\nnoise: {C: [1, 0.3], variance: 1}\n"
+        "experiment: {samples: 500, controller: {numerator: [0.3, -0.25], denominator: [1, -1]}}\n",
+        "plant: {A: [1, -0.6], B: [0, 0.7]}\nnoise: {variance: 0.5}\n"
+        "experiment: {samples: 500, controller: {numerator: [0.3], denominator: [1, -0.5]}}\n",
+    ]
+    design = by_exchange(both, build_channel_task(both))[0].result
+    costs = []
+    for text in alone:
+        spec = parse_spec(text + common)
+        costs.append(by_exchange(spec, build_task(spec))[0].result.objective)
+    assert design.gap < 1e-6
+    assert design.objective == pytest.approx(sum(costs), rel=2e-6)
+
+
+def test_what_a_design_writes_is_what_an_analysis_reads(tmp_path):
+    """The powers and the accuracy of spectrum.csv, and of signal.csv, as given excitations."""
+    outcome = solve(changed("signal={samples: 2000, seed: 1, scale: design}"))
+    write_run(outcome, tmp_path, figures=False)
+    result = outcome.result
+    spec = changed(f"spectrum={{given: {{type: table, file: {tmp_path / 'spectrum.csv'}}}}}")
+    table = solve(spec).result
+    for kind in ("input", "output", "excitation"):
+        np.testing.assert_allclose(table["power"][kind], result["power"][kind], rtol=1e-4)
+    found = [np.array(r["information"]["matrix"]) for r in (table, result)]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-3, atol=1e-4 * np.abs(found[1]).max())
+    signal = solve(changed(f"spectrum={{given: {{signal: {tmp_path / 'signal.csv'}}}}}")).result
+    np.testing.assert_allclose(signal["power"]["input"], result["signal"]["input_power"], rtol=1e-9)
+    assert list(outcome.tables["signal"].columns) == ["time_s", "r1", "r2"]
+    np.testing.assert_allclose(result["signal"]["input_power"], result["power"]["input"], rtol=0.1)
+
+
+def test_limits_bind_what_r_causes():
+    free = solve(changed()).result
+    most = 0.97 * free["power"]["input"][1]
+    held = solve(changed(f"limits.input_power=[1e6, {most}]")).result
+    assert held["power"]["input"][1] == pytest.approx(most, rel=1e-6)
+    assert held["cost"] > free["cost"]
+    assert held["objective"]["relative_gap"] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("override", "code"),
+    [
+        ("experiment.controller.numerator=[[[0.3], [0]]]", "wrong-shape"),
+        ("experiment.controller={numerator: [1]}", "wrong-shape"),
+        ("experiment.controller.numerator=[[[-0.3], [0]], [[0], [0.3]]]", "unstable-loop"),
+        ("limits={rate: 1}", "not-supported"),
+        ("limits={amplitude: 1}", "not-supported"),
+    ],
+)
+def test_bad_loops_are_explained(override, code):
+    with pytest.raises(SpecError) as caught:
+        build_channel_task(changed(override))
+    assert code in [complaint.code for complaint in caught.value.complaints]
+
+
+def test_a_matrix_around_one_channel_is_refused():
+    with pytest.raises(SpecError) as caught:
+        parse_spec(
+            "plant: {B: [0, 1]}\nnoise: {variance: 1}\naccuracy: {standard_deviation: {b1: 0.1}}\n"
+            "experiment: {controller: {numerator: [[[0.1]]]}}\n"
+        )
+    assert [complaint.code for complaint in caught.value.complaints] == ["wrong-shape"]
