@@ -2,6 +2,7 @@
 
 from inputdesign_cli.identification.batch import BatchEstimate as BatchEstimate
 from inputdesign_cli.identification.batch import fit_batch as fit_batch
+from inputdesign_cli.identification.channel_estimate import ChannelEstimate as ChannelEstimate
 from inputdesign_cli.identification.estimate import Estimate as Estimate
 from inputdesign_cli.identification.estimate import identify as identify
 from inputdesign_cli.identification.predictor import prediction_errors as prediction_errors
