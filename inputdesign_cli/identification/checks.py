@@ -13,6 +13,8 @@ from inputdesign_cli.plant.polynomial import Array
 _FAINT = 1e-12
 # Residuals of this power relative to the output are rounding.
 _EXACT = 1e-20
+# Correlation matrices of residuals with a smaller eigenvalue are singular but for rounding.
+_COMBINED = 1e-13
 # Fewer samples than this for each parameter say nothing about a covariance.
 _SAMPLES_A_PARAMETER = 3
 
@@ -82,6 +84,26 @@ def check_noisy(variances: Array, y: Array) -> None:
             hint=f"is {name} computed from u? Real data have noise",
             key=name,
         )
+
+
+def check_apart(covariance: Array) -> None:
+    """No output's residuals are those of the others: `covariance` (p, p) can be inverted.
+
+    Raises:
+        SpecError: `noise-free-data`.
+    """
+    rms = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(rms, rms))
+    if values[0] > _COMBINED:
+        return
+    share = np.abs(vectors[:, 0])
+    names = " and ".join(f"y{i + 1}" for i in np.flatnonzero(share > 0.05 * share.max()))
+    raise bad_spec(
+        "noise-free-data",
+        f"the residuals of {names} determine each other: these outputs carry the same noise",
+        hint="is one of the outputs computed from the others? Leave it out",
+        key="y",
+    )
 
 
 def covariance_of(names: Sequence[str], information: Array) -> Array:

@@ -16,8 +16,9 @@ from inputdesign_cli.identification.checks import (
     fit_percent,
 )
 from inputdesign_cli.identification.predictor import prediction_errors
+from inputdesign_cli.identification.problem import PredictionErrors
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlation, whiteness
-from inputdesign_cli.identification.search import minimise
+from inputdesign_cli.identification.search import best_run, minimise
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant import PolynomialModel
@@ -72,20 +73,16 @@ def identify(structure: Structure, u: ArrayLike, y: ArrayLike, *, start: ArrayLi
         SpecError: `too-few-samples`, `constant-input` or `not-exciting`.
     """
     u, y = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
-    check_length(y.size, structure.size, max(structure.lags["b"][-1], structure.a))
+    check_length(y.size, structure.size, structure.row.memory)
     check_varying(structure.names, u[:, None], y[:, None])
-    points = starting_points(structure, u, y)
+    record = PredictionErrors.single(structure.row, [u[:, None]], y[:, None])
+    points = starting_points(structure.row, [u], y)
     if start is not None:
         points = np.concatenate([np.asarray(start, dtype=float)[None], points])
-    found = minimise(
-        structure, points, np.repeat(u[:, None], len(points), 1), np.repeat(y[:, None], len(points), 1)
-    )
-    best = int(np.argmin(np.where(np.isfinite(found.cost), found.cost, np.inf)))
-    settled = found.converged & (found.cost <= found.cost[best] * (1 + 1e-6))
-    if np.any(settled):
-        best = int(np.flatnonzero(settled)[np.argmin(found.cost[settled])])
+    found = minimise(record.repeated(len(points)), points)
+    best = best_run(found)
     theta = found.theta[best]
-    errors = prediction_errors(structure, theta[None], u[:, None], y[:, None])[:, 0]
+    errors = prediction_errors(structure.row, theta[None], record.u, record.y[0])[:, 0]
     variance = float(errors @ errors) / (y.size - structure.size)
     check_noisy(np.array([variance]), y[:, None])
     information = found.hessian[best] / variance

@@ -1,5 +1,8 @@
 """Plants: G, H, their parameter gradients and the loop around them, at any frequencies."""
 
+from inputdesign_cli.plant.channel_simulation import caused_by_inputs as caused_by_inputs
+from inputdesign_cli.plant.channel_simulation import caused_by_noise as caused_by_noise
+from inputdesign_cli.plant.channel_simulation import stable_outputs as stable_outputs
 from inputdesign_cli.plant.channels import ChannelModel as ChannelModel
 from inputdesign_cli.plant.channels import PolynomialChannels as PolynomialChannels
 from inputdesign_cli.plant.continuous import ContinuousChannels as ContinuousChannels
