@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from inputdesign_cli.accuracy import worst
+from inputdesign_cli.accuracy import EntryOfPlant, worst
 from inputdesign_cli.assemble.channel_design import solve_channels
 from inputdesign_cli.assemble.channel_identification import ChannelIdentified
 from inputdesign_cli.assemble.channels import has_channels
@@ -99,6 +99,8 @@ def _requirements(
         entry: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
         if violation.frequency is not None:
             entry["frequency"] = violation.frequency / found.frequency_unit
+        if isinstance(requirement, EntryOfPlant):
+            entry["entry"] = requirement.label
         listed.append(entry)
     return all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed), listed
 

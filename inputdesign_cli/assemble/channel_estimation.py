@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from inputdesign_cli.assemble.estimates import Blocks
 from inputdesign_cli.identification import (
+    ChannelBatch,
     ChannelEstimate,
+    fit_channel_batch,
     identify_channels,
 )
 from inputdesign_cli.plant import ChannelModel, PolynomialChannels
@@ -16,24 +18,32 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.plant import with_paths
 
-Estimator = Callable[[Array, Array, Array], ChannelEstimate]
 
-
-def estimator_of(spec: Spec, model: ChannelModel) -> Estimator:
-    """What maps u (samples, r), y (samples, p) and a start (k,) to an estimate of the structure of `model`.
+def check_estimable(spec: Spec, model: ChannelModel) -> None:
+    """Whether there is an estimator for the kind of `model`.
 
     Raises:
         SpecError: `not-supported` for plants in s.
     """
-    if isinstance(model, PolynomialChannels):
-        polynomial = model
-        return lambda u, y, start: identify_channels(polynomial, u, y, start=start)
-    raise spec.complain(
-        "not-supported",
-        "this version does not identify plants in s",
-        hint="write the plant as polynomials A, B, F in q^-1",
-        key="plant",
-    )
+    if not isinstance(model, PolynomialChannels):
+        raise spec.complain(
+            "not-supported",
+            "this version does not identify plants in s",
+            hint="write the plant as polynomials A, B, F in q^-1",
+            key="plant",
+        )
+
+
+def estimated(model: ChannelModel, u: Array, y: Array, start: Array) -> ChannelEstimate:
+    """The structure of `model` estimated from u (samples, r), y (samples, p) and a start (k,)."""
+    assert isinstance(model, PolynomialChannels)
+    return identify_channels(model, u, y, start=start)
+
+
+def estimated_runs(model: ChannelModel, u: Array, y: Array, start: Array) -> ChannelBatch:
+    """The same of many records, u (runs, samples, r) and y (runs, samples, p), in one pass."""
+    assert isinstance(model, PolynomialChannels)
+    return fit_channel_batch(model, u, y, start=start)
 
 
 def moved(model: ChannelModel, theta: Array, covariance: Array) -> ChannelModel:

@@ -13,7 +13,13 @@ import numpy as np
 
 from inputdesign_cli.accuracy import EntryOfPlant, worst
 from inputdesign_cli.assemble.channel_curves import entry_bound_curves
-from inputdesign_cli.assemble.channel_estimation import blocks_of, estimator_of, moved, predictor_of
+from inputdesign_cli.assemble.channel_estimation import (
+    blocks_of,
+    check_estimable,
+    estimated,
+    moved,
+    predictor_of,
+)
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, unstated_errors
 from inputdesign_cli.assemble.channel_task import channel_prior, channel_requirements
 from inputdesign_cli.assemble.channels import (
@@ -104,10 +110,10 @@ def channels_identified(spec: Spec, path: Path, *, remove_means: bool = False) -
         DataError: the file cannot be used.
     """
     nominal = build_channel_model(spec)
-    estimator = estimator_of(spec, nominal)
+    check_estimable(spec, nominal)
     record_step(spec)
     data = read_channel_data(spec, path, remove_means=remove_means)
-    estimate = estimator(data.u, data.y, nominal.theta)
+    estimate = estimated(nominal, data.u, data.y, nominal.theta)
     model = moved(nominal, estimate.theta, estimate.noise)
     replaced = parse_spec(
         spec.to_yaml(),

@@ -95,7 +95,8 @@ def _assessed(result: Result, time_unit: str) -> list[tuple[str, str]]:
         where = f" at {entry['frequency']:.4g} rad/{time_unit}" if "frequency" in entry else ""
         word = "met" if entry["worst_ratio"] <= 1.0 + 1e-9 else "missed"
         share = f"{entry['worst_ratio']:.4g} of the admissible"
-        text = f"{entry['name']} {word}: the error that these data give is {share}"
+        name = " ".join([entry["name"], *([entry["entry"]] if "entry" in entry else [])])
+        text = f"{name} {word}: the error that these data give is {share}"
         lines.append(("" if lines else "assessed", text + where))
     if "top_up_status" in assessment:
         lines.append(("top-up", "the experiment below makes up for it, after these data"))
