@@ -141,6 +141,14 @@ class ErrorBandCurves:
 
 
 @dataclass(frozen=True)
+class ChannelErrorBandCurves:
+    """The same entry by entry: "[2,1]" -> its curves."""
+
+    entries: Mapping[str, ErrorBandCurves]
+    name: str = "design"
+
+
+@dataclass(frozen=True)
 class FitCurves:
     """Recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
 
@@ -159,6 +167,26 @@ class ResidualCurves:
     autocorrelation: Array
     input_lags: Array
     cross_correlation: Array
+    limit: float
+    whiteness: float
+    independence: float
+
+
+@dataclass(frozen=True)
+class ChannelFitCurves:
+    """The same output by output: "y1" -> its curves."""
+
+    outputs: Mapping[str, FitCurves]
+
+
+@dataclass(frozen=True)
+class ChannelResidualCurves:
+    """Normalised correlations of p residuals among each other and with r past inputs."""
+
+    lags: Array
+    autocorrelation: Array  # (n, p, p)
+    input_lags: Array
+    cross_correlation: Array  # (m, p, r)
     limit: float
     whiteness: float
     independence: float
@@ -210,8 +238,11 @@ Curves = (
     | MomentsCurves
     | CloudCurves
     | ErrorBandCurves
+    | ChannelErrorBandCurves
     | FitCurves
+    | ChannelFitCurves
     | ResidualCurves
+    | ChannelResidualCurves
 )
 
 

@@ -7,10 +7,29 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.requirement import Violation, inverse_factor
+from inputdesign_cli.accuracy.requirement import Requirement, Violation, inverse_factor, worst
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import graded_grid, local_maxima, logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots
+
+# The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
+_BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
+
+
+def worst_violation(requirement: Requirement, information: Array) -> Violation:
+    """The largest of the violations, for reports: one beside frequency zero is told to be there.
+
+    Args:
+        information: M (k, k) in the coordinates of the experiment.
+    """
+    found = worst(requirement.violations(information))
+    if found.frequency is None or not isinstance(requirement, OverFrequency):
+        return found
+    lo, hi = requirement.band
+    if lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
+        return found
+    at_zero = float(requirement.ratios(information, np.zeros(1))[0])
+    return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _ROUNDING) else found
 
 
 class OverFrequency:

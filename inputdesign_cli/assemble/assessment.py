@@ -8,17 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from inputdesign_cli.accuracy import worst
+from inputdesign_cli.accuracy import EntryOfPlant, worst_violation
+from inputdesign_cli.assemble.channel_design import solve_channels
+from inputdesign_cli.assemble.channel_identification import ChannelIdentified
+from inputdesign_cli.assemble.channels import has_channels
 from inputdesign_cli.assemble.design import solve_convex
-from inputdesign_cli.assemble.identification import (
-    Identified,
-    identification_entry,
-    identification_outcome,
-    identified,
-    model_notes,
-)
-from inputdesign_cli.assemble.model_error import build_model_error
-from inputdesign_cli.assemble.requirements import build_requirements
+from inputdesign_cli.assemble.identification import Identified, identified
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.plant.polynomial import Array
@@ -65,20 +60,19 @@ def _assess(spec: Spec, path: Path, remove_means: bool) -> Assessment:
     found = identified(spec, path, remove_means=remove_means)
     information = found.estimate.information + found.experiment.prior_information
     met, listed = _requirements(found, information)
+    identification = found.outcome(spec, started)
     if met or not spec.designs:
-        outcome = identification_outcome(spec, found, started)
         verdict = {"met": met, "requirements": listed}
-        result = {**outcome.result, "status": "met" if met else "missed", "assessment": verdict}
-        return Assessment(met, replace(outcome, result=result))
-    identification = identification_outcome(spec, found, started)
+        result = {**identification.result, "status": "met" if met else "missed", "assessment": verdict}
+        return Assessment(met, replace(identification, result=result))
     topped = _top_up(found, information)
     result = {
         **topped.result,
         "title": spec.title,
         "status": "missed",
-        "identification": identification_entry(found.estimate),
+        "identification": found.entry,
         "assessment": {"met": False, "requirements": listed, "top_up_status": topped.result["status"]},
-        "notes": [*topped.result.get("notes", []), *found.data.notes, *model_notes(found.estimate)],
+        "notes": [*topped.result.get("notes", []), *found.notes],
     }
     tables = {**topped.tables, **{f"data_{k}": t for k, t in identification.tables.items()}}
     curves = {**topped.curves, **{f"data_{k}": c for k, c in identification.curves.items()}}
@@ -94,21 +88,24 @@ def _assess(spec: Spec, path: Path, remove_means: bool) -> Assessment:
     )
 
 
-def _requirements(found: Identified, information: Array) -> tuple[bool, list[dict[str, Any]]]:
-    spec, experiment = found.spec, found.experiment
-    error = build_model_error(spec, experiment) if spec.accuracy.model_error is not None else None
+def _requirements(
+    found: Identified | ChannelIdentified, information: Array
+) -> tuple[bool, list[dict[str, Any]]]:
+    """Whether the information of the data meets what is asked, and each requirement with its worst ratio."""
     listed: list[dict[str, Any]] = []
-    for make in build_requirements(spec, experiment, error):
-        requirement = make(experiment)
-        violation = worst(requirement.violations(information))
+    for make in found.requirements():
+        requirement = make(found.experiment)
+        violation = worst_violation(requirement, information)
         entry: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
         if violation.frequency is not None:
-            entry["frequency"] = violation.frequency / spec.sample_time
+            entry["frequency"] = violation.frequency / found.frequency_unit
+        if isinstance(requirement, EntryOfPlant):
+            entry["entry"] = requirement.label
         listed.append(entry)
     return all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed), listed
 
 
-def _top_up(found: Identified, information: Array) -> Outcome:
+def _top_up(found: Identified | ChannelIdentified, information: Array) -> Outcome:
     """The design on the new estimate with the data as prior information."""
     prior = {
         "parameters": list(found.estimate.names),
@@ -120,4 +117,4 @@ def _top_up(found: Identified, information: Array) -> Outcome:
         overrides=[f"experiment.prior={json.dumps(prior)}"],
         folder=found.spec.resolve_path("."),
     )
-    return solve_convex(spec)
+    return solve_channels(spec) if has_channels(spec) else solve_convex(spec)

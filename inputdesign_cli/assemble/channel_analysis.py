@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Absolute, EntryError, EntryOfPlant, active_entries, worst
+from inputdesign_cli.accuracy import EntryOfPlant, worst
 from inputdesign_cli.assemble.analysis import check_excites
 from inputdesign_cli.assemble.channel_curves import (
     channel_signal_curves,
@@ -24,7 +24,7 @@ from inputdesign_cli.assemble.channel_given import (
     spectral,
 )
 from inputdesign_cli.assemble.channel_record import record_sizes
-from inputdesign_cli.assemble.channel_requirements import required_band
+from inputdesign_cli.assemble.channel_requirements import unstated_errors
 from inputdesign_cli.assemble.channel_task import (
     channel_cost,
     channel_requirements,
@@ -105,7 +105,7 @@ def analyse_channels(spec: Spec) -> Outcome:
     curves: dict[str, Any] = {}
     errors = [r for r in requirements if isinstance(r, EntryOfPlant)]
     tables["bound"], curves["bound"] = entry_bound_curves(
-        spec, errors or _unstated(spec, task, experiment), information, flat, stated=bool(errors)
+        spec, errors or unstated_errors(spec, experiment), information, flat, stated=bool(errors)
     )
     if isinstance(excitation.basis, DirectedLines):
         tables["spectrum"], curves["spectrum"] = line_curves(spec, excitation.basis, _x(excitation))
@@ -143,15 +143,6 @@ def _ratio(requirements: tuple[Any, ...], information: Array) -> float | None:
         return worst_ratio(requirements)(information)
     except np.linalg.LinAlgError:
         return None
-
-
-def _unstated(spec: Spec, task: Task, experiment: ChannelExperiment) -> tuple[EntryError, ...]:
-    """What draws r_u of every entry where no bound on it is stated."""
-    band = required_band(spec, experiment, None)
-    return tuple(
-        EntryError(experiment, Absolute(1.0), task.alpha, band, output=i, input=j)
-        for i, j in active_entries(experiment.model, band[1])
-    )
 
 
 def _entry(spec: Spec, excitation: ChannelExcitation) -> dict[str, Any]:

@@ -90,10 +90,12 @@ def entry_bound_curves(
     white: Array | None,
     *,
     stated: bool = True,
+    label: str = "design",
 ) -> tuple[Table, ChannelBoundCurves]:
     """bound.csv and its plot: r_u, r_adm and |G| of every entry over the band of the requirement.
 
-    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing.
+    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing. `label`
+    says what gave r_u.
     """
     band = requirements[0].band
     lo = max(band[0], 1e-3 * band[1])
@@ -114,7 +116,7 @@ def entry_bound_curves(
         compared = None if white is None else requirement.error_bound(white, w)
         if compared is not None:
             columns[f"r_u_white_{i + 1}{j + 1}"] = compared
-        entries[requirement.label] = BoundCurves(frequency, r_u, G, r_adm, compared)
+        entries[requirement.label] = BoundCurves(frequency, r_u, G, r_adm, compared, label=label)
     return Table(columns), ChannelBoundCurves(entries)
 
 

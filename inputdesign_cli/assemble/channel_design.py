@@ -13,7 +13,11 @@ from inputdesign_cli.assemble.channel_curves import (
     entry_bound_curves,
     line_curves,
 )
-from inputdesign_cli.assemble.channel_record import channel_signal_entry, make_channel_record
+from inputdesign_cli.assemble.channel_record import (
+    channel_signal_entry,
+    lines_of_record,
+    make_channel_record,
+)
 from inputdesign_cli.assemble.channel_task import build_channel_task
 from inputdesign_cli.assemble.design import by_exchange, check_length, plain_errors
 from inputdesign_cli.assemble.ellipses import experiment_ellipses
@@ -22,12 +26,18 @@ from inputdesign_cli.assemble.result import design_result, experiment_of
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.signal import Lines
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spectrum import DirectedLines, LinesBasis
 
 
 def solve_channels(spec: Spec) -> Outcome:
-    """The design, its proof, its signal and its curves.
+    """The design, its proof, its signal and its curves; see `designed_channels`."""
+    return designed_channels(spec)[0]
+
+
+def designed_channels(spec: Spec) -> tuple[Outcome, Lines | None]:
+    """The same, and the sinusoids that stand for the spectrum in a record of its length, if there is one.
 
     Raises:
         SpecError, DataError: the spec cannot be used.
@@ -57,7 +67,8 @@ def solve_channels(spec: Spec) -> Outcome:
         result["signal"] = channel_signal_entry(spec, design, experiment, record)
         tables["signal"], curves["signal"] = channel_signal_curves(spec, record.samples)
     result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
-    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves)
+    lines = None if record is None else lines_of_record(spec, design, experiment, len(record.samples))
+    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves), lines
 
 
 def _illustrate(

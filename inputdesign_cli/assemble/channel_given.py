@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.assemble.channel_record import channel_phases
 from inputdesign_cli.assemble.channels import excitation_symbol, frequency_unit, record_step
 from inputdesign_cli.assemble.given import bad_table, read_spectrum_table
 from inputdesign_cli.assemble.tables import read_columns
@@ -14,7 +15,7 @@ from inputdesign_cli.design.problem import Weight, weights_of
 from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
-    ChannelPhases,
+    Lines,
     blocks_of,
     channel_inputs,
     channel_outputs,
@@ -74,7 +75,7 @@ def read_channel_excitation(spec: Spec, experiment: ChannelExperiment) -> Channe
         )
         return spectral("white", TabulatedChannels.white(powers, experiment.band), np.ones(1), experiment)
     if isinstance(given, GivenMultisine):
-        frequencies, amplitudes = _sinusoids(spec, given)
+        frequencies, amplitudes = given_sinusoids(spec, given)
         constant = (frequencies <= 0.0) | (spec.plant.sampled & (frequencies >= np.pi))
         size = np.linalg.norm(amplitudes, axis=1)
         lines = DirectedLines(frequencies, amplitudes / size[:, None] + 0j, frequencies)
@@ -103,7 +104,7 @@ def spectral(
     return ChannelExcitation(kind, found, information, basis, x)
 
 
-def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
+def given_sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
     """Frequencies (L,) in the unit of the experiment and amplitudes (L, r), of those that are not zero."""
     frequencies = np.array(given.frequencies) * frequency_unit(spec)
     if spec.plant.sampled:
@@ -166,26 +167,31 @@ def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
     """The record as given, or one of the given spectrum (n, r); None for a table, or a record too short."""
     if excitation.samples is not None:
         return excitation.samples
-    basis, x, samples = excitation.basis, excitation.x, spec.signal_samples
+    basis, samples = excitation.basis, spec.signal_samples
     rng, step = np.random.default_rng(spec.signal.seed or 0), record_step(spec)
     if isinstance(basis, DirectedLines):
         if samples < _SHORTEST:
             return None
         assert isinstance(spec.spectrum, GivenSpectrum)
         assert isinstance(spec.spectrum.given, GivenMultisine)
-        frequencies, amplitudes = _sinusoids(spec, spec.spectrum.given)
+        frequencies, amplitudes = given_sinusoids(spec, spec.spectrum.given)
         return in_phase_record(frequencies * step, amplitudes, samples, rng)
-    if excitation.kind != "white" or basis is None or x is None:
+    if excitation.kind != "white":
         return None
-    phases: ChannelPhases = "random" if spec.signal.phases == "random" else "orthogonal"
-    blocks = blocks_of(phases, basis.inputs)
-    if samples < _SHORTEST * blocks:
+    lines = given_lines(spec, excitation, samples)
+    return None if lines is None else multisine_record(lines, samples, rng, channel_phases(spec))
+
+
+def given_lines(spec: Spec, excitation: ChannelExcitation, samples: int) -> Lines | None:
+    """The sinusoids that stand for a given density; None for another excitation, or a record too short."""
+    basis = excitation.basis
+    blocks = blocks_of(channel_phases(spec), spec.plant.inputs)
+    if not isinstance(basis, TabulatedChannels) or samples < _SHORTEST * blocks:
         return None
-    period = samples // blocks
+    period, step = samples // blocks, record_step(spec)
     w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
-    lines = grid_lines(basis.density(x, w), period, step)
+    lines = grid_lines(basis.density(np.ones(1), w), period, step)
     total = float(np.trace(lines.powers.sum(axis=0)).real)
     if total == 0.0:  # the band lies between two lines of the record
         return None
-    lines = lines.scaled(sum(excitation.power["excitation"]) / total)
-    return multisine_record(lines, samples, rng, phases)
+    return lines.scaled(sum(excitation.power["excitation"]) / total)

@@ -47,12 +47,11 @@ def make_channel_record(spec: Spec, design: Design, experiment: ChannelExperimen
         return None
     found = experiment.samples if design.problem.goal == "samples" else spec.signal_samples
     samples = spec.signal.samples or found
-    phases: ChannelPhases = "random" if spec.signal.phases == "random" else "orthogonal"
-    blocks = blocks_of(phases, experiment.inputs)
-    if samples < _SHORTEST * blocks:
+    phases = channel_phases(spec)
+    if samples < _SHORTEST * blocks_of(phases, experiment.inputs):
         return None
     step = record_step(spec)
-    lines = design_lines(design, experiment, samples // blocks, step)
+    lines = lines_of_record(spec, design, experiment, samples)
     first = design.problem.requirements[0]
     score = worst_ratio(design.problem.requirements)
     if isinstance(first, Criterion):
@@ -78,6 +77,17 @@ def make_channel_record(spec: Spec, design: Design, experiment: ChannelExperimen
     if record.short_of > 1.0 + 1e-9 and design.problem.goal != "factor":
         raise _too_tight(spec, record)
     return record
+
+
+def channel_phases(spec: Spec) -> ChannelPhases:
+    """How the phases of a multisine are chosen over the channels."""
+    return "random" if spec.signal.phases == "random" else "orthogonal"
+
+
+def lines_of_record(spec: Spec, design: Design, experiment: ChannelExperiment, samples: int) -> Lines:
+    """The sinusoids that stand for the design in a record of so many samples."""
+    blocks = blocks_of(channel_phases(spec), experiment.inputs)
+    return design_lines(design, experiment, samples // blocks, record_step(spec))
 
 
 def build_channel_bounds(spec: Spec, design: Design) -> ChannelBounds:

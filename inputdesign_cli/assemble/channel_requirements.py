@@ -66,6 +66,15 @@ def build_entry_errors(spec: Spec, experiment: Any) -> tuple[EntryError | Ellips
     return tuple(errors)
 
 
+def unstated_errors(spec: Spec, experiment: Any) -> tuple[EntryError, ...]:
+    """What has r_u of every entry where no bound on it is stated."""
+    band, alpha = required_band(spec, experiment, None), model_error_alpha(spec, experiment)
+    return tuple(
+        EntryError(experiment, Absolute(1.0), alpha, band, output=i, input=j)
+        for i, j in active_entries(experiment.model, band[1])
+    )
+
+
 def _over_ellipsoid(
     spec: Spec,
     experiment: Any,

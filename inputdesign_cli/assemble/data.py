@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,10 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class Data:
-    """u and y (samples,) of one experiment, and what a user should know of them."""
+    """u (samples, r) and y (samples, p) of one experiment, and what a user should know of them.
+
+    Of one input and one output they are (samples,).
+    """
 
     u: Array
     y: Array
@@ -31,14 +34,25 @@ class Data:
 
 
 def read_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
-    """The columns u (or u1), y (or y1) and, if there is one, time.
+    """The columns u (or u1), y (or y1) and, if there is one, time, of one input and one output.
 
     Raises:
         DataError: the file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
             the spec says.
     """
+    data = read_channel_data(spec, path, remove_means=remove_means)
+    return replace(data, u=data.u[:, 0], y=data.y[:, 0])
+
+
+def read_channel_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
+    """The columns u1, u2, .., y1, y2, .. of all channels of the plant and, if there is one, time.
+
+    Raises:
+        DataError: see `read_data`.
+    """
     header = _header(path)
-    wanted = {"u": "u1" if "u1" in header else "u", "y": "y1" if "y1" in header else "y"}
+    channels = {"u": _names("u", spec.plant.inputs, header), "y": _names("y", spec.plant.outputs, header)}
+    wanted = {name: column for names in channels.values() for name, column in names.items()}
     timed = [name for name in header if name == "time" or name.startswith("time_")]
     if timed:
         wanted["time"] = timed[0]
@@ -47,7 +61,7 @@ def read_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
     if timed:
         _check_times(spec, path, columns["time"])
     notes = []
-    for name in ("u", "y"):
+    for name in (name for name in wanted if name != "time"):
         x = columns[name]
         notes += _outliers(name, x)
         if remove_means:
@@ -57,7 +71,15 @@ def read_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
                 f"{name} varies by {x.std():.3g} about {x.mean():.3g}: models describe deviations from an "
                 "operating point; --remove-means takes the means away"
             )
-    return Data(columns["u"], columns["y"], tuple(notes))
+    u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
+    return Data(u, y, tuple(notes))
+
+
+def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:
+    """How the channels are called, and how their columns begin: u1, u2, ..; u or u1 for one channel."""
+    if channels == 1:
+        return {letter: f"{letter}1" if f"{letter}1" in header else letter}
+    return {f"{letter}{i + 1}": f"{letter}{i + 1}" for i in range(channels)}
 
 
 def _header(path: Path) -> list[str]:

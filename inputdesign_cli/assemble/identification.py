@@ -13,20 +13,28 @@ import numpy as np
 import scipy.signal
 
 from inputdesign_cli.accuracy import error_bound
+from inputdesign_cli.assemble.channel_identification import ChannelIdentified, channels_identified
+from inputdesign_cli.assemble.channels import has_channels
 from inputdesign_cli.assemble.curves import axis, frequency_header
 from inputdesign_cli.assemble.data import Data, read_data
+from inputdesign_cli.assemble.estimates import (
+    Blocks,
+    estimate_result,
+    identification_entry,
+    model_notes,
+    model_text,
+)
 from inputdesign_cli.assemble.experiment import build_experiment
 from inputdesign_cli.assemble.model_error import build_model_error, model_error_alpha, sampled_band
+from inputdesign_cli.assemble.requirements import build_requirements
+from inputdesign_cli.design.problem import RequirementFactory
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.identification import Estimate, ResidualTest, Structure
+from inputdesign_cli.identification import Estimate, Structure
 from inputdesign_cli.identification import identify as identify_record
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import BoundCurves, FitCurves, Outcome, ResidualCurves, Table
-from inputdesign_cli.plant.polynomial import Array, roots_in_z
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec, parse_spec
-
-# A residual test below this probability speaks against the model.
-_REFUTED = 0.01
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,41 @@ class Identified:
     spec: Spec
     experiment: Experiment
 
+    @property
+    def entry(self) -> dict[str, Any]:
+        """`identification` of `result.json`."""
+        return identification_entry(self.estimate, self.estimate.variance, self.estimate.fit)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know of the data, and what speaks against the model."""
+        model = self.estimate.model
+        predictor = {letter: [getattr(model, letter)] for letter in "CDF"}
+        return [*self.data.notes, *model_notes(self.estimate, predictor)]
+
+    @property
+    def frequency_unit(self) -> float:
+        """What a frequency of the experiment is divided by to be in rad per time unit."""
+        return self.spec.sample_time
+
+    def requirements(self) -> list[RequirementFactory]:
+        """What the spec asks for, at the estimate."""
+        spec, experiment = self.spec, self.experiment
+        error = build_model_error(spec, experiment) if spec.accuracy.model_error is not None else None
+        return build_requirements(spec, experiment, error)
+
+    def outcome(self, spec: Spec, started: float) -> Outcome:
+        """What `idesign identify` writes."""
+        estimate = self.estimate
+        result = estimate_result(spec.title, self.data.y.size, estimate, self.entry)
+        tables, curves = _data_curves(spec, self)
+        tables["bound"], curves["bound"], result["model_error"] = _bound(self)
+        if self.notes:
+            result["notes"] = self.notes
+        result["timing_s"] = {"identification": time.perf_counter() - started}
+        files = {"model.yaml": model_text(_blocks(estimate), estimate).encode()}
+        return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
+
 
 def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Outcome:
     """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
@@ -48,14 +91,19 @@ def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Out
     """
     try:
         started = time.perf_counter()
-        found = identified(spec, Path(data), remove_means=remove_means)
-        return identification_outcome(spec, found, started)
+        return identified(spec, Path(data), remove_means=remove_means).outcome(spec, started)
     except IdesignError as error:
         raise spec.place(error) from error
 
 
-def identified(spec: Spec, path: Path, *, remove_means: bool = False) -> Identified:
-    """The estimate from the data in `path`; the nominal parameters are one of the starts."""
+def identified(spec: Spec, path: Path, *, remove_means: bool = False) -> Identified | ChannelIdentified:
+    """The estimate from the data in `path`; the nominal parameters are one of the starts.
+
+    Raises:
+        SpecError, DataError: see `identify`.
+    """
+    if has_channels(spec):
+        return channels_identified(spec, path, remove_means=remove_means)
     nominal = build_experiment(spec)
     data = read_data(spec, path, remove_means=remove_means)
     structure = Structure.of(nominal.model)
@@ -63,13 +111,13 @@ def identified(spec: Spec, path: Path, *, remove_means: bool = False) -> Identif
     replaced = parse_spec(
         spec.to_yaml(),
         file=f"{path.name} (estimate)",
-        overrides=[f"{key}={json.dumps(block)}" for key, block in blocks(spec, estimate).items()],
+        overrides=[f"{key}={json.dumps(block)}" for key, block in _blocks(estimate).items()],
         folder=spec.resolve_path("."),
     )
     return Identified(estimate, data, replaced, build_experiment(replaced))
 
 
-def blocks(spec: Spec, estimate: Estimate) -> dict[str, dict[str, Any]]:
+def _blocks(estimate: Estimate) -> Blocks:
     """`plant` and `noise` of the estimate in the words of the spec; polynomials that are 1 are left out."""
     model = estimate.model
     plant = {"A": model.A, "B": model.B, "F": model.F}
@@ -81,121 +129,7 @@ def blocks(spec: Spec, estimate: Estimate) -> dict[str, dict[str, Any]]:
     return {"plant": plain(plant), "noise": {**plain(noise), "variance": model.variance}}
 
 
-def identification_outcome(spec: Spec, found: Identified, started: float) -> Outcome:
-    """What `idesign identify` writes."""
-    estimate = found.estimate
-    deviations = np.sqrt(np.diag(estimate.covariance))
-    result: dict[str, Any] = {
-        "format": 1,
-        "title": spec.title,
-        "status": "identified" if estimate.converged else "not_converged",
-        "samples": int(found.data.y.size),
-        "identification": identification_entry(estimate),
-        "information": {
-            "parameters": list(estimate.names),
-            "matrix": estimate.information,
-            "covariance": estimate.covariance,
-            "standard_deviation": dict(zip(estimate.names, deviations.tolist(), strict=True)),
-        },
-    }
-    tables, curves = data_curves(spec, found)
-    tables["bound"], curves["bound"], result["model_error"] = _bound(found)
-    notes = [*found.data.notes, *model_notes(estimate)]
-    if notes:
-        result["notes"] = notes
-    result["timing_s"] = {"identification": time.perf_counter() - started}
-    files = {"model.yaml": model_text(spec, found).encode()}
-    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
-
-
-def identification_entry(estimate: Estimate) -> dict[str, Any]:
-    """`identification` of `result.json`."""
-    entry: dict[str, Any] = {
-        "theta": dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
-        "standard_deviation": dict(
-            zip(estimate.names, np.sqrt(np.diag(estimate.covariance)).tolist(), strict=True)
-        ),
-        "variance": estimate.variance,
-        "converged": estimate.converged,
-        "steps": estimate.steps,
-        "starts": estimate.starts,
-        "whiteness": _test(estimate.whiteness),
-        "independence": _test(estimate.independence),
-    }
-    if estimate.fit is not None:
-        entry["fit_percent"] = estimate.fit
-    return entry
-
-
-def _test(test: ResidualTest) -> dict[str, Any]:
-    return {
-        "statistic": test.statistic,
-        "degrees_of_freedom": test.freedom,
-        "probability": test.probability,
-    }
-
-
-def model_notes(estimate: Estimate) -> list[str]:
-    """What speaks against trusting the estimate."""
-    notes = []
-    if not estimate.converged:
-        notes.append(
-            f"the search did not settle after {estimate.steps} steps from the best of {estimate.starts} "
-            "starts: the estimate may be far from the minimum; the orders may be too high for these data"
-        )
-    at_the_edge = [
-        letter
-        for letter in "CDF"
-        if np.any(np.abs(roots_in_z(getattr(estimate.model, letter))) > 1.0 - 1.0 / estimate.errors.size)
-    ]
-    if at_the_edge:
-        notes.append(
-            f"{' and '.join(at_the_edge)} has a root on the unit circle, as far as {estimate.errors.size} "
-            "samples can tell: the covariance is not to be trusted there, and a design on this model would "
-            "count on noise that vanishes or never fades; take more data, or a lower order"
-        )
-    if estimate.whiteness.probability < _REFUTED:
-        notes.append(
-            f"the residuals are not white (probability {estimate.whiteness.probability:.1e}): the noise has "
-            "more structure than the model, and the covariance is not to be trusted; raise the orders of C "
-            "and D (or A)"
-        )
-    if estimate.independence.probability < _REFUTED:
-        notes.append(
-            f"past inputs explain residuals (probability {estimate.independence.probability:.1e}): the plant "
-            "has more structure than the model, or another delay; raise the orders of B and F (or A)"
-        )
-    deviations = np.sqrt(np.diag(estimate.covariance))
-    vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
-    if vague:
-        notes.append(f"zero lies within a standard deviation of {', '.join(vague)}: an order may be too high")
-    return notes
-
-
-def model_text(spec: Spec, found: Identified) -> str:
-    """The blocks to paste, with the covariance and, as a comment, the same as prior information."""
-    estimate = found.estimate
-    given = blocks(spec, estimate)
-    lines = [f"# Estimated from {found.data.y.size} samples; paste in place of the blocks of the same names."]
-    for key, block in given.items():
-        lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]
-    names = ", ".join(estimate.names)
-    lines += [
-        "",
-        f"# Covariance of {names}:",
-        *(f"#   {json.dumps(row)}" for row in estimate.covariance.tolist()),
-        "",
-        "# To count these data as prior information of the next experiment, uncomment:",
-        "# experiment:",
-        "#   prior:",
-        f"#     parameters: [{names}]",
-        "#     information:",
-        *(f"#       - {json.dumps(row)}" for row in estimate.information.tolist()),
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def data_curves(spec: Spec, found: Identified) -> tuple[dict[str, Table], dict[str, Any]]:
+def _data_curves(spec: Spec, found: Identified) -> tuple[dict[str, Table], dict[str, Any]]:
     """fit.csv and residuals.csv with their figures."""
     estimate, data = found.estimate, found.data
     n = data.y.size

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, EntryOfPlant, Requirement, worst
+from inputdesign_cli.accuracy import Criterion, EntryOfPlant, Requirement, worst_violation
 from inputdesign_cli.assemble.channel_curves import channel_spectrum_entry
 from inputdesign_cli.assemble.channels import frequency_unit
 from inputdesign_cli.assemble.curves import distinct
@@ -93,7 +93,7 @@ def requirements_entry(
     for requirement in requirements:
         if isinstance(requirement, Criterion):
             continue
-        violation = worst(requirement.violations(information))
+        violation = worst_violation(requirement, information)
         item: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
         if violation.frequency is not None:
             item["frequency"] = violation.frequency / frequency_unit(spec)

@@ -43,7 +43,8 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
                     Location(str(path), 1, 1, ",".join(rows[0][1])),
                 )
             )
-        columns[role] = np.array([_number(path, key, line, row, found[0]) for line, row in rows[1:]])
+        at = found[0]
+        columns[role] = np.array([_number(path, key, line, row, at, header[at]) for line, row in rows[1:]])
     return columns
 
 
@@ -78,7 +79,7 @@ def _rows(path: Path, key: str) -> list[tuple[int, list[str]]]:
     return rows
 
 
-def _number(path: Path, key: str, line: int, row: list[str], column: int) -> float:
+def _number(path: Path, key: str, line: int, row: list[str], column: int, name: str) -> float:
     text = row[column].strip() if column < len(row) else ""
     try:
         value = float(text)
@@ -88,7 +89,9 @@ def _number(path: Path, key: str, line: int, row: list[str], column: int) -> flo
         raise DataError(
             Complaint(
                 "data-not-a-number",
-                f"{text!r} is not a finite number" if text else "a number is missing",
+                f"{text!r} in column {name} is not a finite number"
+                if text
+                else f"a number is missing in column {name}",
                 "write plain numbers with a decimal point, one row a line",
                 key,
                 Location(str(path), line, 1, ",".join(row)),

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.assemble.channels import build_channel_model
+from inputdesign_cli.information import ChannelExperiment, Experiment
 from inputdesign_cli.plant import Loop
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.experiment import Noise
 from inputdesign_cli.spec.plant import PolynomialPlant
 
 
@@ -52,6 +54,36 @@ def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) 
     loop = Loop(model, nominal.loop.controller)
     loop.check_stability()
     return replace(nominal, loop=loop, factor=None)
+
+
+def true_channel_experiment(
+    spec: Spec, nominal: ChannelExperiment, result: Mapping[str, Any]
+) -> ChannelExperiment:
+    """The same with several channels; noise of a relative size refers to the weakest output.
+
+    Raises:
+        SpecError: `not-supported` for a true plant in s of a nominal one in q^-1, or the other way round.
+    """
+    study = spec.simulation
+    if study is None or (study.plant is None and study.noise is None):
+        return nominal
+    changes: dict[str, Any] = {}
+    if study.plant is not None:
+        if type(study.plant) is not type(spec.plant):
+            raise spec.complain(
+                "not-supported",
+                "the true system and the plant are of different kinds: one in s, one in q^-1",
+                hint="describe the true system as the plant is described",
+                key="simulation.plant",
+            )
+        changes["plant"] = study.plant
+    if study.noise is not None:
+        noise = study.noise
+        variance: Any = noise.variance
+        if noise.relative_std is not None:
+            variance = noise.relative_std**2 * float(np.min(result["power"]["output"]))
+        changes["noise"] = Noise.model_construct(C=noise.C, D=noise.D, variance=variance)
+    return replace(nominal, model=build_channel_model(spec.model_copy(update=changes)), factor=None)
 
 
 def _variance(spec: Spec, result: Mapping[str, Any]) -> float:

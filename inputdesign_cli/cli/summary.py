@@ -62,12 +62,27 @@ def _identified(result: Result) -> list[tuple[str, str]]:
         return []
     deviations = found["standard_deviation"]
     values = [f"{name} {value:.5g} +- {deviations[name]:.2g}" for name, value in found["theta"].items()]
-    lines = [("estimate", ", ".join(values)), ("", f"noise variance {found['variance']:.5g}")]
+    lines = [("estimate", ", ".join(values)), ("", f"noise {_variance(found['variance'])}")]
     if "fit_percent" in found:
-        lines[-1] = ("", f"{lines[-1][1]}, simulation explains {found['fit_percent']:.1f} % of the output")
+        lines[-1] = ("", f"{lines[-1][1]}, simulation explains {_explained(found['fit_percent'])}")
     tests = [f"{name} {found[name]['probability']:.2g}" for name in ("whiteness", "independence")]
     lines.append(("residuals", f"probability of {', of '.join(tests)}"))
     return lines
+
+
+def _variance(value: Any) -> str:
+    """A variance, or a covariance matrix row by row."""
+    if not isinstance(value, list):
+        return f"variance {value:.5g}"
+    return f"covariance [{'; '.join(_numbers(row) for row in value)}]"
+
+
+def _explained(value: Any) -> str:
+    """The fit of the output, or of each output; a dash where the model cannot be simulated."""
+    if not isinstance(value, list):
+        return f"{value:.1f} % of the output"
+    shares = ["-" if share is None else f"{share:.1f}" for share in value]
+    return f"{' and '.join(shares)} % of the outputs"
 
 
 def _assessed(result: Result, time_unit: str) -> list[tuple[str, str]]:
@@ -80,7 +95,8 @@ def _assessed(result: Result, time_unit: str) -> list[tuple[str, str]]:
         where = f" at {entry['frequency']:.4g} rad/{time_unit}" if "frequency" in entry else ""
         word = "met" if entry["worst_ratio"] <= 1.0 + 1e-9 else "missed"
         share = f"{entry['worst_ratio']:.4g} of the admissible"
-        text = f"{entry['name']} {word}: the error that these data give is {share}"
+        name = " ".join([entry["name"], *([entry["entry"]] if "entry" in entry else [])])
+        text = f"{name} {word}: the error that these data give is {share}"
         lines.append(("" if lines else "assessed", text + where))
     if "top_up_status" in assessment:
         lines.append(("top-up", "the experiment below makes up for it, after these data"))

@@ -2,6 +2,10 @@
 
 from inputdesign_cli.identification.batch import BatchEstimate as BatchEstimate
 from inputdesign_cli.identification.batch import fit_batch as fit_batch
+from inputdesign_cli.identification.channel_estimate import ChannelEstimate as ChannelEstimate
+from inputdesign_cli.identification.channels import ChannelBatch as ChannelBatch
+from inputdesign_cli.identification.channels import fit_channel_batch as fit_channel_batch
+from inputdesign_cli.identification.channels import identify_channels as identify_channels
 from inputdesign_cli.identification.estimate import Estimate as Estimate
 from inputdesign_cli.identification.estimate import identify as identify
 from inputdesign_cli.identification.predictor import prediction_errors as prediction_errors

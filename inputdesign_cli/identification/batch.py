@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.identification.problem import PredictionErrors
 from inputdesign_cli.identification.search import minimise
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.polynomial import Array
@@ -51,10 +52,12 @@ def fit_batch(structure: Structure, u: ArrayLike, y: ArrayLike, *, start: ArrayL
     begin = np.broadcast_to(np.asarray(start, dtype=float), (runs, structure.size))
     parts = [
         minimise(
-            structure,
+            PredictionErrors.single(
+                structure.row,
+                [np.ascontiguousarray(u[first : first + _BATCH].T)],
+                np.ascontiguousarray(y[first : first + _BATCH].T),
+            ),
             begin[first : first + _BATCH],
-            np.ascontiguousarray(u[first : first + _BATCH].T),
-            np.ascontiguousarray(y[first : first + _BATCH].T),
         )
         for first in range(0, runs, _BATCH)
     ]

@@ -67,7 +67,10 @@ class Stream:
             for run in range(self._runs):
                 out[:, run] = scipy.signal.lfilter([1.0], monic[run], out[:, run])
             return
-        taps, lines = self._columns(f"{name} {source}", monic)[1:], self._lines[name]
+        taps = self._columns(f"{name} {source}", monic)[1:]
+        if name not in self._lines:
+            self._lines[name] = list(self._held[name])
+        lines = self._lines[name]
         product = self._product[0]
         for t in range(self._history, self._history + self.length):
             row = lines[t]
@@ -78,7 +81,6 @@ class Stream:
     def _signal(self, name: str) -> Array:
         if name not in self._held:
             self._held[name] = np.zeros((self._history + self._rows, self._runs))
-            self._lines[name] = list(self._held[name])
         return self._held[name]
 
     def _columns(self, key: str, coefficients: Array) -> list[Array]:

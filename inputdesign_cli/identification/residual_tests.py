@@ -1,11 +1,15 @@
-"""Is what the model leaves unexplained white, and free of the past input? Ljung (1999), Section 16.6."""
+"""Is what the model leaves unexplained white, and free of the past input? Ljung (1999), Section 16.6.
+
+Of several outputs all channels are tested at once, in units of the residuals' own covariance.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.special
+from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
 
@@ -18,14 +22,15 @@ class ResidualTest:
     """A chi-squared test over several lags.
 
     Attributes:
-        lags, correlation: (n,) normalised correlations.
+        lags, correlation: (n,) normalised correlations; of vectors (n, rows, columns), entry (i, j) of lag
+            tau that of residual i and of residual or input j, tau samples earlier.
         limit: a single correlation of white noise stays within +- limit with probability 0.99.
         statistic, freedom: chi-squared with this many degrees of freedom if the model is right.
         probability: of a statistic at least as large if the model is right; small values refute it.
     """
 
     lags: Array
-    correlation: Array
+    correlation: NDArray[np.float64]
     limit: float
     statistic: float
     freedom: int
@@ -38,32 +43,66 @@ def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest
     Args:
         fitted: number of estimated parameters of the noise model, which make residuals look whiter.
     """
-    n = errors.size
-    lags = max(min(lags, n // 4), fitted + 1)
-    at = np.arange(1, lags + 1)
-    power = float(errors @ errors)
-    r = np.array([errors[tau:] @ errors[:-tau] for tau in at]) / power
-    statistic = float(n * (n + 2) * np.sum(r**2 / (n - at)))
-    freedom = lags - fitted
-    probability = float(scipy.special.chdtrc(freedom, statistic))
-    return ResidualTest(at.astype(float), r, _BAND / np.sqrt(n), statistic, freedom, probability)
+    return _scalar(joint_whiteness(errors[:, None], lags=lags, fitted=fitted))
+
+
+def joint_whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
+    """Correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
+
+    The portmanteau statistic of Hosking, J. American Statistical Association 75 (1980) 602-608, with the
+    weights of Ljung and Box, to which it reduces for one output.
+
+    Args:
+        fitted: number of estimated parameters of the noise model, which make residuals look whiter.
+    """
+    n, p = errors.shape
+    at = np.arange(1, _most_lags(n, p * p, lags, fitted) + 1)
+    products = np.array([errors[tau:].T @ errors[:-tau] for tau in at])
+    power = errors.T @ errors
+    whitener = np.linalg.inv(np.linalg.cholesky(power))
+    squares = np.sum((whitener @ products @ whitener.T) ** 2, axis=(1, 2))
+    rms = np.sqrt(np.diag(power))
+    statistic = n * (n + 2) * np.sum(squares / (n - at))
+    return _test(at, products / np.outer(rms, rms), n, statistic, p * p * at.size - fitted)
 
 
 def cross_correlation(errors: Array, u: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
     """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
 
     Args:
+        errors, u: (samples,).
         fitted: number of estimated parameters of the plant, which take as many directions away.
     """
-    n = errors.size
-    lags = max(min(lags, n // 4), fitted + 1)
-    at = np.arange(lags)
-    past = np.stack([np.concatenate([np.zeros(tau), u[: n - tau]]) for tau in at], axis=1)
-    left, singular, _ = np.linalg.svd(past, full_matrices=False)
+    return _scalar(cross_correlations(errors[:, None], u[:, None], lags=lags, fitted=fitted))
+
+
+def cross_correlations(errors: Array, u: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
+    """The same of all residuals (samples, p) and all inputs (samples, r) at once."""
+    n, p = errors.shape
+    r = u.shape[1]
+    at = np.arange(_most_lags(n, r, lags, fitted))
+    past = np.stack([np.concatenate([np.zeros((tau, r)), u[: n - tau]]) for tau in at], axis=1)
+    regressors = past.reshape(n, -1)
+    left, singular, _ = np.linalg.svd(regressors, full_matrices=False)
     left = left[:, singular > 1e-9 * singular[0]]
-    variance = float(np.mean(errors**2))
-    statistic = float(np.sum((left.T @ errors) ** 2) / variance)
-    freedom = max(left.shape[1] - fitted, 1)
-    r = past.T @ errors / (n * np.sqrt(variance * np.mean(u**2)))
+    covariance = errors.T @ errors / n
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+    statistic = np.sum((left.T @ errors @ whitener.T) ** 2)
+    products = np.einsum("np,nlr->lpr", errors, past)
+    rms = np.sqrt(np.outer(np.diag(covariance), np.mean(u**2, axis=0)))
+    return _test(at, products / (n * rms), n, statistic, max(p * left.shape[1] - fitted, 1))
+
+
+def _most_lags(samples: int, pairs: int, lags: int, fitted: int) -> int:
+    """As many lags as asked for, fewer in a short record, enough for some freedom to be left."""
+    return max(min(lags, samples // (4 * pairs)), fitted // pairs + 1)
+
+
+def _test(at: NDArray, correlation: NDArray, samples: int, statistic: float, freedom: int) -> ResidualTest:
     probability = float(scipy.special.chdtrc(freedom, statistic))
-    return ResidualTest(at.astype(float), r, _BAND / np.sqrt(n), statistic, freedom, probability)
+    limit = _BAND / np.sqrt(samples)
+    return ResidualTest(at.astype(float), correlation, limit, float(statistic), freedom, probability)
+
+
+def _scalar(test: ResidualTest) -> ResidualTest:
+    return replace(test, correlation=test.correlation[:, 0, 0])

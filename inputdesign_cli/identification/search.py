@@ -1,19 +1,17 @@
 """Gauss-Newton with Levenberg's damping on many prediction-error problems at once.
 
 Each run has its own damping and leaves the batch when it has settled. Steps that would make the predictor
-(C, F) or the noise model (D) unstable are mirrored into the unit circle. Ljung (1999), Section 10.2.
+unstable are mirrored back by the problem. Ljung (1999), Section 10.2.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.predictor import moments
-from inputdesign_cli.identification.stability import is_stable, reflected
-from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.polynomial import Array
 
 # Settled: the next step, squared and in standard deviations of the estimate, is this small. It is still
@@ -29,9 +27,33 @@ _ROUNDING = 1e-12
 _RIDGE = 1e-14
 
 
+class Problem(Protocol):
+    """Many runs of one nonlinear least-squares problem."""
+
+    @property
+    def errors(self) -> int:
+        """Number of prediction errors of a run."""
+        ...
+
+    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+        """Cost (runs,), half its Hessian to first order (runs, k, k), minus half its gradient (runs, k).
+
+        A cost that overflows is infinite.
+        """
+        ...
+
+    def stabilised(self, theta: Array) -> Array:
+        """theta (runs, k), moved where its predictor would be unstable; a copy."""
+        ...
+
+    def kept(self, runs: NDArray[np.bool_]) -> Self:
+        """The same problem with some of its runs only."""
+        ...
+
+
 @dataclass(frozen=True)
 class Minimum:
-    """Where the search ended: theta (runs, k), cost (runs,), psi^T psi (runs, k, k) there."""
+    """Where the search ended: theta (runs, k), cost (runs,), the Hessian of `Problem.at` there."""
 
     theta: Array
     cost: Array
@@ -40,26 +62,27 @@ class Minimum:
     steps: NDArray[np.int64]
 
 
-def minimise(structure: Structure, start: Array, u: Array, y: Array) -> Minimum:
-    """Minimise the sum of squared prediction errors from `start` (runs, k); u, y (samples, runs)."""
-    theta = stabilised(structure, start)
+def minimise(problem: Problem, start: Array) -> Minimum:
+    """Minimise the cost of every run from `start` (runs, k)."""
+    theta = problem.stabilised(start)
     runs = theta.shape[0]
-    cost, hessian, slope = _evaluate(structure, theta, u, y)
+    cost, hessian, slope = problem.at(theta)
     damping = np.full(runs, _FIRST_DAMPING)
     converged, steps = np.zeros(runs, dtype=bool), np.zeros(runs, dtype=np.int64)
-    active = np.flatnonzero(np.isfinite(cost))
-    u_active, y_active = u[:, active], y[:, active]
+    finite = np.isfinite(cost)
+    active = np.flatnonzero(finite)
+    going_on = problem if np.all(finite) else problem.kept(finite)
     for _ in range(_MOST_STEPS):
         newton, gain = _step(hessian[active], slope[active], np.zeros(active.size))
-        settled = gain * (u.shape[0] / np.maximum(cost[active], 1e-300)) < _SETTLED
+        settled = gain * (problem.errors / np.maximum(cost[active], 1e-300)) < _SETTLED
         settled |= cost[active] <= 0.0
         converged[active[settled]] = True
-        theta[active[settled]] = stabilised(structure, theta[active[settled]] + newton[settled])
+        theta[active[settled]] = problem.stabilised(theta[active[settled]] + newton[settled])
         lost = ~settled & (damping[active] > _MOST_DAMPING)
         going = ~(settled | lost)
         if not np.all(going):
             active, newton = active[going], newton[going]
-            u_active, y_active = u_active[:, going], y_active[:, going]
+            going_on = going_on.kept(going)
         if not active.size:
             break
         damped = damping[active] > _LEAST_DAMPING
@@ -67,8 +90,8 @@ def minimise(structure: Structure, start: Array, u: Array, y: Array) -> Minimum:
         if np.any(damped):
             some = active[damped]
             move[damped], gain[damped] = _step(hessian[some], slope[some], damping[some])
-        trial = stabilised(structure, theta[active] + move)
-        trial_cost, trial_hessian, trial_slope = _evaluate(structure, trial, u_active, y_active)
+        trial = problem.stabilised(theta[active] + move)
+        trial_cost, trial_hessian, trial_slope = going_on.at(trial)
         steps[active] += 1
         better = trial_cost <= cost[active] * (1.0 + _ROUNDING)
         chosen = active[better]
@@ -83,29 +106,13 @@ def minimise(structure: Structure, start: Array, u: Array, y: Array) -> Minimum:
     return Minimum(theta, cost, hessian, converged, steps)
 
 
-def stabilised(structure: Structure, theta: Array) -> Array:
-    """theta (runs, k) with the roots of C, D and F mirrored into the unit circle where they are outside."""
-    theta = theta.copy()
-    for letter in "cdf":
-        columns = structure.columns[letter]
-        if columns.stop == columns.start:
-            continue
-        monic = np.concatenate([np.ones((theta.shape[0], 1)), theta[:, columns]], axis=1)
-        for run in np.flatnonzero(~is_stable(monic)):
-            theta[run, columns] = reflected(monic[run])[1:]
-    return theta
-
-
-def _evaluate(
-    structure: Structure, theta: Array, u: Array, y: Array
-) -> tuple[Array, NDArray[np.float64], Array]:
-    """Cost (runs,), psi^T psi (runs, k, k) and psi^T epsilon (runs, k); an overflow costs infinity."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        cost, hessian, slope = moments(structure, theta, u, y)
-    finite = np.isfinite(cost) & np.isfinite(hessian).all(axis=(1, 2)) & np.isfinite(slope).all(axis=1)
-    if not np.all(finite):
-        cost, hessian[~finite], slope[~finite] = np.where(finite, cost, np.inf), np.eye(structure.size), 0.0
-    return cost, hessian, slope
+def best_run(found: Minimum) -> int:
+    """Of several starts of one record the run of least cost; one that settled, if it is as good."""
+    best = int(np.argmin(np.where(np.isfinite(found.cost), found.cost, np.inf)))
+    settled = found.converged & (found.cost <= found.cost[best] * (1 + 1e-6))
+    if np.any(settled):
+        best = int(np.flatnonzero(settled)[np.argmin(found.cost[settled])])
+    return best
 
 
 def _step(hessian: NDArray[np.float64], slope: Array, damping: Array) -> tuple[Array, Array]:

@@ -3,28 +3,32 @@
 A long ARX model gives an estimate of the noise and of the noise-free output. With the first, A, B and C
 follow by linear regression (Hannan and Rissanen, Biometrika 69 (1982) 81-94); with the second, B and F by
 Steiglitz and McBride's iteration (IEEE Trans. Automatic Control 10 (1965) 461-464) and C and D from what is
-left.
+left. With several inputs the iteration takes one at a time, on the output less what the others cause.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy.signal
 
 from inputdesign_cli.identification.stability import reflected
-from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.identification.structure import Block, Row
 from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 15
 _LONGEST = 40
 
 
-def starting_points(structure: Structure, u: Array, y: Array) -> Array:
-    """(points, k): several starts for one record u, y (samples,)."""
-    noise, noise_free = _long_model(structure, u, y)
-    first = _equation_error(structure, u, y, noise)
-    second = _output_error(structure, u, y, noise_free, coloured=True)
-    third = _output_error(structure, u, y, y, coloured=False)
+def starting_points(row: Row, u: Sequence[Array], y: Array) -> Array:
+    """(points, k): several starts for one output y (samples,) and all inputs u, (samples,) each."""
+    inputs = [u[entry.input] for entry in row.entries]
+    noise, responses = _long_model(row, inputs, y)
+    first = _equation_error(row, inputs, y, noise)
+    second = _output_error(row, inputs, y, responses, coloured=True)
+    left = y - sum(responses, np.zeros_like(y))
+    third = _output_error(row, inputs, y, [left + x for x in responses], coloured=False)
     points = np.array([first, second, third])
     return points[np.all(np.isfinite(points), axis=1)]
 
@@ -44,50 +48,75 @@ def _shifted(x: Array, lag: int) -> Array:
     return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])
 
 
-def _long_model(structure: Structure, u: Array, y: Array) -> tuple[Array, Array]:
-    """Residuals of a long ARX model, and what it says that the input alone causes."""
-    order = max(structure.a, structure.b, structure.c, structure.d, structure.f)
-    order = max(1, min(max(4 * order, 10), y.size // 6, _LONGEST))
-    (a, b), residual = regress(y, [(-y, range(1, order + 1)), (u, range(structure.delay, order + 1))])
+def _long_model(row: Row, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
+    """Residuals of a long ARX model, and what it says that each input alone causes."""
+    highest = max([row.a, row.c, row.d, *(max(entry.b, entry.f) for entry in row.entries)])
+    order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
+    regressors = [(x, range(entry.delay, order + 1)) for x, entry in zip(inputs, row.entries, strict=True)]
+    (a, *bs), residual = regress(y, [(-y, range(1, order + 1)), *regressors])
     A = reflected(np.concatenate([[1.0], a]))
-    B = np.concatenate([np.zeros(structure.delay), b])
-    return residual, scipy.signal.lfilter(B, A, u)
+    responses = [
+        scipy.signal.lfilter(np.concatenate([np.zeros(entry.delay), b]), A, x)
+        for b, x, entry in zip(bs, inputs, row.entries, strict=True)
+    ]
+    return residual, responses
 
 
-def _equation_error(structure: Structure, u: Array, y: Array, noise: Array) -> Array:
-    """A, B, C by regression; an output-error denominator F takes the place of a missing A."""
-    lags = structure.lags
-    in_f = structure.f > 0 and structure.a == 0
-    left = lags["f"] if in_f else lags["a"]
-    (a, b, c), _ = regress(y, [(-y, left), (u, lags["b"]), (noise, lags["c"])])
-    parts = {"f" if in_f else "a": a, "b": b, "c": c}
-    return _theta(structure, parts)
+def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Array:
+    """A, B, C by regression; output-error denominators F take the place of a missing A."""
+    A, C = row.by_letter["a"][0], row.by_letter["c"][0]
+    Bs, Fs = row.by_letter["b"], row.by_letter["f"]
+    longest = max((block.lags for block in Fs), key=len, default=range(1, 1))
+    in_f = len(longest) > 0 and row.a == 0
+    regressors = [(x, block.lags) for x, block in zip(inputs, Bs, strict=True)]
+    (a, *bs, c), _ = regress(y, [(-y, longest if in_f else A.lags), *regressors, (noise, C.lags)])
+    denominators = [(block, a[: len(block.lags)]) for block in Fs] if in_f else [(A, a)]
+    return _theta(row, [*denominators, *zip(Bs, bs, strict=True), (C, c)])
 
 
-def _output_error(structure: Structure, u: Array, y: Array, target: Array, *, coloured: bool) -> Array:
-    """B and F (or A) by Steiglitz and McBride on `target`, then C and D from the residual."""
-    lags = structure.lags
-    letter = "f" if structure.f else "a"
-    F = np.ones(1)
-    b = f = np.zeros(0)
-    for _ in range(_ITERATIONS if lags[letter] else 1):
-        filtered_u, filtered_y = scipy.signal.lfilter([1.0], F, u), scipy.signal.lfilter([1.0], F, target)
-        (f, b), _ = regress(filtered_y, [(-filtered_y, lags[letter]), (filtered_u, lags["b"])])
-        F = reflected(np.concatenate([[1.0], f]))
-    parts = {"b": b, letter: F[1:]}
-    if coloured and (structure.c or structure.d):
-        B = np.concatenate([np.zeros(structure.delay), b])
-        v = y - scipy.signal.lfilter(B, F, u)
-        if letter == "a":
-            v = scipy.signal.lfilter(F, [1.0], v)
-        long = max(1, min(10 + 2 * (structure.c + structure.d), y.size // 6))
+def _output_error(row: Row, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool) -> Array:
+    """B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
+    A, C, D = (row.by_letter[letter][0] for letter in "acd")
+    Bs, Fs = row.by_letter["b"], row.by_letter["f"]
+    if any(block.lags for block in Fs) or row.a == 0:
+        found = [
+            _iterated(x, F.lags, [(x_in, B.lags)])
+            for x, x_in, F, B in zip(targets, inputs, Fs, Bs, strict=True)
+        ]
+        bs, denominators = [b for _, (b,) in found], [f for f, _ in found]
+        parts = [*zip(Bs, bs, strict=True), *((F, f[1:]) for F, f in zip(Fs, denominators, strict=True))]
+        shaped = np.ones(1)
+    else:
+        regressors = [(x, B.lags) for x, B in zip(inputs, Bs, strict=True)]
+        shaped, bs = _iterated(sum(targets, np.zeros_like(y)) if coloured else y, A.lags, regressors)
+        denominators = [shaped] * len(bs)
+        parts = [*zip(Bs, bs, strict=True), (A, shaped[1:])]
+    if coloured and (row.c or row.d):
+        v = y.copy()
+        for b, f, x, entry in zip(bs, denominators, inputs, row.entries, strict=True):
+            v -= scipy.signal.lfilter(np.concatenate([np.zeros(entry.delay), b]), f, x)
+        v = scipy.signal.lfilter(shaped, [1.0], v)
+        long = max(1, min(10 + 2 * (row.c + row.d), y.size // 6))
         _, noise = regress(v, [(-v, range(1, long + 1))])
-        (parts["d"], parts["c"]), _ = regress(v, [(-v, lags["d"]), (noise, lags["c"])])
-    return _theta(structure, parts)
+        (d, c), _ = regress(v, [(-v, D.lags), (noise, C.lags)])
+        parts += [(D, d), (C, c)]
+    return _theta(row, parts)
 
 
-def _theta(structure: Structure, parts: dict[str, Array]) -> Array:
-    theta = np.zeros(structure.size)
-    for letter, values in parts.items():
-        theta[structure.columns[letter]] = values
+def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> tuple[Array, list[Array]]:
+    """A common denominator with these lags `below`, monic, and the numerators by Steiglitz and McBride."""
+    F = np.ones(1)
+    numerators: list[Array] = []
+    for _ in range(_ITERATIONS if below else 1):
+        y = scipy.signal.lfilter([1.0], F, target)
+        filtered = [(scipy.signal.lfilter([1.0], F, x), lags) for x, lags in above]
+        (f, *numerators), _ = regress(y, [(-y, below), *filtered])
+        F = reflected(np.concatenate([[1.0], f]))
+    return F, numerators
+
+
+def _theta(row: Row, parts: Iterable[tuple[Block, Array]]) -> Array:
+    theta = np.zeros(row.size)
+    for block, values in parts:
+        theta[block.columns] = values
     return theta

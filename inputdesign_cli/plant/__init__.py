@@ -3,6 +3,9 @@
 from inputdesign_cli.plant.channel_loop import ChannelLoop as ChannelLoop
 from inputdesign_cli.plant.channel_loop import MatrixController as MatrixController
 from inputdesign_cli.plant.channel_model import ChannelModel as ChannelModel
+from inputdesign_cli.plant.channel_simulation import caused_by_inputs as caused_by_inputs
+from inputdesign_cli.plant.channel_simulation import caused_by_noise as caused_by_noise
+from inputdesign_cli.plant.channel_simulation import stable_outputs as stable_outputs
 from inputdesign_cli.plant.channels import PolynomialChannels as PolynomialChannels
 from inputdesign_cli.plant.continuous import ContinuousChannels as ContinuousChannels
 from inputdesign_cli.plant.continuous import SampledChannels as SampledChannels

@@ -194,3 +194,24 @@ class PolynomialChannels(Parametrised):
                 filtered = {"a": -D[i] / C[i], "c": 1.0 / C[i], "d": -1.0 / D[i]}[letter]
                 gradient[:, index, i] = shift * filtered[:, None] * source
         return gradient
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialChannels:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        B, F = ([[entry.copy() for entry in row] for row in rows] for rows in (self.B, self.F))
+        common = {"a": self.A, "c": self.C, "d": self.D}
+        rows = {letter: [polynomial.copy() for polynomial in given] for letter, given in common.items()}
+        for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):
+            for i, j in parameter.places:
+                if parameter.letter in rows:
+                    own = rows[parameter.letter]
+                    own[0 if len(own) == 1 else i][parameter.power] = value
+                else:
+                    (B if parameter.letter == "b" else F)[i][j][parameter.power] = value
+        return PolynomialChannels(
+            tuple(tuple(row) for row in B),
+            tuple(rows["a"]),
+            tuple(tuple(row) for row in F),
+            tuple(rows["c"]),
+            tuple(rows["d"]),
+            self.covariance if covariance is None else covariance,
+        )

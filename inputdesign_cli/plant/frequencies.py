@@ -14,8 +14,6 @@ _ZOOM_POINTS = 8
 _ZOOM_STEPS = 6
 # A peak between two grid points may stand this much higher than both.
 _SLACK = 0.05
-# So near to an end of the band, in shares of it, and so nearly as high, a maximum is one at the end.
-_END, _ROUNDING = 1e-6, 1e-12
 
 
 def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
@@ -88,10 +86,6 @@ def local_maxima(
         best_value = np.where(better, found[rows, top], best_value)
         width = (right - left) / (_ZOOM_POINTS + 1)
         left, right = np.maximum(left, best - width), np.minimum(right, best + width)
-    # A flat maximum at an end is found beside it, up to rounding: the end is what is meant.
-    for end, value in ((grid[0], function(grid[:1])[0]), (grid[-1], function(grid[-1:])[0])):
-        near = np.abs(best - end) < _END * (grid[-1] - grid[0])
-        best = np.where(near & (value >= best_value - _ROUNDING * np.abs(best_value)), end, best)
     kept = best_value > above
     return best[kept], best_value[kept]
 

@@ -7,6 +7,9 @@ from pathlib import Path
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
+    ChannelErrorBandCurves,
+    ChannelFitCurves,
+    ChannelResidualCurves,
     CloudCurves,
     Curves,
     DirectionCurves,
@@ -24,7 +27,7 @@ from inputdesign_cli.outcome import (
 )
 from inputdesign_cli.report.bound import draw_bound
 from inputdesign_cli.report.channels import draw_channel_bounds
-from inputdesign_cli.report.data import draw_fit, draw_residuals
+from inputdesign_cli.report.data import draw_channel_fit, draw_channel_residuals, draw_fit, draw_residuals
 from inputdesign_cli.report.ellipses import draw_ellipses
 from inputdesign_cli.report.error import draw_error
 from inputdesign_cli.report.loss import draw_loss
@@ -33,7 +36,7 @@ from inputdesign_cli.report.moments import draw_moments
 from inputdesign_cli.report.optimality import draw_optimality
 from inputdesign_cli.report.signal import draw_signal
 from inputdesign_cli.report.spectrum import draw_spectrum
-from inputdesign_cli.report.trials import draw_cloud, draw_error_bands
+from inputdesign_cli.report.trials import draw_channel_error_bands, draw_cloud, draw_error_bands
 
 
 def draw(curves: Curves, path: Path, time_unit: str = "s") -> None:
@@ -71,6 +74,12 @@ def draw(curves: Curves, path: Path, time_unit: str = "s") -> None:
             draw_cloud(curves, path)
         case ErrorBandCurves():
             draw_error_bands(curves, path, time_unit)
+        case ChannelErrorBandCurves():
+            draw_channel_error_bands(curves, path, time_unit)
+        case ChannelFitCurves():
+            draw_channel_fit(curves, path, time_unit)
+        case ChannelResidualCurves():
+            draw_channel_residuals(curves, path)
         case FitCurves():
             draw_fit(curves, path, time_unit)
         case ResidualCurves():

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.outcome import CloudCurves, ErrorBandCurves
+from inputdesign_cli.outcome import ChannelErrorBandCurves, CloudCurves, ErrorBandCurves
+from inputdesign_cli.report.channels import entry_panels
 from inputdesign_cli.report.ellipses import boundary
 from inputdesign_cli.report.style import BLACK, BLUE, GREY, ORANGE, figure, frequency_axis, legend_above
 
@@ -44,31 +46,41 @@ def draw_cloud(curves: CloudCurves, path: Path) -> None:
 
 def draw_error_bands(curves: ErrorBandCurves, path: Path, time_unit: str) -> None:
     """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
-    w = curves.frequency
-    levels = sorted(curves.quantiles)
-    low, high = levels[0], levels[-1]
     with figure(path) as page:
         axes = page.add_subplot()
-        axes.set_yscale("log")
-        handles: list[Artist] = [
-            axes.fill_between(
-                w,
-                curves.quantiles[low],
-                curves.quantiles[high],
-                color=BLUE,
-                alpha=0.25,
-                linewidth=0,
-                label=f"{100 * low:g} to {100 * high:g} % of {curves.runs} runs",
-            )
-        ]
-        for level in levels[1:-1]:
-            handles += axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
-        if curves.r_u is not None:
-            handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="$r_u$, promised")
-        if curves.r_adm is not None:
-            r_adm = np.where(curves.r_adm > 0, curves.r_adm, np.nan)
-            handles += axes.plot(w, r_adm, color=ORANGE, label=r"$r_\mathrm{adm}$")
-        frequency_axis(axes, w, time_unit)
+        handles = _bands(axes, curves)
+        frequency_axis(axes, curves.frequency, time_unit)
         axes.set_ylabel(r"$|\hat{G} - G_0|$")
         axes.set_title(curves.name, loc="right", color=GREY)
         legend_above(axes, handles)
+
+
+def draw_channel_error_bands(curves: ChannelErrorBandCurves, path: Path, time_unit: str) -> None:
+    """The same in a panel for every entry of G, outputs as rows."""
+    with figure(path) as page:
+        handles: list[Artist] = []
+        for axes, entry in entry_panels(page, curves.entries, time_unit):
+            handles = max(handles, _bands(axes, entry), key=len)
+        page.legend(
+            handles=handles, loc="outside upper left", ncols=len(handles), title=curves.name, alignment="left"
+        )
+
+
+def _bands(axes: Axes, curves: ErrorBandCurves) -> list[Artist]:
+    """The curves of one plant or entry; the handles of their legend."""
+    w, levels = curves.frequency, sorted(curves.quantiles)
+    low, high = levels[0], levels[-1]
+    axes.set_yscale("log")
+    label = f"{100 * low:g} to {100 * high:g} % of {curves.runs} runs"
+    band = axes.fill_between(
+        w, curves.quantiles[low], curves.quantiles[high], color=BLUE, alpha=0.25, linewidth=0, label=label
+    )
+    handles: list[Artist] = [band]
+    for level in levels[1:-1]:
+        handles += axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
+    if curves.r_u is not None:
+        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="$r_u$, promised")
+    if curves.r_adm is not None:
+        r_adm = np.where(curves.r_adm > 0, curves.r_adm, np.nan)
+        handles += axes.plot(w, r_adm, color=ORANGE, label=r"$r_\mathrm{adm}$")
+    return handles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inputdesign_cli.assemble.channels import has_channels
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.spec import RegressionPlant, Spec
@@ -27,6 +28,10 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Outcome:
             from inputdesign_cli.study.closed_loop_simulation import simulate_closed_loop_error
 
             return simulate_closed_loop_error(spec, executor=executor)
+        if has_channels(spec):
+            from inputdesign_cli.study.channel_monte_carlo import simulate_channels
+
+            return simulate_channels(spec, executor=executor)
         from inputdesign_cli.study.monte_carlo import simulate_polynomial
 
         return simulate_polynomial(spec, executor=executor)

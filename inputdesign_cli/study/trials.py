@@ -10,11 +10,13 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
+from inputdesign_cli.accuracy import error_bound
 from inputdesign_cli.identification import Structure, fit_batch, identify
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import input_and_output
 from inputdesign_cli.study.excitations import Excitation
+from inputdesign_cli.study.verdict import Promise
 
 # Complex numbers of frequency responses held at a time.
 _CHUNK = 2_000_000
@@ -26,7 +28,7 @@ class Trials:
 
     Attributes:
         theta: (runs, k) estimates; `converged` (runs,).
-        power: mean squares of what the excitation causes: input, output, excitation.
+        power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
         total_power: mean squares of input and output, noise included.
         first: (samples,) the excitation of the first run.
     """
@@ -35,12 +37,21 @@ class Trials:
     structure: Structure
     theta: Array
     converged: NDArray[np.bool_]
-    power: dict[str, float]
-    total_power: dict[str, float]
+    power: dict[str, list[float]]
+    total_power: dict[str, list[float]]
     first: Array
 
-    def errors(self, w: Array) -> Array:
-        """|G_hat - G_0| (runs, n) at frequencies `w` (n,) in rad/sample."""
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.structure.names
+
+    @property
+    def truth(self) -> Array:
+        return self.true.model.theta
+
+    def errors(self, promise: Promise) -> Array:
+        """|G_hat - G_0| (runs, n) at the frequencies of the promise (n,)."""
+        w = promise.w
         true = self.true.model.plant_at(w)
         size = max(1, _CHUNK // w.size)
         parts = [
@@ -48,6 +59,10 @@ class Trials:
             for i in range(0, len(self.theta), size)
         ]
         return np.concatenate(parts)
+
+    def bound(self, promise: Promise, information: Array) -> Array:
+        """r_u (n,) on the true system."""
+        return error_bound(self.true, information, promise.alpha, promise.w)
 
     @cached_property
     def same_structure(self) -> bool:
@@ -72,21 +87,22 @@ def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
 
 def joined(parts: Sequence[Trials]) -> Trials:
     """All batches of one study as one; mean squares are weighted by the number of runs."""
-    weights = np.array([len(part.theta) for part in parts], dtype=np.float64)
-
-    def mean(entries: Sequence[dict[str, float]]) -> dict[str, float]:
-        return {
-            name: float(np.average([entry[name] for entry in entries], weights=weights))
-            for name in entries[0]
-        }
-
+    weights = [len(part.theta) for part in parts]
     return replace(
         parts[0],
         theta=np.concatenate([part.theta for part in parts]),
         converged=np.concatenate([part.converged for part in parts]),
-        power=mean([part.power for part in parts]),
-        total_power=mean([part.total_power for part in parts]),
+        power=averaged([part.power for part in parts], weights),
+        total_power=averaged([part.total_power for part in parts], weights),
     )
+
+
+def averaged(entries: Sequence[dict[str, list[float]]], weights: Sequence[int]) -> dict[str, list[float]]:
+    """Mean squares of several batches as one, name by name and channel by channel."""
+    return {
+        name: np.average([entry[name] for entry in entries], axis=0, weights=weights).tolist()
+        for name in entries[0]
+    }
 
 
 def run_trials(
@@ -114,13 +130,13 @@ def run_trials(
         again = identify(structure, u[run], y[run], start=start)
         theta[run], information[run], converged[run] = again.theta, again.information, again.converged
     if true.prior is not None and true.model.names == structure.names:
-        theta = _with_prior(theta, information, true.prior, true.model.theta, rng)
+        theta = with_prior(theta, information, true.prior, true.model.theta, rng)
     mean_squares = {
-        "input": float(np.mean(u_x**2)),
-        "output": float(np.mean(y_x**2)),
-        "excitation": float(np.mean(r**2)),
+        "input": [float(np.mean(u_x**2))],
+        "output": [float(np.mean(y_x**2))],
+        "excitation": [float(np.mean(r**2))],
     }
-    total = {"input": float(np.mean(u**2)), "output": float(np.mean(y**2))}
+    total = {"input": [float(np.mean(u**2))], "output": [float(np.mean(y**2))]}
     return Trials(true, structure, theta, converged, mean_squares, total, np.array(r[0]))
 
 
@@ -138,7 +154,7 @@ def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> tuple[Array
     return u, y
 
 
-def _with_prior(
+def with_prior(
     theta: Array, information: Array, prior: Array, centre: Array, rng: np.random.Generator
 ) -> Array:
     """Estimates (runs, k) combined with earlier ones of information `prior`, which may be singular."""

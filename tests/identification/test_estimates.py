@@ -56,7 +56,9 @@ def test_a_batch_finds_what_a_plain_optimiser_finds(name):
     assert np.all(found.converged)
     for run in range(4):
         plain = scipy.optimize.least_squares(
-            lambda x, run=run: prediction_errors(structure, x[None], u[run][:, None], y[run][:, None])[:, 0],
+            lambda x, run=run: prediction_errors(structure.row, x[None], [u[run][:, None]], y[run][:, None])[
+                :, 0
+            ],
             theta,
             xtol=1e-12,
             ftol=1e-14,

@@ -15,11 +15,11 @@ def test_the_gradient_is_the_finite_difference(name, runs):
     rng = np.random.default_rng(1)
     u, y = (x.T for x in data(name, 60, rng, runs=runs))
     theta = np.array(theta) * (1 + 0.05 * rng.standard_normal((runs, structure.size)))
-    _, psi = errors_and_gradient(structure, theta, u, y)
+    _, psi = errors_and_gradient(structure.row, theta, [u], y)
     for i in range(structure.size):
         step = np.zeros(structure.size)
         step[i] = 1e-6
-        ahead, behind = (prediction_errors(structure, theta + s * step, u, y) for s in (1, -1))
+        ahead, behind = (prediction_errors(structure.row, theta + s * step, [u], y) for s in (1, -1))
         np.testing.assert_allclose(psi[i], -(ahead - behind) / 2e-6, atol=1e-6 * np.abs(psi[i]).max())
 
 
@@ -31,7 +31,7 @@ def test_prediction_errors_at_the_truth_are_the_noise(name):
     u, e = rng.standard_normal((2, 80))
     y = scipy.signal.lfilter(model.B, np.convolve(model.A, model.F), u)
     y += scipy.signal.lfilter(model.C, np.convolve(model.A, model.D), e)
-    errors = prediction_errors(structure, np.array([theta]), u[:, None], y[:, None])
+    errors = prediction_errors(structure.row, np.array([theta]), [u[:, None]], y[:, None])
     np.testing.assert_allclose(errors[:, 0], e, atol=1e-10)
 
 

@@ -1,0 +1,83 @@
+"""The estimate of a model with several inputs and outputs, whatever its kind, and how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.identification.checks import covariance_of
+from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, joint_whiteness
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class ChannelEstimate:
+    """A prediction-error estimate of a model with p outputs, r inputs and k parameters.
+
+    Attributes:
+        names, theta: (k,).
+        covariance, information: (k, k) of theta; they are inverse to each other.
+        noise: (p, p) covariance of e; of white noise on the samples where the model knows no other.
+        errors: (samples, p) prediction errors at theta.
+        converged: whether the search settled; `steps` that it took, from the best of `starts`.
+        fit: output by output, per cent of the rms of y (its mean taken off) that the model's simulation
+            explains; None where the model is unstable and cannot be simulated.
+        whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
+            their correlations are (lags, p, p) and (lags, p, r).
+    """
+
+    names: tuple[str, ...]
+    theta: Array
+    covariance: Array
+    information: Array
+    noise: Array
+    errors: Array
+    converged: bool
+    steps: int
+    starts: int
+    fit: tuple[float | None, ...]
+    whiteness: ResidualTest
+    independence: ResidualTest
+
+
+def concluded(
+    names: tuple[str, ...],
+    theta: Array,
+    information: Array,
+    noise: Array,
+    errors: Array,
+    u: Array,
+    *,
+    in_noise: int,
+    in_plant: int,
+    fit: tuple[float | None, ...],
+    converged: bool,
+    steps: int,
+    starts: int,
+) -> ChannelEstimate:
+    """The estimate with its covariance and the tests of its residuals.
+
+    Args:
+        information: (k, k) sum over the samples of psi(t) noise^-1 psi(t)^T.
+        errors, u: (samples, p), (samples, r).
+        in_noise: number of parameters that make residuals look whiter: those of A, C and D.
+        in_plant: number of parameters that take directions of past inputs away: those of B and F.
+
+    Raises:
+        SpecError: `not-exciting`.
+    """
+    return ChannelEstimate(
+        names=names,
+        theta=np.asarray(theta, dtype=float),
+        covariance=covariance_of(names, information),
+        information=information,
+        noise=noise,
+        errors=errors,
+        converged=converged,
+        steps=steps,
+        starts=starts,
+        fit=fit,
+        whiteness=joint_whiteness(errors, fitted=in_noise),
+        independence=cross_correlations(errors, u, fitted=in_plant),
+    )

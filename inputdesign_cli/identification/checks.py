@@ -1,0 +1,132 @@
+"""What data must be like to determine a model, channel by channel, and what they leave undetermined."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant.polynomial import Array
+
+# Below this share of the largest eigenvalue (parameters scaled) a direction is not excited.
+_FAINT = 1e-12
+# Residuals of this power relative to the output are rounding.
+_EXACT = 1e-20
+# Correlation matrices of residuals with a smaller eigenvalue are singular but for rounding.
+_COMBINED = 1e-13
+# Fewer samples than this for each parameter say nothing about a covariance.
+_SAMPLES_A_PARAMETER = 3
+
+
+def channel_name(letter: str, channel: int, channels: int) -> str:
+    """How a channel is called in messages: `u2`, or `u` where it is the only one."""
+    return letter if channels == 1 else f"{letter}{channel + 1}"
+
+
+def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1) -> None:
+    """Enough samples of the outputs for so many parameters and a predictor that looks `memory` back.
+
+    Raises:
+        SpecError: `too-few-samples`.
+    """
+    needed = -(-_SAMPLES_A_PARAMETER * parameters // outputs) + memory
+    if samples < needed:
+        raise bad_spec(
+            "too-few-samples",
+            f"{samples} samples are too few for {parameters} parameters: at least {needed} are needed",
+            hint="record more samples, or lower the orders",
+            key="u",
+        )
+
+
+def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
+    """No channel of u (samples, r) and y (samples, p) keeps one value throughout.
+
+    Args:
+        names: of the parameters, for the complaint.
+
+    Raises:
+        SpecError: `constant-input`, `constant-output`.
+    """
+    for letter, signals in (("u", u), ("y", y)):
+        for index, signal in enumerate(signals.T):
+            if np.ptp(signal) > 1e-12 * max(float(np.abs(signal).max()), 1e-300):
+                continue
+            name = channel_name(letter, index, signals.shape[1])
+            raise bad_spec(
+                "constant-input" if letter == "u" else "constant-output",
+                f"{name} has the same value {signal[0]:g} in every sample: "
+                + (
+                    f"nothing but a static gain could be seen, and {', '.join(names)} cannot be told apart"
+                    if letter == "u"
+                    else "it shows neither the input nor noise"
+                ),
+                hint="is the signal in another column, or the logger stuck?",
+                key=name,
+            )
+
+
+def check_noisy(variances: Array, y: Array) -> None:
+    """Residuals of these `variances` (p,) are more than the rounding of y (samples, p).
+
+    Raises:
+        SpecError: `noise-free-data`.
+    """
+    for index, power in enumerate(np.mean(y**2, axis=0)):
+        if variances[index] > _EXACT * power:
+            continue
+        name = channel_name("y", index, y.shape[1])
+        which = "the output" if y.shape[1] == 1 else name
+        raise bad_spec(
+            "noise-free-data",
+            f"the model explains {which} to the last digit: there is no noise to estimate a variance from",
+            hint=f"is {name} computed from u? Real data have noise",
+            key=name,
+        )
+
+
+def check_apart(covariance: Array) -> None:
+    """No output's residuals are those of the others: `covariance` (p, p) can be inverted.
+
+    Raises:
+        SpecError: `noise-free-data`.
+    """
+    rms = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(rms, rms))
+    if values[0] > _COMBINED:
+        return
+    share = np.abs(vectors[:, 0])
+    names = " and ".join(f"y{i + 1}" for i in np.flatnonzero(share > 0.05 * share.max()))
+    raise bad_spec(
+        "noise-free-data",
+        f"the residuals of {names} determine each other: these outputs carry the same noise",
+        hint="is one of the outputs computed from the others? Leave it out",
+        key="y",
+    )
+
+
+def covariance_of(names: Sequence[str], information: Array) -> Array:
+    """M^-1 (k, k) by way of unit diagonal.
+
+    Raises:
+        SpecError: `not-exciting`, with the parameters that the data cannot tell apart.
+    """
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    if values[0] <= _FAINT * values[-1]:
+        weak = np.abs(vectors[:, 0])
+        listed = [n for n, v in zip(names, weak, strict=True) if v > 0.05 * weak.max()]
+        raise bad_spec(
+            "not-exciting",
+            f"the data cannot tell these parameters apart: {', '.join(listed)}",
+            hint="the input is too simple (too few sinusoids, a short step), or the orders are too high",
+            key="u",
+        )
+    half = vectors / np.sqrt(values)
+    return np.asarray((half @ half.T) / np.outer(scale, scale))
+
+
+def fit_percent(y: Array, simulated: Array) -> float:
+    """Per cent of the rms of y (samples,), its mean taken off, that a simulation explains."""
+    return float(100.0 * (1.0 - np.linalg.norm(y - simulated) / np.linalg.norm(y - y.mean())))

@@ -1,0 +1,136 @@
+"""One input of several channels tried many times: simulate the true system, identify each record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import Absolute, EntryError
+from inputdesign_cli.assemble.channel_estimation import estimated, estimated_runs, moved
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import ChannelModel, PolynomialChannels, caused_by_inputs, caused_by_noise
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal import channel_outputs
+from inputdesign_cli.study.channel_excitations import ChannelExcitation
+from inputdesign_cli.study.trials import averaged, with_prior
+from inputdesign_cli.study.verdict import Promise
+
+
+@dataclass(frozen=True)
+class ChannelTrials:
+    """What the runs gave.
+
+    Attributes:
+        model: of which the structure was estimated.
+        theta: (runs, k) estimates; `converged` (runs,).
+        power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
+        total_power: mean squares of inputs and outputs, noise included.
+    """
+
+    true: ChannelExperiment
+    model: ChannelModel
+    theta: Array
+    converged: NDArray[np.bool_]
+    power: dict[str, list[float]]
+    total_power: dict[str, list[float]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.model.names
+
+    @property
+    def truth(self) -> Array:
+        return self.true.model.theta
+
+    @property
+    def same_structure(self) -> bool:
+        """Whether the true system has the parameters of the model."""
+        return self.true.model.names == self.model.names
+
+    def errors(self, promise: Promise) -> Array:
+        """|G_hat - G_0| (runs, n) at the frequencies and entries of the promise."""
+        assert promise.entries is not None
+        w, where = np.unique(promise.w, return_inverse=True)
+        rows, columns = promise.entries.T
+        true = self.true.model.plant_at(w)
+        parts = []
+        for theta in self.theta:
+            off = np.abs(moved(self.model, theta, self.model.covariance).plant_at(w) - true)
+            parts.append(off[where, rows, columns])
+        return np.array(parts)
+
+    def bound(self, promise: Promise, information: Array) -> Array:
+        """r_u (n,) on the true system at the frequencies and entries of the promise."""
+        assert promise.entries is not None
+        r_u = np.empty(promise.w.size)
+        for i, j in np.unique(promise.entries, axis=0):
+            own = np.all(promise.entries == (i, j), axis=1)
+            entry = EntryError(
+                self.true, Absolute(1.0), promise.alpha, self.true.band, output=int(i), input=int(j)
+            )
+            r_u[own] = entry.error_bound(information, promise.w[own])
+        return r_u
+
+
+@dataclass(frozen=True)
+class ChannelTrialJob:
+    """What all batches of one study share.
+
+    Attributes:
+        true: the true system and the length of its experiment.
+        model: of which the structure is estimated; the search begins at its parameters.
+        step: time between samples in the unit of the experiment's frequencies.
+    """
+
+    true: ChannelExperiment
+    model: ChannelModel
+    excitation: ChannelExcitation
+    step: float
+
+
+def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -> ChannelTrials:
+    """Simulate a batch of experiments from rest on the true system and identify each of them.
+
+    The noise is drawn first, so that it is the same for every input. Runs where the search does not settle
+    are repeated from several starts. Prior information enters as an estimate from earlier data would: with
+    an error of its own in each run.
+    """
+    true, system, start = job.true, job.true.model, job.model.theta
+    e = rng.standard_normal((runs, true.samples, system.outputs)) @ np.linalg.cholesky(system.covariance).T
+    u = job.excitation.draw(runs, true.samples, rng)
+    if isinstance(system, PolynomialChannels):
+        y_u, y_e = caused_by_inputs(system, u), caused_by_noise(system, e)
+    else:
+        y_u, y_e = np.array([channel_outputs(true, record, job.step) for record in u]), e
+    y = y_u + y_e
+    found = estimated_runs(job.model, u, y, start)
+    theta, information, converged = found.theta, found.information, found.converged.copy()
+    for run in np.flatnonzero(~converged):
+        again = estimated(job.model, u[run], y[run], start)
+        theta[run], information[run], converged[run] = again.theta, again.information, again.converged
+    if true.prior is not None and system.names == job.model.names:
+        theta = with_prior(theta, information, true.prior, system.theta, rng)
+    inputs, outputs = _mean_squares(u), _mean_squares(y_u)
+    power = {"input": inputs, "output": outputs, "excitation": inputs}
+    total = {"input": inputs, "output": _mean_squares(y)}
+    return ChannelTrials(true, job.model, theta, converged, power, total)
+
+
+def joined_channels(parts: Sequence[ChannelTrials]) -> ChannelTrials:
+    """All batches of one study as one; mean squares are weighted by the number of runs."""
+    weights = [len(part.theta) for part in parts]
+    return replace(
+        parts[0],
+        theta=np.concatenate([part.theta for part in parts]),
+        converged=np.concatenate([part.converged for part in parts]),
+        power=averaged([part.power for part in parts], weights),
+        total_power=averaged([part.total_power for part in parts], weights),
+    )
+
+
+def _mean_squares(x: Array) -> list[float]:
+    """Channel by channel over all runs (runs, samples, channels)."""
+    return [float(value) for value in np.mean(x**2, axis=(0, 1))]
