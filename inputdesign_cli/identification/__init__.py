@@ -14,3 +14,10 @@ from inputdesign_cli.identification.residual_tests import cross_correlation as c
 from inputdesign_cli.identification.residual_tests import whiteness as whiteness
 from inputdesign_cli.identification.structure import Polynomials as Polynomials
 from inputdesign_cli.identification.structure import Structure as Structure
+from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices as fit_transfer_matrices
+from inputdesign_cli.identification.transfer_matrix import (
+    identify_transfer_matrix as identify_transfer_matrix,
+)
+from inputdesign_cli.identification.transfer_matrix import (
+    simulate_transfer_matrix as simulate_transfer_matrix,
+)

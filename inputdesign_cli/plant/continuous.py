@@ -90,6 +90,20 @@ class ContinuousChannels(Parametrised):
             ]
         return tuple(found)
 
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousChannels:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        above = [[entry.copy() for entry in row] for row in self.numerator]
+        below = [[entry.copy() for entry in row] for row in self.denominator]
+        for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):
+            for i, j in parameter.places:
+                (above if parameter.letter == "b" else below)[i][j][parameter.power] = value
+        return ContinuousChannels(
+            tuple(map(tuple, above)),
+            tuple(map(tuple, below)),
+            self.covariance if covariance is None else covariance,
+            self.common,
+        )
+
     @property
     def in_plant(self) -> NDArray[np.bool_]:
         return np.ones(len(self.parameters), dtype=bool)

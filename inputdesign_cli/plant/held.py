@@ -1,4 +1,7 @@
-"""One entry of a transfer matrix behind a zero-order hold, with the gradients of its parameters in s."""
+"""One entry of a transfer matrix behind a zero-order hold, with the gradients of its parameters in s.
+
+The same states serve samples that are not held but interpolated within their band.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,9 @@ import scipy.linalg
 from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+# What is left of a state, far below rounding.
+_FORGOTTEN = 1e-20
 
 
 @dataclass(frozen=True)
@@ -55,15 +61,40 @@ class HeldEntry:
 
     @cached_property
     def gain(self) -> Array:
-        return self._row(self.numerator - self.direct * self.denominator, 1)
+        return self.row(self.numerator - self.direct * self.denominator, 1)
 
     def states(self, z: ComplexArray) -> ComplexArray:
-        """(n, 2 order): the states at points z of the unit circle."""
+        """(n, 2 order): the states at points z of the unit circle.
+
+        By back-substitution in Schur's triangular form, for all points at once.
+        """
         if not self.order:
             return np.zeros((z.size, 0), dtype=complex)
-        pencil = z[:, None, None] * np.eye(self.entry.size) - self.transition
-        driven = np.broadcast_to(self.entry[:, None].astype(complex), (z.size, self.entry.size, 1))
-        return np.asarray(np.linalg.solve(pencil, driven), dtype=complex)[..., 0]
+        triangle, basis = scipy.linalg.schur(self.transition, output="complex")
+        driven = basis.conj().T @ self.entry
+        modes = np.zeros((driven.size, z.size), dtype=complex)
+        for row in reversed(range(driven.size)):
+            above = driven[row] + triangle[row, row + 1 :] @ modes[row + 1 :]
+            modes[row] = above / (z - triangle[row, row])
+        return np.asarray((basis @ modes).T, dtype=complex)
+
+    def interpolated_states(self, w: Array) -> ComplexArray:
+        """(n, 2 order): the states at frequencies w of the continuous entry, without a hold."""
+        s = 1j * w[:, None] / self.unit
+        scaled = self.denominator * self.unit ** (np.arange(self.order + 1.0) - self.order)
+        below = ascending.polyval(s, scaled)
+        chain = s ** np.arange(self.order) / below
+        return np.concatenate([chain, chain / below], axis=1)
+
+    def forgetting(self, states: ComplexArray, z: ComplexArray, samples: int) -> ComplexArray:
+        """States (n, 2 order) at points z whose memory ends after so many samples.
+
+        Exact in a record that is no longer, whatever the poles: there is nothing older to remember.
+        """
+        lost = np.linalg.matrix_power(self.transition, samples)
+        if np.all(np.abs(lost) < _FORGOTTEN):
+            return states
+        return np.asarray(states - z[:, None] ** -float(samples) * (states @ lost.T), dtype=complex)
 
     def gradient(self, letter: str, power: int) -> tuple[float, Array]:
         """Direct term and row of the gradient with respect to one coefficient."""
@@ -71,12 +102,12 @@ class HeldEntry:
         above[power] = 1.0
         if letter == "b":
             if power == self.order:
-                return 1.0, self._row(above - self.denominator, 1)
-            return 0.0, self._row(above, 1)
+                return 1.0, self.row(above - self.denominator, 1)
+            return 0.0, self.row(above, 1)
         whole, rest = ascending.polydiv(ascending.polymul(above, self.numerator), self.denominator)
-        return 0.0, -self._row(np.asarray(whole), 1) - self._row(np.asarray(rest), 2)
+        return 0.0, -self.row(np.asarray(whole), 1) - self.row(np.asarray(rest), 2)
 
-    def _row(self, coefficients: Array, copy: int) -> Array:
+    def row(self, coefficients: Array, copy: int) -> Array:
         """The row that reads coefficients(s) / a^copy off the states; powers of s carry their unit."""
         row = np.zeros(2 * self.order)
         trimmed = np.asarray(coefficients, dtype=float)[: self.order]

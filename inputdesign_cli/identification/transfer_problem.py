@@ -1,0 +1,99 @@
+"""Output errors of transfer matrices in s, weighed by their own covariance: what is minimised, run by run.
+
+With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), as in `problem.py`. It falls with the likelihood of
+Gaussian noise of unknown covariance; minus half its gradient is sum psi(t) W e(t), half its Hessian sum
+psi W psi^T up to what vanishes at the minimum, with W = cost / (p N) S^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.problem import inverses
+from inputdesign_cli.identification.transfer_record import TransferRecord
+from inputdesign_cli.plant.polynomial import Array
+
+# Errors of this power relative to the output are rounding. It is added to S, so that an output without
+# noise does not hide the others.
+_EXACT = 1e-20
+
+
+@dataclass(frozen=True)
+class Point:
+    """One record at theta (k,): errors (N, p), the gradient psi (k, N, p) of the output, W (p, p), cost."""
+
+    theta: Array
+    errors: Array
+    psi: NDArray[np.float64]
+    weights: Array
+    cost: float
+
+    @property
+    def slope(self) -> Array:
+        """(k,): sum of psi W e."""
+        return np.asarray(self._weighed.reshape(self.theta.size, -1) @ self.errors.ravel())
+
+    @property
+    def hessian(self) -> Array:
+        """(k, k): sum of psi W psi^T."""
+        return self.against(self.psi)
+
+    def against(self, regressors: NDArray[np.float64]) -> Array:
+        """(k, k): sum of psi W phi^T for regressors phi (k, N, p)."""
+        k = self.theta.size
+        return np.asarray(self._weighed.reshape(k, -1) @ regressors.reshape(k, -1).T)
+
+    @property
+    def _weighed(self) -> NDArray[np.float64]:
+        return np.asarray(self.psi @ self.weights)
+
+
+def rounding(record: TransferRecord) -> Array:
+    """(p, p): a covariance of errors so small that they are rounding."""
+    return _EXACT * np.diag(np.mean(record.y**2, axis=0))
+
+
+def evaluate(record: TransferRecord, theta: Array) -> Point:
+    """The cost of one record; infinite where it overflows, zero where all errors are rounding."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        errors, psi = record.errors_and_gradient(theta)
+        S = errors.T @ errors / record.samples
+    usable = bool(np.all(np.isfinite(S)) and np.all(np.isfinite(psi)))
+    if not usable:
+        errors, psi, S = np.zeros(errors.shape), np.zeros(psi.shape), np.eye(len(S))
+    floor = rounding(record)
+    inverse, logarithm = inverses((S + floor)[None])
+    root = float(np.exp(logarithm[0] / len(S)))
+    exact = np.all(np.diag(S) <= np.diag(floor))
+    cost = np.inf if not usable else 0.0 if exact else record.samples * root
+    return Point(theta, errors, psi, root / len(S) * inverse[0], cost)
+
+
+@dataclass(frozen=True)
+class TransferProblem:
+    """The problem of fitting records of one structure, one a run; see `search.Problem`."""
+
+    records: tuple[TransferRecord, ...]
+
+    @property
+    def errors(self) -> int:
+        """Number of output errors of a run."""
+        return self.records[0].y.size
+
+    def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
+        """Cost (runs,), psi^T W psi (runs, k, k) and psi^T W e (runs, k)."""
+        points = [evaluate(record, row) for record, row in zip(self.records, theta, strict=True)]
+        hessian = np.array([point.hessian for point in points])
+        slope = np.array([point.slope for point in points])
+        return np.array([point.cost for point in points]), hessian, slope
+
+    def stabilised(self, theta: Array) -> Array:
+        """theta (runs, k) with stable poles."""
+        return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
+
+    def kept(self, runs: NDArray[np.bool_]) -> TransferProblem:
+        """The same problem with some of its runs only."""
+        return TransferProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))

@@ -1,0 +1,351 @@
+"""Transfer matrices in s from samples: simulation, gradients, estimates and their covariance."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.signal
+from channel_plants import descending, two_by_two
+
+from inputdesign_cli import load_spec, solve
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification.refined_iv import refine
+from inputdesign_cli.identification.transfer_matrix import (
+    fit_transfer_matrices,
+    identify_transfer_matrix,
+    simulate_transfer_matrix,
+)
+from inputdesign_cli.identification.transfer_problem import evaluate
+from inputdesign_cli.identification.transfer_record import Intersample, TransferRecord
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import ContinuousChannels, SampledChannels
+from inputdesign_cli.signal import channel_outputs, channel_record_information
+from inputdesign_cli.study.statistics import whitened_eigenvalues, wishart_range
+
+STEP = 0.4
+SPECS = Path(__file__).parents[2] / "specs"
+
+
+def plant(numerator, denominator, *, common=False):
+    return ContinuousChannels.monic(
+        descending(numerator), descending(denominator), np.eye(len(numerator)), common=common
+    )
+
+
+PLANTS = {
+    "two by two": two_by_two(),
+    "one channel": plant([[[1, 3]]], [[[1, 0.3, 2]]]),
+    "biproper": plant([[[1, 2, 3]]], [[[1, 2, 4]]]),
+    "one common denominator": plant([[[1, 2], [3]], [[1], [2, 1]]], [[[1, 1, 2]] * 2] * 2, common=True),
+    "orders of their own": plant([[[1], [2, 5], [0]]], [[[1, 0.5], [1, 1, 9], [1]]]),
+    "a static entry": plant([[[2], [1]]], [[[1], [1, 1]]]),
+}
+HOLDS = pytest.mark.parametrize("hold", [False, True], ids=["band-limited", "held"])
+
+
+def actual() -> ContinuousChannels:
+    """The true plant of the spectral design paper, near its nominal one."""
+    return plant(
+        [[[3.2], [3.1]], [[5.2], [1.5]]], [[[1, 1.6, 1.5], [1, 1.9, 1]], [[1, 0.5, 0.95], [1, 0.9, 0.3]]]
+    )
+
+
+def excitation(samples, inputs, rng, *, share=0.6):
+    """Noise (samples, inputs) below this share of the Nyquist frequency."""
+    transform = np.fft.rfft(rng.normal(size=(samples, inputs)), axis=0)
+    transform[int(share * len(transform)) :] = 0.0
+    return np.fft.irfft(transform, samples, axis=0)
+
+
+def noisy(model, u, rng, *, hold, level, covariance=None, runs=None):
+    """Outputs with noise of `level` times their rms, and the model with the covariance of that noise."""
+    y = simulate_transfer_matrix(model, u, STEP, hold=hold)
+    root = level * np.linalg.cholesky(np.eye(y.shape[1]) if covariance is None else covariance)
+    root = y.std(axis=0)[:, None] * root
+    shape = y.shape if runs is None else (runs, *y.shape)
+    return y + rng.normal(size=shape) @ root.T, model.at(model.theta, root @ root.T)
+
+
+def as_sampled(model, hold):
+    return SampledChannels(model, STEP) if hold else model
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_a_held_input_gives_what_a_sampled_state_space_gives(name):
+    model = PLANTS[name]
+    u = np.random.default_rng(0).normal(size=(200, model.inputs))
+    expected = np.zeros((200, model.outputs))
+    for i, j in model.active:
+        top, bottom = model.numerator[i][j][::-1], model.denominator[i][j][::-1]
+        b, a, _ = (
+            scipy.signal.cont2discrete((top, bottom), STEP, "zoh") if bottom.size > 1 else (top, [1.0], 0)
+        )
+        expected[:, i] += scipy.signal.lfilter(np.ravel(b), a, u[:, j])
+    np.testing.assert_allclose(simulate_transfer_matrix(model, u, STEP, hold=True), expected, atol=1e-11)
+
+
+def test_a_held_input_is_exact_when_the_plant_remembers_more_than_the_record():
+    slow = plant([[[1.0]]], [[[1.0, 1e-6]]])
+    u = np.ones((300, 1))
+    expected = (1.0 - np.exp(-1e-6 * STEP * np.arange(300))) / 1e-6
+    ours = simulate_transfer_matrix(slow, u, STEP, hold=True)[:, 0]
+    np.testing.assert_allclose(ours, expected, atol=1e-10 * expected.max())
+
+
+def test_a_band_limited_input_is_its_fine_interpolation():
+    model, factor = PLANTS["two by two"], 64
+    u = excitation(256, 2, np.random.default_rng(1), share=0.3) * np.hanning(256)[:, None]
+    around = np.concatenate([np.zeros((256, 2)), u, np.zeros((256, 2))])
+    fine = scipy.signal.resample(around, factor * len(around), axis=0)
+    time = np.arange(len(fine)) * STEP / factor
+    expected = np.zeros((len(fine), 2))
+    for i, j in model.active:
+        system = (model.numerator[i][j][::-1], model.denominator[i][j][::-1])
+        expected[:, i] += scipy.signal.lsim(system, fine[:, j], time)[1]
+    ours = simulate_transfer_matrix(model, u, STEP, hold=False)
+    np.testing.assert_allclose(ours, expected[256 * factor : 512 * factor : factor], atol=2e-4 * np.std(ours))
+
+
+@HOLDS
+@pytest.mark.parametrize("name", ["two by two", "one common denominator"])
+def test_outputs_are_those_by_which_the_record_was_judged(name, hold):
+    model = PLANTS[name]
+    u = excitation(500, model.inputs, np.random.default_rng(2), share=0.3)
+    expected = channel_outputs(ChannelExperiment(as_sampled(model, hold), 500), u, STEP)
+    ours = simulate_transfer_matrix(model, np.stack([u, 2 * u]), STEP, hold=hold)
+    tolerance = 1e-10 if hold else 1e-5
+    np.testing.assert_allclose(ours[0], expected, atol=tolerance * np.std(expected))
+    np.testing.assert_allclose(ours[1], 2 * ours[0], atol=1e-12 * np.abs(ours).max())
+
+
+@HOLDS
+@pytest.mark.parametrize("name", PLANTS)
+def test_the_gradient_is_a_difference_quotient(name, hold):
+    model = PLANTS[name]
+    rng = np.random.default_rng(3)
+    u = excitation(150, model.inputs, rng)
+    record = TransferRecord(model, u, rng.normal(size=(150, model.outputs)), Intersample(STEP, hold))
+    _, psi = record.errors_and_gradient(model.theta)
+    for index, value in enumerate(model.theta):
+        move = 1e-5 * max(abs(value), 0.1) * np.eye(model.theta.size)[index]
+        lower, upper = (record.errors_and_gradient(model.theta + sign * move)[0] for sign in (-1, 1))
+        expected = (lower - upper) / (2 * move[index])
+        np.testing.assert_allclose(psi[index], expected, atol=1e-7 * max(np.abs(expected).max(), 1.0))
+
+
+def test_the_slope_of_the_likelihood_is_a_difference_quotient():
+    model = PLANTS["two by two"]
+    rng = np.random.default_rng(4)
+    u = excitation(150, 2, rng)
+    y, _ = noisy(actual(), u, rng, hold=False, level=0.5, covariance=[[1, 0.8], [0.8, 1]])
+    record = TransferRecord(model, u, y, Intersample(STEP, hold=False))
+
+    point = evaluate(record, model.theta)
+    for index in range(model.theta.size):
+        move = 1e-5 * np.eye(model.theta.size)[index]
+        lower, upper = (evaluate(record, model.theta + sign * move).cost for sign in (-1, 1))
+        assert 2 * point.slope[index] == pytest.approx((lower - upper) / 2e-5, rel=1e-5, abs=1e-4)
+
+
+@HOLDS
+@pytest.mark.parametrize("name", PLANTS)
+def test_data_without_noise_return_the_parameters(name, hold):
+    model = PLANTS[name]
+    u = excitation(300, model.inputs, np.random.default_rng(5))
+    y = simulate_transfer_matrix(model, u, STEP, hold=hold)
+    found = fit_transfer_matrices(model, u, y[None], STEP, hold=hold, start=1.15 * model.theta)
+    assert np.all(found.converged)
+    np.testing.assert_allclose(found.theta[0], model.theta, atol=1e-8)
+
+
+@HOLDS
+@pytest.mark.parametrize("name", PLANTS)
+def test_parameters_are_found_without_a_start(name, hold):
+    model = PLANTS[name]
+    rng = np.random.default_rng(6)
+    u = excitation(600, model.inputs, rng)
+    y, truth = noisy(model, u, rng, hold=hold, level=0.2)
+    # The numbers of the structure are not used.
+    anything = model.at(np.ones(model.theta.size))
+    found = identify_transfer_matrix(anything, u, y, STEP, hold=hold)
+    assert found.converged
+    assert found.names == model.names
+    off = found.theta - model.theta
+    # Mahalanobis distance: chi-squared with k degrees of freedom.
+    assert off @ found.information @ off < off.size + 4 * np.sqrt(2 * off.size)
+    np.testing.assert_allclose(found.noise, truth.covariance, atol=0.2 * truth.covariance.max())
+    assert min(found.fit) > 75.0
+    assert found.whiteness.probability > 1e-3
+    assert found.independence.probability > 1e-3
+
+
+def test_one_channel_has_the_estimate_of_a_plain_optimiser():
+    model = PLANTS["one channel"]
+    rng = np.random.default_rng(7)
+    u = rng.normal(size=(400, 1))
+    y, _ = noisy(model, u, rng, hold=True, level=0.3)
+
+    def errors(theta):
+        b, a, _ = scipy.signal.cont2discrete((theta[1::-1], [1.0, *theta[:1:-1]]), STEP, "zoh")
+        return y[:, 0] - scipy.signal.lfilter(np.ravel(b), a, u[:, 0])
+
+    plain = scipy.optimize.least_squares(
+        errors, model.theta, xtol=1e-14, ftol=1e-14, gtol=1e-14, jac="3-point"
+    )
+    found = identify_transfer_matrix(model, u, y, STEP, hold=True)
+    np.testing.assert_allclose(found.theta, plain.x, atol=1e-6)
+    variance = 2 * plain.cost / (400 - 4)
+    assert found.noise[0, 0] == pytest.approx(variance, rel=1e-6)
+    np.testing.assert_allclose(found.covariance, variance * np.linalg.inv(plain.jac.T @ plain.jac), rtol=1e-4)
+
+
+@HOLDS
+def test_the_covariance_is_that_of_the_records_information(hold):
+    rng = np.random.default_rng(8)
+    u = excitation(500, 2, rng, share=0.4)
+    y, _ = noisy(actual(), u, rng, hold=hold, level=0.2, covariance=[[1, 0.7], [0.7, 1]])
+    found = identify_transfer_matrix(two_by_two(), u, y, STEP, hold=hold)
+    model = as_sampled(two_by_two().at(found.theta, found.noise), hold)
+    expected = channel_record_information(ChannelExperiment(model, 500), u, STEP)
+    scale = np.sqrt(np.diag(expected))
+    difference = (found.information - expected) / np.outer(scale, scale)
+    assert np.abs(difference).max() < (1e-9 if hold else 1e-5)
+    np.testing.assert_allclose(found.covariance @ found.information, np.eye(12), atol=1e-8)
+
+
+def test_instruments_alone_come_within_a_fraction_of_a_standard_deviation():
+    rng = np.random.default_rng(9)
+    u = excitation(800, 2, rng)
+    y, _ = noisy(actual(), u, rng, hold=False, level=0.2)
+    record = TransferRecord(two_by_two(), u, y, Intersample(STEP, hold=False))
+
+    likeliest = identify_transfer_matrix(two_by_two(), u, y, STEP, hold=False)
+    far = evaluate(record, np.exp(0.3 * rng.normal(size=12)) * two_by_two().theta)
+    off = refine(record, far)[0].theta - likeliest.theta
+    assert off @ likeliest.information @ off < 0.1
+    off = refine(record, evaluate(record, likeliest.theta))[0].theta - likeliest.theta
+    assert off @ likeliest.information @ off < 1e-8
+
+
+def test_a_change_of_the_unit_of_time_changes_the_units_of_the_estimate():
+    model = PLANTS["two by two"]
+    rng = np.random.default_rng(10)
+    u = excitation(400, 2, rng)
+    y, _ = noisy(model, u, rng, hold=True, level=0.2)
+    powers = np.array([1000.0 ** (p.power - 2) for p in model.parameters])
+    seconds = identify_transfer_matrix(model, u, y, STEP, hold=True, start=model.theta)
+    milliseconds = identify_transfer_matrix(model, u, y, 1000 * STEP, hold=True, start=powers * model.theta)
+    np.testing.assert_allclose(milliseconds.theta / powers, seconds.theta, rtol=1e-4)
+
+
+def test_unstable_starts_are_mirrored():
+    model = PLANTS["one channel"]
+    record = TransferRecord(model, np.ones((100, 1)), np.ones((100, 1)), Intersample(STEP, hold=True))
+    unstable = np.array([1.0, 1.0, 2.0, -0.3])
+    np.testing.assert_allclose(record.stabilised(unstable), [1.0, 1.0, 2.0, 0.3])
+    np.testing.assert_allclose(record.stabilised(model.theta), model.theta)
+    rng = np.random.default_rng(11)
+    u = excitation(600, 1, rng)
+    y, _ = noisy(model, u, rng, hold=True, level=0.1)
+    found = fit_transfer_matrices(model, u, y[None], STEP, hold=True, start=unstable)
+    assert np.all(found.converged)
+    np.testing.assert_allclose(found.theta[0], model.theta, atol=0.1)
+
+
+def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
+    """A ramp is the answer to a step of an integrator, which the structure does not allow."""
+    model = plant([[[1.0]]], [[[1.0, 1.0]]])
+    rng = np.random.default_rng(12)
+    u = np.where(np.arange(400) < 40, 0.0, 1.0)[:, None]
+    y = np.cumsum(u, axis=0) ** 1.2 + rng.normal(size=(400, 1))
+    found = fit_transfer_matrices(model, u, y[None], STEP, hold=True, start=model.theta)
+    assert not found.converged[0]
+
+
+def test_a_batch_is_one_estimate_after_the_other():
+    rng = np.random.default_rng(13)
+    u = excitation(300, 2, rng)
+    y, _ = noisy(actual(), u, rng, hold=False, level=0.2, runs=3)
+    found = fit_transfer_matrices(two_by_two(), u, y, STEP, hold=False, start=two_by_two().theta)
+    for run in range(3):
+        single = identify_transfer_matrix(two_by_two(), u, y[run], STEP, hold=False)
+        np.testing.assert_allclose(found.theta[run], single.theta, atol=1e-5)
+        np.testing.assert_allclose(np.linalg.inv(found.information[run]), single.covariance, rtol=1e-4)
+        np.testing.assert_allclose(found.noise[run], single.noise, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "word"),
+    [
+        (lambda u, y: (u[:9], y[:9]), "too-few-samples", "9 samples"),
+        (lambda u, y: (u * [1.0, 0.0] + [0.0, 3.0], y), "constant-input", "u2"),
+        (lambda u, y: (u, y * [0.0, 1.0]), "constant-output", "y1"),
+        (lambda u, y: (u[:, [0, 0]] * [1.0, 2.0], y), "not-exciting", "b0[1,1], b0[1,2]"),
+    ],
+)
+def test_bad_data_is_refused(change, code, word):
+    rng = np.random.default_rng(14)
+    model = PLANTS["one common denominator"]
+    u = excitation(300, 2, rng)
+    y, _ = noisy(model, u, rng, hold=True, level=0.2)
+    with pytest.raises(SpecError) as caught:
+        identify_transfer_matrix(model, *change(u, y), STEP, hold=True)
+    assert caught.value.complaints[0].code == code
+    assert word in caught.value.complaints[0].message
+
+
+def test_data_without_noise_have_no_covariance():
+    model = PLANTS["two by two"]
+    u = excitation(300, 2, np.random.default_rng(15))
+    y = simulate_transfer_matrix(model, u, STEP, hold=True)
+    with pytest.raises(SpecError) as caught:
+        identify_transfer_matrix(model, u, y, STEP, hold=True)
+    assert caught.value.complaints[0].code == "noise-free-data"
+
+
+def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
+    """rms / Cramer-Rao bound by parameter, over all directions, and the spread of the eigenvalues."""
+    rng = np.random.default_rng(seed)
+    y, truth = noisy(actual(), u, rng, hold=hold, level=level, covariance=covariance, runs=runs)
+    found = fit_transfer_matrices(two_by_two(), u, y, STEP, hold=hold, start=two_by_two().theta)
+    assert np.all(found.converged)
+    experiment = ChannelExperiment(as_sampled(truth, hold), len(u))
+    information = channel_record_information(experiment, u, STEP)
+    off = found.theta - truth.theta
+    bound = np.sqrt(np.diag(np.linalg.inv(information)))
+    by_parameter = np.sqrt(np.mean(off**2, axis=0)) / bound
+    overall = np.sqrt(np.mean((off @ np.linalg.cholesky(information)) ** 2))
+    return by_parameter, overall, whitened_eigenvalues(found.theta, information)
+
+
+@HOLDS
+def test_few_runs_from_the_nominal_start_reach_the_bound(hold):
+    u = excitation(400, 2, np.random.default_rng(17))
+    correlated = np.array([[1.0, 0.9], [0.9, 1.0]])
+    by_parameter, overall, _ = efficiency(u, 40, hold=hold, level=0.1, covariance=correlated)
+    # The mean square of 40 x 12 normal variables has a relative error of 0.065.
+    assert overall == pytest.approx(1.0, abs=0.13)
+    assert 0.8 < np.median(by_parameter) < 1.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("criterion", "level", "covariance"),
+    [("D", 0.1, None), ("D", 0.5, 0.9), ("E", 0.1, None), ("E", 0.1, 0.9)],
+)
+@HOLDS
+def test_designed_records_reach_the_cramer_rao_bound(criterion, level, covariance, hold):
+    """Spectral design paper: noise of a tenth of the outputs, the estimate begun at the nominal plant."""
+    spec = load_spec(
+        SPECS / "two_by_two.yaml",
+        [f"accuracy.criterion={criterion}", "signal.samples=2000", f"sample_time={STEP}"],
+    )
+    columns = solve(spec).tables["signal"].columns
+    u = np.column_stack([columns["u1"], columns["u2"]])
+    full = None if covariance is None else np.array([[1.0, covariance], [covariance, 1.0]])
+    by_parameter, overall, eigenvalues = efficiency(u, 300, hold=hold, level=level, covariance=full)
+    assert 0.9 < np.median(by_parameter) < 1.2
+    assert overall == pytest.approx(1.0, abs=0.05)
+    low, high = wishart_range(12, 300, np.random.default_rng(18))
+    assert low < eigenvalues.min() <= eigenvalues.max() < high
