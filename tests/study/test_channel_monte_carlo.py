@@ -1,13 +1,15 @@
+import pickle
+
 import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, simulate
-from inputdesign_cli.cli.workers import executor
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import PolynomialChannels
 from inputdesign_cli.signal import Lines, Recipe, channel_record_information
 from inputdesign_cli.study.channel_excitations import Flat, InPhase, Multisine, Recorded
+from inputdesign_cli.study.executor import Finished
 
 SPEC = "specs/two_by_two_arx.yaml"
 JENKINS = """
@@ -28,7 +30,7 @@ TRUE = "[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]"
 
 @pytest.fixture(scope="module")
 def studied():
-    overrides = ["spectrum.order=4", "simulation={runs: 150, compare: [white, prbs]}"]
+    overrides = ["spectrum.order=2", "simulation={runs: 120, compare: [white, prbs]}"]
     return simulate(load_spec(SPEC, overrides))
 
 
@@ -72,7 +74,7 @@ def test_every_entry_has_its_error_bands(studied):
     for band in curves.entries.values():
         assert np.all(band.quantiles[0.05] <= band.quantiles[0.95])
         assert np.all(band.quantiles[0.95] < band.r_u)
-    assert studied.curves["cloud_design"].theta.shape == (150, 10)
+    assert studied.curves["cloud_design"].theta.shape == (120, 10)
 
 
 def test_the_true_system_may_be_another():
@@ -108,7 +110,7 @@ def test_prior_information_narrows_the_estimates():
     "given",
     [
         "{type: white, power: 100}",
-        "{type: multisine, frequencies: [0.1, 0.4, 1, 2, 3], amplitudes: [[9, 3, 4, 5, 3], [2, -3, 6, 8, 4]]}",
+        "{type: multisine, frequencies: [0.1, 0.4, 1, 2], amplitudes: [[9, 3, 4, 5], [2, -3, 6, -8]]}",
     ],
 )
 def test_given_excitations_are_tried(given):
@@ -124,10 +126,21 @@ def test_the_delivered_record_can_be_tried():
     )
 
 
+class Elsewhere:
+    """Tasks travel as bytes and are done in reverse order, as other processes may do them."""
+
+    shares_files = True
+
+    def run(self, function, tasks):
+        for sent in reversed([pickle.dumps((function, task)) for task in tasks]):
+            there, task = pickle.loads(sent)
+            yield Finished(task, pickle.loads(pickle.dumps(there(task))))
+
+
 def test_the_result_does_not_depend_on_where_it_is_computed():
     overrides = [GIVEN, "simulation={runs: 60, seed: 5}"]
     here = simulate(load_spec(SPEC, overrides)).result["simulation"]
-    there = simulate(load_spec(SPEC, overrides), executor=executor(2, None)).result["simulation"]
+    there = simulate(load_spec(SPEC, overrides), executor=Elsewhere()).result["simulation"]
     assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
 
 
