@@ -1,0 +1,188 @@
+import pickle
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import load_spec, parse_spec, simulate
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.signal import Lines, Recipe, channel_record_information
+from inputdesign_cli.study.channel_excitations import Flat, InPhase, Multisine, Recorded
+from inputdesign_cli.study.executor import Finished
+
+SPEC = "specs/two_by_two_arx.yaml"
+JENKINS = """
+plant:
+  B: [[[0, 1.0], [0, 0.5]], [[0, 0, 0.7], [0]]]
+  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1]]]
+noise: {C: [[1, 0.5], [1, -0.3]], D: [1, -0.6], variance: [[0.2, 0.05], [0.05, 0.1]]}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 4}
+simulation: {runs: 100, seed: 2}
+"""
+
+
+GIVEN = "spectrum={given: {type: white, power: 450}}"
+TRUE = "[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]"
+
+
+@pytest.fixture(scope="module")
+def studied():
+    overrides = ["spectrum.order=2", "simulation={runs: 120, compare: [white, prbs]}"]
+    return simulate(load_spec(SPEC, overrides))
+
+
+def within_wishart(simulation):
+    low, high = simulation["wishart_range"]
+    for entry in simulation["inputs"].values():
+        eigenvalues = np.array(entry["covariance_eigenvalues"])
+        assert low < eigenvalues.min()
+        assert eigenvalues.max() < high
+        assert entry["not_converged"] == 0
+
+
+def test_covariances_lie_in_the_range_of_the_wishart_distribution(studied):
+    within_wishart(studied.result["simulation"])
+    within_wishart(simulate(parse_spec(JENKINS)).result["simulation"])
+
+
+def test_the_promise_is_kept_on_the_design_model(studied):
+    inputs = studied.result["simulation"]["inputs"]
+    # r_u is a joint region of 95 % for all entries at all frequencies.
+    for name in ("design", "white", "prbs", "white_that_suffices"):
+        assert inputs[name]["within_r_u_limits"][1] > 0.95
+    assert inputs["design"]["within_r_adm_limits"][1] > 0.95
+    assert inputs["design"]["theory_on_truth"]["worst_ratio"] == pytest.approx(1.0, abs=1e-3)
+    assert inputs["white"]["theory_on_truth"]["worst_ratio"] > 1.5
+    assert inputs["white_that_suffices"]["theory_on_truth"]["worst_ratio"] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_powers_are_equal_and_those_of_the_design(studied):
+    inputs, designed = studied.result["simulation"]["inputs"], studied.result["power"]["excitation"]
+    assert sum(inputs["design"]["power"]["input"]) == pytest.approx(sum(designed), rel=1e-6)
+    np.testing.assert_allclose(inputs["design"]["power"]["input"], designed, rtol=0.02)
+    for name in ("white", "prbs"):
+        np.testing.assert_allclose(inputs[name]["power"]["input"], sum(designed) / 2, rtol=1e-6)
+        assert inputs[name]["cost"] == pytest.approx(studied.result["cost"], rel=1e-6)
+
+
+def test_every_entry_has_its_error_bands(studied):
+    curves = studied.curves["errors_design"]
+    assert list(curves.entries) == ["[1,1]", "[1,2]", "[2,1]", "[2,2]"]
+    for band in curves.entries.values():
+        assert np.all(band.quantiles[0.05] <= band.quantiles[0.95])
+        assert np.all(band.quantiles[0.95] < band.r_u)
+    assert studied.curves["cloud_design"].theta.shape == (120, 10)
+
+
+def test_the_true_system_may_be_another():
+    plant = f"{{A: [[1, -0.9], [1, 0.4]], B: [{TRUE}]}}"
+    overrides = [GIVEN, f"simulation={{runs: 60, plant: {plant}, noise: {{relative_std: 0.1}}}}"]
+    result = simulate(load_spec(SPEC, overrides)).result
+    simulation = result["simulation"]
+    design = simulation["inputs"]["design"]
+    assert simulation["true_parameters"]["a1[1]"] == -0.9
+    assert design["mean_estimate"]["a1[1]"] == pytest.approx(-0.9, abs=0.02)
+    assert design["on_design_model"]["within_r_u_limits"][1] > 0.95
+    assert design["within_r_u_limits"][1] > 0.95
+    smallest = min(result["power"]["output"])
+    np.testing.assert_allclose(simulation["true_variance"], 0.01 * smallest * np.eye(2), rtol=1e-9)
+
+
+def test_a_true_system_of_another_structure_has_no_theory():
+    plant = f"{{A: [[1, -0.7, 0.1], [1, 0.4]], B: [{TRUE}]}}"
+    overrides = [GIVEN, f"simulation={{runs: 20, plant: {plant}}}"]
+    design = simulate(load_spec(SPEC, overrides)).result["simulation"]["inputs"]["design"]
+    assert "within_r_u" not in design
+    assert "within_r_adm" in design
+
+
+def test_prior_information_narrows_the_estimates():
+    prior = "experiment.prior={information: [[1.0e+5]], parameters: ['a1[1]']}"
+    given = ["spectrum={given: {type: white, power: 5}}", "simulation={runs: 150}", prior]
+    design = simulate(load_spec(SPEC, given)).result["simulation"]["inputs"]["design"]
+    assert all(0.8 < ratio < 1.2 for ratio in design["rms_over_theory"].values())
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "{type: white, power: 100}",
+        "{type: multisine, frequencies: [0.1, 0.4, 1, 2], amplitudes: [[9, 3, 4, 5], [2, -3, 6, -8]]}",
+    ],
+)
+def test_given_excitations_are_tried(given):
+    overrides = [f"spectrum={{given: {given}}}", "simulation={runs: 100}"]
+    within_wishart(simulate(load_spec(SPEC, overrides)).result["simulation"])
+
+
+def test_the_delivered_record_can_be_tried():
+    overrides = [GIVEN, "simulation={runs: 40, excitation: record}"]
+    result = simulate(load_spec(SPEC, overrides)).result
+    np.testing.assert_allclose(
+        result["simulation"]["inputs"]["design"]["power"]["input"], result["signal"]["power"]
+    )
+
+
+class Elsewhere:
+    """Tasks travel as bytes and are done in reverse order, as other processes may do them."""
+
+    shares_files = True
+
+    def run(self, function, tasks):
+        for sent in reversed([pickle.dumps((function, task)) for task in tasks]):
+            there, task = pickle.loads(sent)
+            yield Finished(task, pickle.loads(pickle.dumps(there(task))))
+
+
+def test_the_result_does_not_depend_on_where_it_is_computed():
+    overrides = [GIVEN, "simulation={runs: 60, seed: 5}"]
+    here = simulate(load_spec(SPEC, overrides)).result["simulation"]
+    there = simulate(load_spec(SPEC, overrides), executor=Elsewhere()).result["simulation"]
+    assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
+
+
+def test_plants_in_s_are_refused():
+    with pytest.raises(SpecError) as caught:
+        simulate(load_spec("specs/two_by_two.yaml"))
+    assert caught.value.complaints[0].code == "not-supported"
+
+
+def model(B):
+    one, ones = (np.ones(1),), ((np.ones(1),) * 2,) * 2
+    rows = tuple(tuple(np.array(entry, dtype=float) for entry in row) for row in B)
+    return PolynomialChannels(rows, one, ones, one, one, np.array([[1.0, 0.4], [0.4, 0.5]]))
+
+
+@pytest.mark.parametrize("kind", ["multisine", "in_phase", "flat"])
+def test_the_information_of_an_excitation_is_that_of_its_records(kind):
+    """A plant without memory to speak of: the finite sample shows little else than the spectrum."""
+    experiment = ChannelExperiment(model([[[0, 1.0], [0, 0.4]], [[0, 0.3], [0, -0.7]]]), 2000)
+    powers = np.array([[[2.0, 0.5j], [-0.5j, 1.0]], [[1.0, 1.0], [1.0, 3.0]]])
+    w = 2 * np.pi * np.array([100, 300]) / 1000
+    excitation = {
+        "multisine": Multisine("m", Lines(w, powers, 1000), "orthogonal", 1.0),
+        "in_phase": InPhase("i", w, np.array([[1.0, 2.0], [3.0, -1.0]]), 1.0),
+        "flat": Flat("f", np.array([2.0, 3.0]), Recipe("prbs")),
+    }[kind]
+    rng = np.random.default_rng(1)
+    records = excitation.draw(20, 2000, rng)
+    found = np.mean([channel_record_information(experiment, r, 1.0) for r in records], axis=0)
+    expected = excitation.information(experiment)
+    np.testing.assert_allclose(found, expected, atol=0.02 * np.abs(expected).max())
+    one = Recorded("r", records[0], 1.0)
+    np.testing.assert_allclose(
+        one.information(experiment), channel_record_information(experiment, records[0], 1.0)
+    )
+
+
+@pytest.mark.slow
+def test_the_design_reaches_the_cramer_rao_bound():
+    overrides = ["simulation={runs: 500, seed: 4}", "experiment.samples=2000", "signal.samples=2000"]
+    simulation = simulate(load_spec(SPEC, overrides)).result["simulation"]
+    within_wishart(simulation)
+    ratios = np.array(list(simulation["inputs"]["design"]["rms_over_theory"].values()))
+    # The error of one ratio of 500 runs is 3.2 %; the rms over ten parameters is within 5 %.
+    assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
