@@ -174,6 +174,14 @@ class ChannelLoop:
             y_x=solved[:, :p, :r], u_x=solved[:, p:, :r], y_e=solved[:, :p, r:], u_e=solved[:, p:, r:]
         )
 
+    def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
+        left, p = at(self._left, unit_circle(w)), self.model.outputs
+        right = np.zeros((left.shape[0], left.shape[1], p), dtype=complex)
+        right[:, :p] = left[:, :p, :p]
+        solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
+        return solved[:, :p], -solved[:, p:]
+
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""
         t = self.responses(w)
