@@ -21,6 +21,9 @@ from inputdesign_cli.accuracy.model_error_mimo import EntryError as EntryError
 from inputdesign_cli.accuracy.model_error_mimo import EntryOfPlant as EntryOfPlant
 from inputdesign_cli.accuracy.model_error_mimo import RelativeEntry as RelativeEntry
 from inputdesign_cli.accuracy.model_error_mimo import active_entries as active_entries
+from inputdesign_cli.accuracy.model_error_norm import LoopSensitivity as LoopSensitivity
+from inputdesign_cli.accuracy.model_error_norm import NormError as NormError
+from inputdesign_cli.accuracy.model_error_norm import RelativeNorm as RelativeNorm
 from inputdesign_cli.accuracy.over_frequency import worst_violation as worst_violation
 from inputdesign_cli.accuracy.requirement import Requirement as Requirement
 from inputdesign_cli.accuracy.requirement import Violation as Violation

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import EntryOfPlant, worst
+from inputdesign_cli.accuracy import worst
 from inputdesign_cli.assemble.analysis import check_excites
 from inputdesign_cli.assemble.channel_curves import (
+    bound_curves_of,
     channel_signal_curves,
     density_curves,
     entry_bound_curves,
@@ -103,9 +104,9 @@ def analyse_channels(spec: Spec) -> Outcome:
     result |= requirements_entry(spec, task, requirements, information, np.zeros(0))
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
-    errors = [r for r in requirements if isinstance(r, EntryOfPlant)]
-    tables["bound"], curves["bound"] = entry_bound_curves(
-        spec, errors or unstated_errors(spec, experiment), information, flat, stated=bool(errors)
+    bound = bound_curves_of(spec, requirements, information, flat)
+    tables["bound"], curves["bound"] = bound or entry_bound_curves(
+        spec, unstated_errors(spec, experiment), information, flat, stated=False
     )
     if isinstance(excitation.basis, DirectedLines):
         tables["spectrum"], curves["spectrum"] = line_curves(spec, excitation.basis, _x(excitation))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import EntryOfPlant
+from inputdesign_cli.accuracy import EntryOfPlant, NormError, Requirement
 from inputdesign_cli.assemble.channels import excitation_band, excitation_symbol, frequency_unit
 from inputdesign_cli.assemble.curves import distinct, frequency_header
 from inputdesign_cli.design.designs import Design
@@ -83,6 +83,48 @@ def line_curves(
     return table, MatrixSpectrumCurves(frequency, powers, lines=True, symbol=symbol)
 
 
+def bound_curves_of(
+    spec: Spec,
+    requirements: Sequence[Requirement],
+    information: Array,
+    white: Array | None,
+    *,
+    label: str = "design",
+) -> tuple[Table, ChannelBoundCurves | BoundCurves] | None:
+    """bound.csv and its plot of those requirements that bound a model error; None when none does.
+
+    `label` says what gave r_u.
+    """
+    entries = [r for r in requirements if isinstance(r, EntryOfPlant)]
+    if entries:
+        return entry_bound_curves(spec, entries, information, white, label=label)
+    for requirement in requirements:
+        if isinstance(requirement, NormError):
+            return _norm_bound_curves(spec, requirement, information, white, label)
+    return None
+
+
+def _norm_bound_curves(
+    spec: Spec, requirement: NormError, information: Array, white: Array | None, label: str
+) -> tuple[Table, BoundCurves]:
+    w = _bound_axis([requirement], information)
+    r_u, r_adm = requirement.error_bound(information, w), requirement.admissible.at(w)
+    G = np.linalg.norm(requirement.experiment.model.plant_at(w), axis=(1, 2))
+    columns = {frequency_header(spec): w / frequency_unit(spec), "r_u": r_u, "r_adm": r_adm, "G_abs": G}
+    compared = None if white is None else requirement.error_bound(white, w)
+    if compared is not None:
+        columns["r_u_white"] = compared
+    return Table(columns), BoundCurves(w / frequency_unit(spec), r_u, G, r_adm, compared, label=label)
+
+
+def _bound_axis(requirements: Sequence[EntryOfPlant | NormError], information: Array) -> Array:
+    band = requirements[0].band
+    lo = max(band[0], 1e-3 * band[1])
+    peaks = [v.frequency for r in requirements for v in r.violations(information, above=0.5)]
+    inside = np.array([w for w in peaks if w is not None and lo <= w <= band[1]])
+    return np.unique(np.concatenate([np.geomspace(lo, band[1], 600), np.linspace(lo, band[1], 300), inside]))
+
+
 def entry_bound_curves(
     spec: Spec,
     requirements: Sequence[EntryOfPlant],
@@ -94,14 +136,9 @@ def entry_bound_curves(
 ) -> tuple[Table, ChannelBoundCurves]:
     """bound.csv and its plot: r_u, r_adm and |G| of every entry over the band of the requirement.
 
-    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing. `label`
-    says what gave r_u.
+    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing.
     """
-    band = requirements[0].band
-    lo = max(band[0], 1e-3 * band[1])
-    peaks = [v.frequency for r in requirements for v in r.violations(information, above=0.5)]
-    inside = np.array([w for w in peaks if w is not None and lo <= w <= band[1]])
-    w = np.unique(np.concatenate([np.geomspace(lo, band[1], 600), np.linspace(lo, band[1], 300), inside]))
+    w = _bound_axis(requirements, information)
     frequency = w / frequency_unit(spec)
     columns: dict[str, Array] = {frequency_header(spec): frequency}
     entries = {}

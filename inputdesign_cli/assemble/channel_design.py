@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from inputdesign_cli.accuracy import Criterion, EntryOfPlant
+from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.assemble.channel_curves import (
+    bound_curves_of,
     channel_optimality_curves,
     channel_signal_curves,
     density_curves,
-    entry_bound_curves,
     line_curves,
 )
 from inputdesign_cli.assemble.channel_record import (
@@ -86,9 +86,9 @@ def _illustrate(
     if not found.x.any():
         return
     white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
-    entries = [r for r in (*problem.requirements, *problem.side) if isinstance(r, EntryOfPlant)]
-    if entries:
-        tables["bound"], curves["bound"] = entry_bound_curves(spec, entries, found.information, white)
+    bound = bound_curves_of(spec, (*problem.requirements, *problem.side), found.information, white)
+    if bound is not None:
+        tables["bound"], curves["bound"] = bound
     optimality = channel_optimality_curves(spec, design)
     if optimality is not None:
         curves["optimality"] = optimality

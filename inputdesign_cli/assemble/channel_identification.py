@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import EntryOfPlant, worst
-from inputdesign_cli.assemble.channel_curves import entry_bound_curves
+from inputdesign_cli.accuracy import worst
+from inputdesign_cli.assemble.channel_curves import bound_curves_of, entry_bound_curves
 from inputdesign_cli.assemble.channel_estimation import (
     blocks_of,
     check_estimable,
@@ -40,6 +40,7 @@ from inputdesign_cli.design.problem import RequirementFactory
 from inputdesign_cli.identification import ChannelEstimate
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import (
+    BoundCurves,
     ChannelBoundCurves,
     ChannelFitCurves,
     ChannelResidualCurves,
@@ -170,15 +171,16 @@ def _pairs(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{name}_{i + 1}{j + 1}": values[:, i, j] for i in range(rows) for j in range(columns)}
 
 
-def _bound(found: ChannelIdentified) -> tuple[Table, ChannelBoundCurves, dict[str, Any]]:
+def _bound(found: ChannelIdentified) -> tuple[Table, ChannelBoundCurves | BoundCurves, dict[str, Any]]:
     spec, experiment, information = found.spec, found.experiment, found.estimate.information
     entry: dict[str, Any] = {"alpha": model_error_alpha(spec, experiment)}
-    stated: tuple[EntryOfPlant, ...] = build_entry_errors(spec, experiment)
+    stated = build_entry_errors(spec, experiment)
     if stated:
         violation = worst([v for error in stated for v in error.violations(information)])
         entry["worst_ratio"] = violation.ratio
         if violation.frequency is not None:
             entry["worst_frequency"] = violation.frequency / found.frequency_unit
-    errors = stated or unstated_errors(spec, experiment)
-    table, curves = entry_bound_curves(spec, errors, information, None, stated=bool(stated), label="data")
+    table, curves = bound_curves_of(spec, stated, information, None, label="data") or entry_bound_curves(
+        spec, unstated_errors(spec, experiment), information, None, stated=False, label="data"
+    )
     return table, curves, entry

@@ -13,26 +13,31 @@ from inputdesign_cli.accuracy import (
     EllipsoidEntryError,
     EntryError,
     EntryVariance,
+    LoopSensitivity,
+    NormError,
     RelativeEntry,
+    RelativeNorm,
     Weighted,
     active_entries,
 )
 from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.assemble.bound_table import read_bound
-from inputdesign_cli.assemble.channels import frequency_unit
-from inputdesign_cli.assemble.experiment import weight
-from inputdesign_cli.assemble.model_error import model_error_alpha
+from inputdesign_cli.assemble.channels import frequency_unit, matrix_controller
+from inputdesign_cli.assemble.experiment import rational, weight
+from inputdesign_cli.assemble.model_error import model_error_alpha, no_feedback
 from inputdesign_cli.assemble.tables import has_column
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import Rational
+from inputdesign_cli.plant import ChannelLoop, ChannelModel, PolynomialChannels, Rational
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer
 
 _ERROR = "accuracy.model_error"
 
 
-def build_entry_errors(spec: Spec, experiment: Any) -> tuple[EntryError | EllipsoidEntryError, ...]:
-    """`accuracy.model_error` for every entry of G, in raw coordinates; empty when it is not asked for.
+def build_entry_errors(
+    spec: Spec, experiment: Any
+) -> tuple[EntryError | EllipsoidEntryError | NormError, ...]:
+    """`accuracy.model_error` for every entry of G, or of its norm; empty when it is not asked for.
 
     Raises:
         SpecError: `not-supported` forms, `admissible-not-positive`.
@@ -41,17 +46,11 @@ def build_entry_errors(spec: Spec, experiment: Any) -> tuple[EntryError | Ellips
     error = spec.accuracy.model_error
     if error is None:
         return ()
-    if error.sensitivity is not None:
-        raise spec.complain(
-            "not-supported",
-            "model_error.sensitivity is that of one sampled loop; with several channels or in continuous "
-            "time the bound is relative, absolute or a table",
-            hint="write relative: 0.05 (of each entry of G), absolute: 0.1 or table: r_adm.csv",
-            key=f"{_ERROR}.sensitivity",
-        )
     band = required_band(spec, experiment, error.band)
     weighted = None if error.weight is None else any_weight(spec, error.weight, f"{_ERROR}.weight")
     alpha = model_error_alpha(spec, experiment)
+    if error.norm == "frobenius" or error.sensitivity is not None:
+        return (_of_the_norm(spec, experiment, alpha, band, weighted),)
     errors: list[EntryError | EllipsoidEntryError] = []
     for i, j in active_entries(experiment.model, band[1]):
         admissible = _admissible(spec, experiment, band, i, j)
@@ -96,6 +95,66 @@ def _over_ellipsoid(
         )
     against: Literal["relative", "absolute"] = "absolute" if error.relative is None else "relative"
     return EllipsoidEntryError(experiment, admissible, alpha, against, band, output=i, input=j)
+
+
+def _of_the_norm(
+    spec: Spec,
+    experiment: Any,
+    alpha: float,
+    band: tuple[float, float],
+    weighted: Rational | ContinuousWeight | None,
+) -> NormError:
+    """The requirement on the Frobenius norm of the error.
+
+    Raises:
+        SpecError: `not-supported`, `no-feedback`, `admissible-not-positive`; an unstable loop to be kept.
+        DataError: the table cannot be used.
+    """
+    error = spec.accuracy.model_error
+    assert error is not None
+    if error.region != "first_order":
+        raise spec.complain(
+            "not-supported",
+            "region: ellipsoid is for the entries of G one by one, not for the norm of the error",
+            hint="use region: first_order, or norm: entry with relative, absolute or table",
+            key=f"{_ERROR}.region",
+        )
+    admissible: AdmissibleError
+    if error.relative is not None:
+        admissible = RelativeNorm(experiment.model, error.relative)
+    elif error.absolute is not None:
+        admissible = Absolute(error.absolute)
+    elif error.table is not None:
+        admissible = read_bound(spec, error.table, band, unit=frequency_unit(spec))
+    else:
+        admissible = _sensitivity(spec, experiment.model)
+    if weighted is not None:
+        admissible = Weighted(admissible, weighted)
+    requirement = NormError(experiment, admissible, alpha, band)
+    check_positive(admissible, requirement.grid)
+    return requirement
+
+
+def _sensitivity(spec: Spec, model: ChannelModel) -> LoopSensitivity:
+    assert spec.accuracy.model_error is not None
+    asked, key = spec.accuracy.model_error.sensitivity, f"{_ERROR}.sensitivity"
+    assert asked is not None
+    if not isinstance(model, PolynomialChannels):
+        raise spec.complain(
+            "not-supported",
+            "model_error.sensitivity is that of a loop around a plant in q^-1, not one in s",
+            hint="write relative: 0.05, absolute: 0.1 or table: r_adm.csv",
+            key=key,
+        )
+    given = asked.controller or spec.experiment.controller
+    assert given is not None  # the spec has been checked
+    loop = ChannelLoop(model, matrix_controller(given))
+    loop.check_stability()
+    if not np.any(loop.controller.numerator):
+        raise no_feedback(spec, key)
+    weight = asked.weight
+    peak = Rational.build([1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)])
+    return LoopSensitivity(loop, peak if weight is None else rational(weight))
 
 
 def _admissible(

@@ -30,6 +30,7 @@ from inputdesign_cli.spec.spectrum import (
     PolynomialSpectrum,
     WhiteSpectrum,
 )
+from inputdesign_cli.spec.transfer import DiscreteTransfer
 from inputdesign_cli.spec.values import depth
 from inputdesign_cli.spectrum import (
     Basis,
@@ -198,13 +199,18 @@ def channel_experiment(spec: Spec) -> ChannelExperiment:
         SpecError: `needs-band`; an unstable or algebraic loop.
     """
     model, controller, loop = build_channel_model(spec), spec.experiment.controller, None
-    if isinstance(controller, ControllerMatrix):
-        assert isinstance(model, PolynomialChannels)
-        loop = ChannelLoop(
-            model, MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
-        )
+    if controller is not None:
+        assert isinstance(model, PolynomialChannels)  # others have been refused
+        loop = ChannelLoop(model, matrix_controller(controller))
         loop.check_stability()
     return ChannelExperiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+
+
+def matrix_controller(controller: DiscreteTransfer | ControllerMatrix) -> MatrixController:
+    """C of the spec as a matrix; a single transfer function is one of one entry."""
+    if isinstance(controller, ControllerMatrix):
+        return MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
+    return MatrixController.build([[controller.numerator]], [[controller.denominator_polynomial]])
 
 
 def frequency_unit(spec: Spec) -> float:

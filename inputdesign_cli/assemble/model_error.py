@@ -19,6 +19,7 @@ from inputdesign_cli.accuracy import (
 from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.assemble.bound_table import read_bound
 from inputdesign_cli.assemble.experiment import rational, weight
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, Rational
 from inputdesign_cli.spec import Spec
@@ -66,6 +67,16 @@ def build_model_error(spec: Spec, experiment: Experiment) -> ModelError | Ellips
     return requirement
 
 
+def no_feedback(spec: Spec, key: str) -> SpecError:
+    """The complaint about a sensitivity without a controller."""
+    return spec.complain(
+        "no-feedback",
+        "the controller is zero: no model error can harm the sensitivity",
+        hint="give the controller of the loop to be kept",
+        key=key,
+    )
+
+
 def model_error_alpha(spec: Spec, experiment: Experiment) -> float:
     """alpha as given, or from the confidence and the number of parameters of G."""
     error = spec.accuracy.model_error
@@ -99,12 +110,7 @@ def _admissible(spec: Spec, experiment: Experiment, band: tuple[float, float]) -
     controller = rational(given)
     Loop(model, controller).check_stability()
     if not np.any(controller.numerator):
-        raise spec.complain(
-            "no-feedback",
-            "the controller is zero: no model error can harm the sensitivity",
-            hint="give the controller of the loop to be kept",
-            key=f"{_KEY}.sensitivity",
-        )
+        raise no_feedback(spec, f"{_KEY}.sensitivity")
     if sensitivity.max_db is not None:
         return Sensitivity(model, controller, Rational.build([10 ** (-sensitivity.max_db / 20)]))
     weight = sensitivity.weight

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, EntryOfPlant, Requirement, worst_violation
+from inputdesign_cli.accuracy import Criterion, EntryOfPlant, NormError, Requirement, worst_violation
 from inputdesign_cli.assemble.channel_curves import channel_spectrum_entry
 from inputdesign_cli.assemble.channels import frequency_unit
 from inputdesign_cli.assemble.curves import distinct
@@ -100,6 +100,8 @@ def requirements_entry(
         listed.append(item)
         if isinstance(requirement, EntryOfPlant):
             item["entry"] = requirement.label
+        elif isinstance(requirement, NormError):
+            item["norm"] = "frobenius"
         if requirement.name == "model_error" and violation.ratio > entry.get("worst_ratio", 0.0):
             entry["worst_ratio"] = violation.ratio
             if violation.frequency is not None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.channels import PolynomialChannels
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.loop import LoopResponse
+from inputdesign_cli.plant.loop import LoopResponse, refuse_unstable
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -145,17 +145,11 @@ class ChannelLoop:
                 hint="put the delay of the plant into B (a leading 0) or into the controller's numerator",
                 key="experiment.controller",
             )
-        poles = self.closed_poles
-        if poles.size and np.abs(poles).max() >= 1.0:
-            worst = poles[int(np.argmax(np.abs(poles)))]
-            raise bad_spec(
-                "unstable-loop",
-                f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
-                f"angle {abs(np.angle(worst)):.4g} rad/sample",
-                hint="check the signs (feedback is negative: u = r - C y), which output each column of the "
-                "controller reads, and that entries of a row with the same poles share one denominator",
-                key="experiment.controller",
-            )
+        refuse_unstable(
+            self.closed_poles,
+            hint="check the signs (feedback is negative: u = r - C y), which output each column of the "
+            "controller reads, and that entries of a row with the same poles share one denominator",
+        )
 
     def responses(self, w: ArrayLike) -> LoopResponse:
         """From r and from e at normalised frequencies `w`: y_x (n, p, r), u_x (n, r, r), y_e (n, p, p), u_e.
@@ -173,6 +167,14 @@ class ChannelLoop:
         return LoopResponse(
             y_x=solved[:, :p, :r], u_x=solved[:, p:, :r], y_e=solved[:, :p, r:], u_e=solved[:, p:, r:]
         )
+
+    def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
+        left, p = at(self._left, unit_circle(w)), self.model.outputs
+        right = np.zeros((left.shape[0], left.shape[1], p), dtype=complex)
+        right[:, :p] = left[:, :p, :p]
+        solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
+        return solved[:, :p], -solved[:, p:]
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""

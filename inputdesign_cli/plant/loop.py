@@ -78,18 +78,11 @@ class Loop:
                 hint="put the delay of the plant into B (a leading 0) or into the controller's numerator",
                 key="experiment.controller",
             )
-        poles = roots_in_z(self.characteristic)
-        radius = np.abs(poles)
-        if radius.size and radius.max() >= 1.0:
-            worst = poles[int(np.argmax(radius))]
-            raise bad_spec(
-                "unstable-loop",
-                f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
-                f"angle {abs(np.angle(worst)):.4g} rad/sample",
-                hint="check the signs (feedback is negative: u = r - C y), the delay in B, and that "
-                "numerator and denominator of the controller are in q^-1, ascending",
-                key="experiment.controller",
-            )
+        refuse_unstable(
+            roots_in_z(self.characteristic),
+            hint="check the signs (feedback is negative: u = r - C y), the delay in B, and that "
+            "numerator and denominator of the controller are in q^-1, ascending",
+        )
 
     def responses(self, w: ArrayLike) -> LoopResponse:
         """Transfer functions at normalised frequencies `w` (n,)."""
@@ -107,3 +100,17 @@ class Loop:
             y_e=F * C * Dc / (D * closed),
             u_e=-F * C * Nc / (D * closed),
         )
+
+
+def refuse_unstable(poles: ComplexArray, *, hint: str) -> None:
+    """Raise `SpecError` (`unstable-loop`) unless all closed-loop poles in z lie inside the unit circle."""
+    if not poles.size or np.abs(poles).max() < 1.0:
+        return
+    worst = poles[int(np.argmax(np.abs(poles)))]
+    raise bad_spec(
+        "unstable-loop",
+        f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
+        f"angle {abs(np.angle(worst)):.4g} rad/sample",
+        hint=hint,
+        key="experiment.controller",
+    )

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
 
 from inputdesign_cli.spec.control import ClosedLoopError
+from inputdesign_cli.spec.controller import Controller
 from inputdesign_cli.spec.experiment import SemidefiniteMatrix, check_names, exactly_one
 from inputdesign_cli.spec.fields import (
     Band,
@@ -38,7 +39,7 @@ class Sensitivity(Section):
         default=None, description="Denominator of W (default 1), or its factors."
     )
     max_db: Positive | None = Field(default=None, description="Largest |S| in dB; stands for a constant W.")
-    controller: DiscreteTransfer | None = Field(
+    controller: Controller | None = Field(
         default=None, description="C of the loop to be kept (default: the controller of the experiment)."
     )
 
@@ -77,6 +78,11 @@ class ModelError(Section):
     )
     band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
     weight: Transfer | None = Field(default=None, description="Weight on the model error (default 1).")
+    norm: Literal["entry", "frobenius"] | None = Field(
+        default=None,
+        description="Of several channels: entry, each entry of G for itself (default), or frobenius, the "
+        "root of the sum of their squares (the only choice for sensitivity).",
+    )
     region: Literal["first_order", "ellipsoid"] = Field(
         default="first_order", description="first_order: linearised; ellipsoid: every model of the ellipsoid."
     )
@@ -92,6 +98,13 @@ class ModelError(Section):
                 "keep one of the two",
                 "alpha",
                 at_key=True,
+            )
+        if self.sensitivity is not None and self.norm == "entry":
+            findings.add(
+                "conflicting-keys",
+                "{key} is entry, but a sensitivity depends on all entries of the error together",
+                "remove norm, or write frobenius",
+                "norm",
             )
         findings.stop()
         return self

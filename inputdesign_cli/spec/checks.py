@@ -15,6 +15,7 @@ Check = Callable[[Spec], Iterator[Finding]]
 CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (checks_plant.stable_unless_controlled, ("plant", "experiment.controller")),
     (checks_plant.controller_fits, ("plant", "experiment.controller")),
+    (checks_plant.kept_loop_fits, ("plant", "accuracy.model_error.sensitivity")),
     (checks_plant.noise_fits, ("plant", "noise")),
     (checks_plant.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
     (checks_plant.true_noise_fits, ("plant", "simulation.noise")),

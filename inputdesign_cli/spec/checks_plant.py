@@ -39,9 +39,19 @@ def _stable_A(spec: Spec, plant: object, path: Path) -> Iterator[Finding]:  # no
 
 def controller_fits(spec: Spec) -> Iterator[Finding]:
     """A controller works in discrete time and has a row an input and a column an output of the plant."""
-    if not spec.closed_loop:
-        return
-    path = ("experiment", "controller")
+    if spec.experiment.controller is not None:
+        yield from _controller(spec, spec.experiment.controller, ("experiment", "controller"))
+
+
+def kept_loop_fits(spec: Spec) -> Iterator[Finding]:
+    """So has the controller of a sensitivity that is to be kept."""
+    error = spec.accuracy.model_error
+    if error is not None and error.sensitivity is not None and error.sensitivity.controller is not None:
+        where = ("accuracy", "model_error", "sensitivity", "controller")
+        yield from _controller(spec, error.sensitivity.controller, where)
+
+
+def _controller(spec: Spec, controller: DiscreteTransfer | ControllerMatrix, path: Path) -> Iterator[Finding]:
     plant = spec.plant
     if isinstance(plant, RegressionPlant):
         yield Finding("unsuitable-key", "{key} does not go with a regression", "remove the controller", path)
@@ -54,7 +64,7 @@ def controller_fits(spec: Spec) -> Iterator[Finding]:
         )
     if isinstance(plant, RegressionPlant):
         return
-    controller, channels = spec.experiment.controller, (plant.inputs, plant.outputs)
+    channels = (plant.inputs, plant.outputs)
     if not isinstance(controller, ControllerMatrix):
         if channels != (1, 1):
             yield Finding(

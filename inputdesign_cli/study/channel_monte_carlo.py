@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.assemble.channel_analysis import analyse_channels
-from inputdesign_cli.assemble.channel_curves import entry_bound_curves
+from inputdesign_cli.assemble.channel_curves import bound_curves_of, entry_bound_curves
 from inputdesign_cli.assemble.channel_design import designed_channels
 from inputdesign_cli.assemble.channel_estimation import check_estimable
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, unstated_errors
@@ -29,7 +29,7 @@ from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.true_system import true_channel_experiment
 from inputdesign_cli.design.problem import weights_of
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.outcome import ChannelErrorBandCurves, Outcome
+from inputdesign_cli.outcome import ChannelErrorBandCurves, ErrorBandCurves, Outcome
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.realisation import Simulation
@@ -144,10 +144,16 @@ def _promise(spec: Spec, nominal: ChannelExperiment, outcome: Outcome, informati
     table = outcome.tables.get("bound")
     if table is None:
         stated = build_entry_errors(spec, experiment)
-        errors = stated or unstated_errors(spec, experiment)
-        table, _ = entry_bound_curves(spec, errors, information, None, stated=bool(stated))
+        table, _ = bound_curves_of(spec, stated, information, None) or entry_bound_curves(
+            spec, unstated_errors(spec, experiment), information, None, stated=False
+        )
     columns = dict(table.columns)
-    w = np.asarray(next(iter(columns.values()))) * frequency_unit(spec)
+    w, alpha = (
+        np.asarray(next(iter(columns.values()))) * frequency_unit(spec),
+        model_error_alpha(spec, experiment),
+    )
+    if "r_u" in columns:  # of the norm of all entries
+        return Promise(w, columns["r_u"], columns.get("r_adm"), alpha)
     places = [name.removeprefix("r_u_") for name in columns if re.fullmatch(r"r_u_\d+", name)]
     stacked = {
         kind: np.concatenate([columns[f"{kind}_{place}"] for place in places])
@@ -159,14 +165,23 @@ def _promise(spec: Spec, nominal: ChannelExperiment, outcome: Outcome, informati
         w=np.tile(w, len(places)),
         r_u=stacked["r_u"],
         r_adm=stacked.get("r_adm"),
-        alpha=model_error_alpha(spec, experiment),
+        alpha=alpha,
         entries=entries,
     )
 
 
-def _error_bands(spec: Spec, trials: ChannelTrials, promise: Promise, name: str) -> ChannelErrorBandCurves:
-    assert promise.entries is not None
+def _error_bands(
+    spec: Spec, trials: ChannelTrials, promise: Promise, name: str
+) -> ChannelErrorBandCurves | ErrorBandCurves:
     errors = trials.errors(promise)
+    if promise.entries is None:
+        return error_bands(
+            errors,
+            frequency=promise.w / frequency_unit(spec),
+            r_u=promise.r_u if name == "design" else None,
+            r_adm=promise.r_adm,
+            name=name,
+        )
     panels = {}
     for i, j in np.unique(promise.entries, axis=0):
         own = np.all(promise.entries == (i, j), axis=1)

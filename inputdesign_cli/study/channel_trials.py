@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Absolute, EntryError
+from inputdesign_cli.accuracy import Absolute, EntryError, NormError
 from inputdesign_cli.assemble.channel_estimation import estimated, estimated_runs, moved
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import ChannelModel, PolynomialChannels, caused_by_inputs, caused_by_noise
@@ -51,20 +51,23 @@ class ChannelTrials:
         return self.true.model.names == self.model.names
 
     def errors(self, promise: Promise) -> Array:
-        """|G_hat - G_0| (runs, n) at the frequencies and entries of the promise."""
-        assert promise.entries is not None
+        """|G_hat - G_0| (runs, n) at the frequencies and entries of the promise, or its Frobenius norm."""
         w, where = np.unique(promise.w, return_inverse=True)
-        rows, columns = promise.entries.T
         true = self.true.model.plant_at(w)
         parts = []
         for theta in self.theta:
             off = np.abs(moved(self.model, theta, self.model.covariance).plant_at(w) - true)
-            parts.append(off[where, rows, columns])
+            if promise.entries is None:
+                parts.append(np.linalg.norm(off, axis=(1, 2))[where])
+            else:
+                parts.append(off[where, *promise.entries.T])
         return np.array(parts)
 
     def bound(self, promise: Promise, information: Array) -> Array:
         """r_u (n,) on the true system at the frequencies and entries of the promise."""
-        assert promise.entries is not None
+        if promise.entries is None:
+            norm = NormError(self.true, Absolute(1.0), promise.alpha, self.true.band)
+            return norm.error_bound(information, promise.w)
         r_u = np.empty(promise.w.size)
         for i, j in np.unique(promise.entries, axis=0):
             own = np.all(promise.entries == (i, j), axis=1)

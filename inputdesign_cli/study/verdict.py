@@ -26,7 +26,8 @@ class Promise:
     """What the design promises over frequency: r_u and, if one is asked for, r_adm, (n,) each.
 
     `w` (n,) is in the unit of the experiment. Several entries of G stand one after the other, each over its
-    own frequencies: `entries` holds the entry (output, input) of each value, (n, 2).
+    own frequencies: `entries` holds the entry (output, input) of each value, (n, 2). Without it the promise
+    is about the one entry of G, or the Frobenius norm of all.
     """
 
     w: Array
