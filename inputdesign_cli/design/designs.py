@@ -24,8 +24,6 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, DirectedLines, FirBasis, LinesBasis, flat_basis, free_lines
 
 _ANY_SPECTRUM_TOLERANCE = 1e-6
-# Directions across channels are found one a round: the last digits of this bound would cost most of the time.
-_DIRECTED_TOLERANCE = 1e-4
 _KEEPS = 1e-9
 _FAR_BELOW = 1e-12
 _UNEXCITED = 1e-13
@@ -91,8 +89,7 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     result = _solve(problem, start, tolerance)
     if isinstance(question.basis, LinesBasis | DirectedLines) and question.basis.free:
         return Design(problem, white, white_level, within, result, result)
-    directed = question.experiment.inputs > 1
-    loose = max(tolerance, _DIRECTED_TOLERANCE if directed else _ANY_SPECTRUM_TOLERANCE)
+    loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
     anything = _solve(anywhere, (power or 1.0) * _flat(anywhere.basis), loose)
     return Design(problem, white, white_level, within, result, anything)
 

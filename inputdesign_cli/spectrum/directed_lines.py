@@ -23,6 +23,9 @@ _FIRST_LINES = 24
 _MOST_NEW = 16
 # Two atoms at one frequency are the same when their directions agree this closely.
 _SAME = 1e-12
+# An atom is in use from this share of the cost, and near another within this distance (band and turn).
+_USED = 1e-4
+_NEAR = 0.2
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,8 @@ class DirectedLines:
         self, face: Face, y: Array, directions: Array, price: Functional
     ) -> tuple[DirectedLines, Face]:
         """The atoms so far and the new ones; x of the old basis is the head of x of the new."""
-        fresh = [row for row in directions if self._is_new(float(row[0].real), row[1:])]
+        rows = [*directions, *self._around(y, directions)]
+        fresh = [row for row in rows if self._is_new(float(row[0].real), row[1:])]
         if not fresh:
             return self, face
         added = np.array(fresh)
@@ -109,6 +113,32 @@ class DirectedLines:
         at = matrices(price.density(added[:, 0].real))
         costs = np.einsum("na,nab,nb->n", added[:, 1:].conj(), at, added[:, 1:]).real
         return grown, grown.first_face(Functional(np.concatenate([price.vector, costs]), price.density))
+
+    def _around(self, y: Array, atoms: NDArray) -> list[NDArray]:
+        """Halfway from the nearest atom in use to each of the new ones, and as far beyond.
+
+        Each round moves the best frequencies and directions a little less than the round before; what lies
+        on both sides of a new atom saves a quarter of the rounds.
+        """
+        used = np.flatnonzero(y > _USED * y.sum())
+        span, found = max(float(np.ptp(self.allowed)), np.finfo(float).tiny), []
+        for atom in atoms if used.size else []:
+            w, v = float(atom[0].real), atom[1:]
+            apart = np.abs(self.frequencies[used] - w) / span
+            turned = 1.0 - np.abs(self.directions[used].conj() @ v) ** 2
+            distance = np.where(self.free | (apart == 0.0), apart + turned, np.inf)
+            nearest = used[int(np.argmin(distance))]
+            if distance.min() > _NEAR:
+                continue
+            old = self.directions[nearest]
+            phase = np.vdot(old, v)
+            old = old * phase / abs(phase)
+            for share in (0.5, 1.5):
+                at = self.frequencies[nearest] + share * (w - self.frequencies[nearest])
+                turn = old + share * (v - old)
+                if self.allowed[0] <= at <= self.allowed[-1]:
+                    found.append(np.concatenate([[at], turn / np.linalg.norm(turn)]))
+        return found
 
     def _is_new(self, frequency: float, direction: ComplexArray) -> bool:
         near = np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300)
