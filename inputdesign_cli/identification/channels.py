@@ -29,7 +29,7 @@ from inputdesign_cli.plant import PolynomialChannels, caused_by_inputs, stable_o
 from inputdesign_cli.plant.polynomial import Array
 
 # Many runs share the cost of a pass over time; with more than this the blocks no longer fit the cache.
-_BATCH = 128
+_BATCH = 256
 
 
 @dataclass(frozen=True)
