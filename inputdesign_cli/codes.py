@@ -484,8 +484,9 @@ CODES: dict[str, Explanation] = {
     ),
     "nothing-to-simulate": Explanation(
         "There is no experiment to simulate",
-        "What is asked is known already without any excitation, so that the design is to do nothing.",
-        "Ask for more accuracy, or give an excitation under spectrum.given.",
+        "What is asked is known already without any excitation, so that the design is to do nothing; or the "
+        "record of the excitation would be too short to hold its sinusoids.",
+        "Ask for more accuracy or a longer signal, or give an excitation under spectrum.given.",
     ),
     "too-few-samples": Explanation(
         "There are too few samples for the number of parameters",
@@ -507,8 +508,8 @@ CODES: dict[str, Explanation] = {
     "noise-free-data": Explanation(
         "The data have no noise",
         "The model reproduces the output to rounding, so that the variance of the noise, and with it every "
-        "confidence region, is zero.",
-        "Use recorded data, or add noise to simulated ones.",
+        "confidence region, is zero. Or the residuals of one output follow from those of others.",
+        "Use recorded data, or add noise to simulated ones; leave out outputs that are computed from others.",
     ),
     "data-not-uniform": Explanation(
         "The samples are not taken at the sample time of the spec",

@@ -164,7 +164,7 @@ def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedChannels:
 
 
 def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
-    """The record as given, or one of the given spectrum (n, r); None for a table, or a record too short."""
+    """The record as given, or one of the given spectrum (n, r); None for a record too short."""
     if excitation.samples is not None:
         return excitation.samples
     basis, samples = excitation.basis, spec.signal_samples
@@ -176,8 +176,6 @@ def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
         assert isinstance(spec.spectrum.given, GivenMultisine)
         frequencies, amplitudes = given_sinusoids(spec, spec.spectrum.given)
         return in_phase_record(frequencies * step, amplitudes, samples, rng)
-    if excitation.kind != "white":
-        return None
     lines = given_lines(spec, excitation, samples)
     return None if lines is None else multisine_record(lines, samples, rng, channel_phases(spec))
 

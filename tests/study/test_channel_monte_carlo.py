@@ -118,6 +118,17 @@ def test_given_excitations_are_tried(given):
     within_wishart(simulate(load_spec(SPEC, overrides)).result["simulation"])
 
 
+def test_a_given_table_is_tried(tmp_path):
+    table = tmp_path / "phi.csv"
+    table.write_text(
+        "frequency,phi_11,phi_12_re,phi_12_im,phi_22\n0,9,3,0,4\n3.1416,9,3,0,4\n", encoding="utf-8"
+    )
+    overrides = [f"spectrum={{given: {{type: table, file: {table}}}}}", "simulation={runs: 100}"]
+    simulation = simulate(load_spec(SPEC, overrides)).result["simulation"]
+    within_wishart(simulation)
+    np.testing.assert_allclose(simulation["inputs"]["design"]["power"]["input"], [9.0, 4.0], rtol=0.01)
+
+
 def test_the_delivered_record_can_be_tried():
     overrides = [GIVEN, "simulation={runs: 40, excitation: record}"]
     result = simulate(load_spec(SPEC, overrides)).result
