@@ -98,6 +98,9 @@ class ChannelSpectrumCurves:
     eigenvalues: Array  # (n, r), ascending
     lines: bool = False
     symbol: str = "u"
+    record: Mapping[str, Array] = field(
+        default_factory=dict
+    )  # "11" -> (n,) smoothed periodogram of the record
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import EntryOfPlant
 from inputdesign_cli.assemble.channels import excitation_band, frequency_unit
 from inputdesign_cli.assemble.curves import distinct, frequency_header
+from inputdesign_cli.assemble.signal_files import smoothed_periodogram, with_periodogram
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
     ChannelSpectrumCurves,
     OptimalityCurves,
-    SignalCurves,
     SpectrumCurves,
     Table,
 )
@@ -97,10 +98,12 @@ def entry_bound_curves(
     white: Array | None,
     *,
     stated: bool = True,
+    record: Array | None = None,
 ) -> tuple[Table, ChannelBoundCurves]:
     """bound.csv and its plot: r_u, r_adm and |G| of every entry over the band of the requirement.
 
-    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing.
+    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing. `record` is
+    the information of the record to be applied.
     """
     band = requirements[0].band
     lo = max(band[0], 1e-3 * band[1])
@@ -121,7 +124,10 @@ def entry_bound_curves(
         compared = None if white is None else requirement.error_bound(white, w)
         if compared is not None:
             columns[f"r_u_white_{i + 1}{j + 1}"] = compared
-        entries[requirement.label] = BoundCurves(frequency, r_u, G, r_adm, compared)
+        applied = None if record is None else requirement.error_bound(record, w)
+        if applied is not None:
+            columns[f"r_u_record_{i + 1}{j + 1}"] = applied
+        entries[requirement.label] = BoundCurves(frequency, r_u, G, r_adm, compared, r_u_record=applied)
     return Table(columns), ChannelBoundCurves(entries)
 
 
@@ -142,16 +148,22 @@ def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | 
     return OptimalityCurves(w / unit, ratio, distinct(np.maximum(support, w[0])) / unit)
 
 
-def channel_signal_curves(spec: Spec, record: Array) -> tuple[Table, SignalCurves]:
-    """signal.csv and its plot: time, u1, u2, .."""
-    time = spec.sample_time * np.arange(len(record), dtype=np.float64)
-    offset = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), record.shape[1])
-    channels = {f"u{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
-    limits = {}
-    if spec.limits.amplitude is not None and spec.limits.amplitude.input is not None:
-        most = np.broadcast_to(np.asarray(spec.limits.amplitude.input, dtype=float), record.shape[1])
-        limits = {f"u{i + 1}": (offset[i] - most[i], offset[i] + most[i]) for i in range(most.size)}
-    return Table({f"time_{spec.time_unit}": time, **channels}), SignalCurves(time, channels, limits)
+def with_channel_periodograms(
+    table: Table, curves: SpectrumCurves | ChannelSpectrumCurves, spec: Spec, samples: Array
+) -> tuple[Table, SpectrumCurves | ChannelSpectrumCurves]:
+    """The spectrum with the smoothed periodogram of each input over it; lines are left as they are."""
+    if isinstance(curves, SpectrumCurves):
+        return with_periodogram(table, curves, spec, samples[:, 0])
+    if curves.lines:
+        return table, curves
+    shown, columns = {}, {}
+    for a, column in enumerate(samples.T):
+        w, smooth = smoothed_periodogram(column, spec.sample_time)
+        # Per rad/sample in discrete time, per rad per time unit in continuous time, as the design.
+        density = smooth * (1.0 if spec.plant.sampled else spec.sample_time)
+        shown[f"{a + 1}{a + 1}"] = np.interp(curves.frequency, w, density)
+        columns[f"phi_record_{a + 1}{a + 1}"] = shown[f"{a + 1}{a + 1}"]
+    return Table({**table.columns, **columns}), replace(curves, record=shown)
 
 
 def channel_spectrum_entry(spec: Spec, basis: object, x: Array) -> dict[str, Any]:

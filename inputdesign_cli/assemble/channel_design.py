@@ -5,23 +5,29 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
+
 from inputdesign_cli.accuracy import Criterion, EntryOfPlant
 from inputdesign_cli.assemble.channel_curves import (
     channel_optimality_curves,
-    channel_signal_curves,
     density_curves,
     entry_bound_curves,
     line_curves,
+    with_channel_periodograms,
 )
 from inputdesign_cli.assemble.channel_record import channel_signal_entry, make_channel_record
 from inputdesign_cli.assemble.channel_task import build_channel_task
+from inputdesign_cli.assemble.channels import record_step
 from inputdesign_cli.assemble.design import by_exchange, check_length, plain_errors
 from inputdesign_cli.assemble.ellipses import experiment_ellipses
 from inputdesign_cli.assemble.factor_columns import restrict_columns
+from inputdesign_cli.assemble.record import record_notes
 from inputdesign_cli.assemble.result import design_result, experiment_of
+from inputdesign_cli.assemble.signal_files import other_files, signal_curves
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.signal import Record, channel_record_information
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spectrum import DirectedLines, LinesBasis
 
@@ -51,19 +57,28 @@ def solve_channels(spec: Spec) -> Outcome:
     assert isinstance(experiment, ChannelExperiment)
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
-    _illustrate(spec, design, experiment, tables, curves)
     record = make_channel_record(spec, design, experiment)
+    _illustrate(spec, design, experiment, record, tables, curves)
+    files: dict[str, bytes] = {}
     if record is not None:
         result["signal"] = channel_signal_entry(spec, design, experiment, record)
-        tables["signal"], curves["signal"] = channel_signal_curves(spec, record.samples)
+        tables["signal"], curves["signal"] = signal_curves(spec, record.samples)
+        tables["spectrum"], curves["spectrum"] = with_channel_periodograms(
+            tables["spectrum"], curves["spectrum"], spec, record.samples
+        )
+        files = other_files(spec, record.samples)
+        notes = record_notes(spec, experiment.samples, record)
+        if notes:
+            result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
-    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves)
+    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 
 
 def _illustrate(
     spec: Spec,
     design: Design,
     experiment: ChannelExperiment,
+    record: Record | None,
     tables: dict[str, Any],
     curves: dict[str, Any],
 ) -> None:
@@ -77,7 +92,12 @@ def _illustrate(
     white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
     entries = [r for r in (*problem.requirements, *problem.side) if isinstance(r, EntryOfPlant)]
     if entries:
-        tables["bound"], curves["bound"] = entry_bound_curves(spec, entries, found.information, white)
+        known = None
+        if record is not None and np.isfinite(record.worst_ratio):
+            known = channel_record_information(experiment, record.samples, record_step(spec))
+        tables["bound"], curves["bound"] = entry_bound_curves(
+            spec, entries, found.information, white, record=known
+        )
     optimality = channel_optimality_curves(spec, design)
     if optimality is not None:
         curves["optimality"] = optimality

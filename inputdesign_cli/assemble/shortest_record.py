@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.errors import Complaint, InfeasibleError
 from inputdesign_cli.signal import Record
@@ -19,7 +18,7 @@ _FINE = 0.01
 
 
 def shortest_record(
-    spec: Spec, task: Task, design: Design, missed: Record, block: int, made: Callable[..., Record]
+    spec: Spec, design: Design, missed: Record, block: int, made: Callable[..., Record]
 ) -> Record:
     """For `shortest_experiment` the longer record; otherwise the error that says how long it would be.
 
@@ -28,10 +27,10 @@ def shortest_record(
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
-    found = _search(missed.samples.size, block, made)
+    found = _search(len(missed.samples), block, made)
     seeking = design.problem.goal == "samples" and spec.signal.samples is None
     most = spec.limits.samples
-    if seeking and found is not None and (most is None or found.samples.size <= most):
+    if seeking and found is not None and (most is None or len(found.samples) <= most):
         return found
     raise _complaint(spec, design, missed, found)
 
@@ -56,6 +55,11 @@ def _search(start: int, block: int, made: Callable[..., Record]) -> Record | Non
     return found
 
 
+def _power(record: Record) -> float:
+    """Of all inputs."""
+    return float(np.sum(np.mean(record.samples**2, axis=0)))
+
+
 def _rounded(length: float, block: int) -> int:
     return int(np.ceil(length / block)) * block
 
@@ -64,10 +68,10 @@ def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None)
     limits = spec.limits
     stated = [name for name in ("amplitude", "rate") if getattr(limits, name) is not None]
     names = " and ".join(f"limits.{name}" for name in stated)
-    size = missed.samples.size
+    size = len(missed.samples)
     message = (
         f"no record of {size} samples within {names} meets the accuracy: the best found reaches "
-        f"r_u / r_adm = {missed.worst_ratio:.4g} with power {np.mean(missed.samples**2):.4g}"
+        f"r_u / r_adm = {missed.worst_ratio:.4g} with power {_power(missed):.4g}"
         if np.isfinite(missed.worst_ratio)
         else f"no record of {size} samples within {names} excites every parameter"
     )
@@ -75,10 +79,10 @@ def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None)
         hint = f"raise the limits: {_LONGEST} times as many samples were not enough either"
     else:
         hint = (
-            f"{found.samples.size} samples can (power {np.mean(found.samples**2):.4g}): set "
+            f"{len(found.samples)} samples can (power {_power(found):.4g}): set "
             f"experiment.samples and signal.samples, raise the limits, or loosen the accuracy"
         )
-        if limits.samples is not None and found.samples.size > limits.samples:
+        if limits.samples is not None and len(found.samples) > limits.samples:
             hint += f"; limits.samples is {limits.samples}"
     key = f"limits.{stated[0]}"
     return InfeasibleError(Complaint("limits-too-tight", message, hint, key, spec.locate(key)))

@@ -1,9 +1,13 @@
-"""`signal:` and the limits on single samples -> recipe and bounds of the record (one input)."""
+"""`signal:` and the limits on single samples -> recipe and bounds of the record."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from inputdesign_cli.assemble.channels import has_channels
 from inputdesign_cli.design.limits import PowerLimit
-from inputdesign_cli.signal import Bounds, Quantiser, Recipe
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal import Bounds, ChannelBounds, Quantiser, Recipe
 from inputdesign_cli.signal.recipe import LEVELLED, Method, Phases
 from inputdesign_cli.spec import Spec
 
@@ -12,6 +16,7 @@ _PATIENCE = 4  # times as many at most, where noise happens to fit badly
 # Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
 _OPTIMISED_CANDIDATES = 4
 _STEPS_ROUNDING = 1e-12
+SHORTEST_BLOCK = 8  # values
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
@@ -32,31 +37,60 @@ def build_recipe(spec: Spec) -> Recipe:
         hold=signal.hold or 1,
         ramp=signal.ramp or 0,
         bits=signal.bits,
-        level=_one(signal.amplitudes),
-        quantiser=build_quantiser(spec),
+        level=None if signal.amplitudes is None else _level(spec, signal.amplitudes),
+        quantiser=None if spec.plant.inputs > 1 else build_quantisers(spec)[0],
         candidates=candidates,
         most_candidates=_PATIENCE * candidates if patient else candidates,
         seed=signal.seed or 0,
     )
 
 
-def build_quantiser(spec: Spec) -> Quantiser | None:
-    """The converter, if there is one."""
-    stated = spec.signal.quantisation
+def _level(spec: Spec, amplitudes: float | tuple[float, ...]) -> float | Array:
+    return _one(amplitudes) if spec.plant.inputs == 1 else per_channel(amplitudes, spec.plant.inputs)
+
+
+def build_quantisers(spec: Spec) -> list[Quantiser | None]:
+    """The converter of each input; all have the same number of bits."""
+    stated, inputs = spec.signal.quantisation, spec.plant.inputs
     if stated is None:
-        return None
-    return Quantiser(stated.bits, stated.range, _one(spec.signal.offset) or 0.0)
+        return [None] * inputs
+    spans = per_channel(stated.range, inputs)
+    offsets = per_channel(spec.signal.offset or 0.0, inputs)
+    return [
+        Quantiser(stated.bits, float(span), float(offset))
+        for span, offset in zip(spans, offsets, strict=True)
+    ]
 
 
 def build_bounds(spec: Spec, power_limits: list[PowerLimit]) -> Bounds:
     """What the record may not exceed."""
     amplitude = spec.limits.amplitude
     return Bounds(
-        amplitude=None if amplitude is None else _one(amplitude.input),
-        rate=_one(spec.limits.rate),
-        output=None if amplitude is None else _one(amplitude.output),
+        amplitude=None if amplitude is None or amplitude.input is None else _one(amplitude.input),
+        rate=None if spec.limits.rate is None else _one(spec.limits.rate),
+        output=None if amplitude is None or amplitude.output is None else _one(amplitude.output),
         powers=tuple((limit.kind, limit.bound) for limit in power_limits if limit.upper),
     )
+
+
+def build_channel_bounds(spec: Spec, power_limits: list[PowerLimit]) -> ChannelBounds:
+    """What a record of several inputs may not exceed, channel by channel."""
+    amplitude, rate = spec.limits.amplitude, spec.limits.rate
+    inputs, outputs = spec.plant.inputs, spec.plant.outputs
+    most = (None, None) if amplitude is None else (amplitude.input, amplitude.output)
+    return ChannelBounds(
+        amplitude=None if most[0] is None else per_channel(most[0], inputs),
+        rate=None if rate is None else per_channel(rate, inputs),
+        output=None if most[1] is None else per_channel(most[1], outputs),
+        powers=tuple((limit.kind, limit.channel, limit.bound) for limit in power_limits if limit.upper),
+    )
+
+
+def operating_points(spec: Spec) -> Array:
+    """(r,): the offset of each input, or the value of its converter next to it."""
+    offsets = per_channel(spec.signal.offset or 0.0, spec.plant.inputs)
+    pairs = zip(build_quantisers(spec), offsets, strict=True)
+    return np.array([float(offset) if q is None else q.operating_point for q, offset in pairs])
 
 
 def check_signal(spec: Spec) -> None:
@@ -69,7 +103,6 @@ def check_signal(spec: Spec) -> None:
             `no-sample-rate` for a WAV file of a sampling rate that is not a whole number of hertz.
     """
     recipe = build_recipe(spec)
-    bounds = build_bounds(spec, [])
     samples = spec.signal_samples
     fixed = spec.goal != "shortest_experiment" or spec.signal.samples is not None
     if fixed and samples % recipe.block:
@@ -84,10 +117,11 @@ def check_signal(spec: Spec) -> None:
             hint=f"write signal.samples: {nearest}, or another number of periods",
             key=key,
         )
-    if fixed and samples // recipe.block < 2:
+    least, period = _least_period(spec), samples // recipe.block
+    if fixed and recipe.block > 1 and period < least:
         raise spec.complain(
             "conflicting-keys",
-            "one period has fewer than two values",
+            f"one period has {period} {'value' if period == 1 else 'values'}, and needs at least {least}",
             hint="ask for more samples, fewer periods or a shorter hold",
             key="signal.periods" if recipe.periods > 1 else "signal.hold",
         )
@@ -106,10 +140,15 @@ def check_signal(spec: Spec) -> None:
             key="signal.ramp",
         )
     _check_harmonics(spec, recipe, samples if fixed else None)
-    _check_level(spec, recipe, bounds)
+    _check_register(spec, recipe)
     _check_files(spec)
-    if recipe.quantiser is not None:
-        _check_converter(spec, recipe.quantiser, bounds)
+    bounds = build_channel_bounds(spec, [])
+    for channel, quantiser in enumerate(build_quantisers(spec)):
+        amplitude = None if bounds.amplitude is None else float(bounds.amplitude[channel])
+        rate = None if bounds.rate is None else float(bounds.rate[channel])
+        _check_level(spec, channel, amplitude)
+        if quantiser is not None:
+            _check_converter(spec, quantiser, amplitude, rate)
 
 
 def _check_harmonics(spec: Spec, recipe: Recipe, samples: int | None) -> None:
@@ -126,18 +165,38 @@ def _check_harmonics(spec: Spec, recipe: Recipe, samples: int | None) -> None:
         )
 
 
-def _check_level(spec: Spec, recipe: Recipe, bounds: Bounds) -> None:
-    most = bounds.amplitude if not spec.closed_loop else None
-    if recipe.level is not None and most is not None and recipe.level > most:
+def _least_period(spec: Spec) -> int:
+    """Values that a period must have: two, and eight in every block of a record of several inputs."""
+    return SHORTEST_BLOCK * spec.plant.inputs if has_channels(spec) else 2
+
+
+def _check_register(spec: Spec, recipe: Recipe) -> None:
+    """Several inputs are shifted against each other by parts of one sequence."""
+    if recipe.method == "prbs" and recipe.bits is not None and 2**recipe.bits - 1 < _least_period(spec):
+        raise spec.complain(
+            "out-of-range",
+            f"a register of {recipe.bits} bits repeats after {2**recipe.bits - 1} values, too few for "
+            f"{spec.plant.inputs} inputs",
+            hint="take more bits, or remove the key",
+            key="signal.bits",
+        )
+
+
+def _check_level(spec: Spec, channel: int, most: float | None) -> None:
+    if spec.signal.amplitudes is None or most is None or spec.closed_loop:
+        return
+    level = float(per_channel(spec.signal.amplitudes, spec.plant.inputs)[channel])
+    if level > most:
         raise spec.complain(
             "conflicting-keys",
-            f"amplitudes is {recipe.level:g}, above limits.amplitude {most:g}",
+            f"amplitudes is {level:g}, above limits.amplitude {most:g}"
+            + (f" of input {channel + 1}" if spec.plant.inputs > 1 else ""),
             hint="lower it, or remove it: the tool finds the level that the accuracy needs",
             key="signal.amplitudes",
         )
 
 
-def _check_converter(spec: Spec, quantiser: Quantiser, bounds: Bounds) -> None:
+def _check_converter(spec: Spec, quantiser: Quantiser, amplitude: float | None, rate: float | None) -> None:
     step = quantiser.step
     if quantiser.room() < step:
         raise spec.complain(
@@ -147,7 +206,7 @@ def _check_converter(spec: Spec, quantiser: Quantiser, bounds: Bounds) -> None:
             hint="move the offset, or widen quantisation.range",
             key="signal.offset",
         )
-    for key, bound in (("limits.amplitude", bounds.amplitude), ("limits.rate", bounds.rate)):
+    for key, bound in (("limits.amplitude", amplitude), ("limits.rate", rate)):
         if bound is not None and not spec.closed_loop and bound * (1 + _STEPS_ROUNDING) < step:
             raise spec.complain(
                 "coarse-converter",
@@ -182,9 +241,16 @@ def _method(spec: Spec) -> Method:
         return signal.type
     if signal.phases is not None or signal.lines is not None:
         return "multisine"
-    return "prbs" if signal.bits is not None else "filtered_noise"
+    if signal.bits is not None:
+        return "prbs"
+    return "multisine" if has_channels(spec) else "filtered_noise"
 
 
-def _one(value: float | tuple[float, ...] | None) -> float | None:
+def per_channel(value: float | tuple[float, ...], channels: int) -> Array:
+    """(channels,): a number holds for every channel."""
+    return np.broadcast_to(np.asarray(value, dtype=float), channels)
+
+
+def _one(value: float | tuple[float, ...]) -> float:
     """The entry for the only channel."""
     return value[0] if isinstance(value, tuple) else value

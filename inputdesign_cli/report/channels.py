@@ -30,6 +30,13 @@ def draw_channel_spectrum(curves: ChannelSpectrumCurves, path: Path, time_unit: 
         for number, (name, values) in enumerate(list(curves.moduli.items())[:MOST]):
             label = rf"$|\Phi_{{{name}}}|$"
             handles += _curve(above, w, values, PALETTE[number], STYLES[number % 4], label, curves.lines)
+        if curves.record:
+            drawn = [
+                above.plot(w, values, color=GREY, linewidth=0.8, zorder=1)
+                for values in curves.record.values()
+            ]
+            drawn[0][0].set_label("record, smoothed")
+            handles += drawn[0]
         what = "power of each line" if curves.lines else rf"density of ${curves.symbol}$"
         above.set_ylabel(what)
         _scale(above, np.concatenate(list(curves.moduli.values())))

@@ -2,54 +2,104 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # e^-32 is below rounding; a plant that remembers longer than this many samples is cut there.
 _FORGOTTEN = 32.0
 _LONGEST_MEMORY = 2**20
 _FREQUENCIES_AT_ONCE = 16384
+# Frequency responses of more numbers than this are computed anew for each record.
+_KEPT = 2**22
 
 
-def channel_record_information(experiment: ChannelExperiment, record: Array, step: float) -> Array:
-    """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of the samples (n, r), from rest, M0 scaled to n.
+@dataclass(frozen=True)
+class RecordFilter:
+    """The plant, from rest, as it answers records of `samples` samples: filtering by FFT, padded past memory.
 
     In continuous time the plant is driven by the band-limited interpolation of the samples, `step`
     apart, and its outputs are read at the same instants.
     """
-    psi = _response(experiment, record, step, gradient=True)
-    flat = psi.transpose(1, 0, 2).reshape(experiment.size, -1)
-    noise = len(record) / experiment.samples * experiment.noise_information
-    return experiment.prior_information + noise + flat @ flat.T
+
+    experiment: ChannelExperiment
+    samples: int
+    step: float
+
+    def information(self, record: Array) -> Array:
+        """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of the samples (n, r), M0 scaled to n."""
+        psi = self._answer(record, gradient=True)
+        flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
+        noise = self.samples / self.experiment.samples * self.experiment.noise_information
+        return self.experiment.prior_information + noise + flat @ flat.T
+
+    def outputs(self, record: Array) -> Array:
+        """(n, p): what the samples (n, r) alone cause."""
+        return self._answer(record, gradient=False)[:, 0]
+
+    def output(self, record: Array, channel: int) -> Array:
+        """(n,): one of the outputs."""
+        transform = np.fft.rfft(record, self._length, axis=0)
+        answer = np.einsum("nr,nr->n", self._plant[:, channel], transform)
+        return np.asarray(np.fft.irfft(answer, self._length)[: self.samples])
+
+    def output_adjoint(self, weights: Array, channel: int) -> Array:
+        """(n, r): the transpose of `output`, applied to weights (n,)."""
+        transform = np.fft.rfft(weights, self._length)
+        answer = self._plant[:, channel].conj() * transform[:, None]
+        return np.asarray(np.fft.irfft(answer, self._length, axis=0)[: self.samples])
+
+    @cached_property
+    def _length(self) -> int:
+        experiment = self.experiment
+        damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
+            self.step if experiment.model.continuous else 1.0
+        )
+        memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
+        return int(2 ** np.ceil(np.log2(self.samples + memory)))
+
+    @cached_property
+    def _frequencies(self) -> Array:
+        w = 2.0 * np.pi * np.arange(self._length // 2 + 1) / self._length
+        return w / self.step if self.experiment.model.continuous else w
+
+    @cached_property
+    def _plant(self) -> ComplexArray:
+        return self.experiment.model.plant_at(self._frequencies)
+
+    @cached_property
+    def _gradient(self) -> ComplexArray:
+        return self.experiment.excitation_gradient(self._frequencies)
+
+    def _answer(self, record: Array, *, gradient: bool) -> NDArray[np.float64]:
+        """(n, k, p) the prediction gradient, or (n, 1, p) the output."""
+        transform = np.fft.rfft(record, self._length, axis=0)
+        model = self.experiment.model
+        size = (self.experiment.size if gradient else 1) * model.outputs * model.inputs * len(transform)
+        if size <= _KEPT:
+            answer = np.einsum(
+                "nkpr,nr->nkp", self._gradient if gradient else self._plant[:, None], transform
+            )
+            return np.fft.irfft(answer, self._length, axis=0)[: len(record)]
+        parts = []
+        for start in range(0, len(transform), _FREQUENCIES_AT_ONCE):
+            part = slice(start, start + _FREQUENCIES_AT_ONCE)
+            w = self._frequencies[part]
+            F = self.experiment.excitation_gradient(w) if gradient else model.plant_at(w)[:, None]
+            parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
+        return np.fft.irfft(np.concatenate(parts), self._length, axis=0)[: len(record)]
+
+
+def channel_record_information(experiment: ChannelExperiment, record: Array, step: float) -> Array:
+    """(k, k): the information of one record (n, r), see `RecordFilter`."""
+    return RecordFilter(experiment, len(record), step).information(record)
 
 
 def channel_outputs(experiment: ChannelExperiment, record: Array, step: float) -> Array:
     """(n, p): what the samples alone cause at the outputs, from rest."""
-    return _response(experiment, record, step, gradient=False)[:, 0]
-
-
-def _response(
-    experiment: ChannelExperiment, record: Array, step: float, *, gradient: bool
-) -> NDArray[np.float64]:
-    """(n, k, p) the prediction gradient, or (n, 1, p) the output: filtering by FFT, padded past memory."""
-    damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
-        step if experiment.model.continuous else 1.0
-    )
-    memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
-    length = int(2 ** np.ceil(np.log2(len(record) + memory)))
-    transform = np.fft.rfft(record, length, axis=0)
-    w = 2.0 * np.pi * np.arange(length // 2 + 1) / length
-    if experiment.model.continuous:
-        w = w / step
-    parts = []
-    for start in range(0, w.size, _FREQUENCIES_AT_ONCE):
-        part = slice(start, start + _FREQUENCIES_AT_ONCE)
-        if gradient:
-            F = experiment.excitation_gradient(w[part])
-        else:
-            F = experiment.model.plant_at(w[part])[:, None]
-        parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
-    return np.fft.irfft(np.concatenate(parts), length, axis=0)[: len(record)]
+    return RecordFilter(experiment, len(record), step).outputs(record)
