@@ -12,8 +12,8 @@ from inputdesign_cli.signal import Record
 from inputdesign_cli.spec import Spec
 
 _LONGEST = 64  # times the length that was asked for
-_CANDIDATES = 4
-_GROWTH = 1.4
+_CANDIDATES = 2
+_GROWTH = 1.1
 _FINE = 0.01
 
 
@@ -27,7 +27,7 @@ def shortest_record(
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
-    found = _search(len(missed.samples), block, made)
+    found = _search(missed, block, made)
     seeking = design.problem.goal == "samples" and spec.signal.samples is None
     most = spec.limits.samples
     if seeking and found is not None and (most is None or len(found.samples) <= most):
@@ -35,14 +35,27 @@ def shortest_record(
     raise _complaint(spec, design, missed, found)
 
 
-def _search(start: int, block: int, made: Callable[..., Record]) -> Record | None:
-    """The shortest record that meets the demand, to one per cent, by trying; None when there is none."""
-    low, high, found = start, start, None
-    while found is None or not found.met:
+def _search(missed: Record, block: int, made: Callable[..., Record]) -> Record | None:
+    """The shortest record that meets the demand, to one per cent, by trying; None when there is none.
+
+    A record at its limits gathers information in proportion to its length: that is where the search begins.
+    """
+    start = len(missed.samples)
+    ratio = missed.worst_ratio if np.isfinite(missed.worst_ratio) else 1.0
+    low, high = start, min(_rounded(start * max(ratio**2, _GROWTH), block), _LONGEST * start)
+    found = made(high, _CANDIDATES)
+    while not found.met:
         if high >= _LONGEST * start:
             return None
         low, high = high, _rounded(high * _GROWTH, block)
         found = made(high, _CANDIDATES)
+    shorter = _rounded(high / _GROWTH, block)
+    while low < shorter < high:
+        tried = made(shorter, _CANDIDATES)
+        if not tried.met:
+            low = shorter
+            break
+        high, found, shorter = shorter, tried, _rounded(shorter / _GROWTH, block)
     while high - low > max(_FINE * high, block):
         middle = _rounded(0.5 * (low + high), block)
         if middle in (low, high):

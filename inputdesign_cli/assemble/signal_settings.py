@@ -154,11 +154,13 @@ def check_signal(spec: Spec) -> None:
 def _check_harmonics(spec: Spec, recipe: Recipe, samples: int | None) -> None:
     if samples is None or not isinstance(recipe.lines, tuple):
         return
-    top = recipe.period(samples) // 2
+    blocks = spec.plant.inputs if spec.signal.phases != "random" else 1
+    block = recipe.period(samples) // blocks
+    top = block // 2
     if recipe.lines[-1] > top:
         raise spec.complain(
             "out-of-range",
-            f"lines reaches harmonic {recipe.lines[-1]}, but a period of {recipe.period(samples)} values has "
+            f"lines reaches harmonic {recipe.lines[-1]}, but a period of {block} values has "
             f"harmonics 0 to {top}",
             hint="remove the higher ones, or make the period longer",
             key="signal.lines",

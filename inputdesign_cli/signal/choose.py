@@ -11,11 +11,13 @@ from inputdesign_cli.information import PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.dress import Dresser
 from inputdesign_cli.signal.recipe import LEVELLED, Method
-from inputdesign_cli.signal.settle import first_level, least_level, level_of_power
+from inputdesign_cli.signal.settle import first_level, last_level, least_level, level_of_power
 from inputdesign_cli.signal.within import compressed
 
 # A record meets the accuracy when its ratio exceeds one by no more than rounding.
 _MET = 1.0 + 1e-9
+# Times the level that would do without limits: there they all bite.
+_FAR = 40.0
 # A record that costs more than the design by this share is worth more draws.
 _LITTLE = 0.05
 
@@ -142,6 +144,9 @@ class _Chooser:
         samples = dresser.dress(values, level)
         if self._accepts(samples):
             return samples, True
+        if recipe.method in LEVELLED and self._ratio(dresser.dress(values, _FAR * level)) > _MET:
+            # More of the same levels is always better, and there is no more.
+            return self._affordable(values, _FAR * level), False
         if not dresser.plain:
             values = self._lowered(values, level)
             found = first_level(lambda a: self._accepts(dresser.dress(values, a)), 0.98 * level)
@@ -199,9 +204,12 @@ class _Chooser:
 
     def _affordable(self, values: Array, level: float) -> Array:
         """The record at this level, or as much of it as the limits on the powers allow."""
-        samples = self.dresser.dress(values, level)
+        dress = self.dresser.dress
+        samples = dress(values, level)
         share = self._share(samples)
-        return samples if share >= 1.0 else self.dresser.dress(values, level * np.sqrt(share))
+        if share >= 1.0 or self.dresser.plain:
+            return samples if share >= 1.0 else dress(values, level * np.sqrt(share))
+        return dress(values, last_level(lambda a: self._share(dress(values, a)) >= 1.0, level))
 
     def _ratio(self, samples: Array) -> float:
         try:

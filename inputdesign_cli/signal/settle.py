@@ -11,7 +11,7 @@ import scipy.optimize
 # the coarser one where limits and rounding make it depend on the level in another way.
 _EXACT = 1e-10
 _COARSE = 1e-3
-_GROWTH = 1.12
+_GROWTH = 1.2
 _MOST_GROWTH = 40.0
 
 
@@ -59,6 +59,20 @@ def first_level(accepted: Callable[[float], bool], start: float) -> float | None
         else:
             low = middle
     return high
+
+
+def last_level(accepted: Callable[[float], bool], start: float) -> float:
+    """The greatest level below `start` that is accepted, to a thousandth, where lower ones are as well."""
+    low, high = start / _GROWTH, start
+    while not accepted(low) and low > start / _MOST_GROWTH:
+        low, high = low / _GROWTH, low
+    while high > low * (1.0 + _COARSE):
+        middle = np.sqrt(low * high)
+        if accepted(middle):
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def level_of_power(power: Callable[[float], float], wanted: float, start: float) -> float:
