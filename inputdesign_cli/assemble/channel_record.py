@@ -87,7 +87,7 @@ def make_channel_record(spec: Spec, design: Design, experiment: ChannelExperimen
         )
 
     record = made(samples)
-    if record.met or recipe.level is not None or not bounds.hard:
+    if record.met or recipe.level is not None or not (bounds.hard or spec.signal.quantisation):
         return record
     return shortest_record(spec, design, record, recipe.block, made)
 
@@ -167,7 +167,8 @@ def channel_signal_entry(
     entry: dict[str, Any] = {"type": record.method}
     if record.method == "multisine":
         phases = build_channel_recipe(spec).phases
-        entry["phases"] = "orthogonal" if phases == "random" and _phases(spec) == "orthogonal" else phases
+        plain = phases == "random" and spec.signal.phases is None
+        entry["phases"] = "orthogonal" if plain and experiment.inputs > 1 else phases
     entry |= record_sizes(spec, experiment, samples)
     first = design.problem.requirements[0]
     if isinstance(first, Criterion):

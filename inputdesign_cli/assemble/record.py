@@ -68,7 +68,7 @@ def make_record(spec: Spec, task: Task, design: Design, experiment: Experiment) 
         return realise(experiment, basis, design.result.x, demand, tried, samples=samples, bounds=bounds)
 
     record = made(samples)
-    if record.met or recipe.level is not None or not bounds.hard:
+    if record.met or recipe.level is not None or not (bounds.hard or recipe.quantiser):
         return record
     return shortest_record(spec, design, record, recipe.block, made)
 

@@ -12,7 +12,7 @@ from inputdesign_cli.signal import Record
 from inputdesign_cli.spec import Spec
 
 _LONGEST = 64  # times the length that was asked for
-_CANDIDATES = 2
+_CANDIDATES = 1
 _GROWTH = 1.1
 _FINE = 0.01
 
@@ -36,13 +36,14 @@ def shortest_record(
 
 
 def _search(missed: Record, block: int, made: Callable[..., Record]) -> Record | None:
-    """The shortest record that meets the demand, to one per cent, by trying; None when there is none.
+    """The shortest record that meets the demand, to one per cent, by trying; None when none does.
 
     A record at its limits gathers information in proportion to its length: that is where the search begins.
     """
     start = len(missed.samples)
-    ratio = missed.worst_ratio if np.isfinite(missed.worst_ratio) else 1.0
-    low, high = start, min(_rounded(start * max(ratio**2, _GROWTH), block), _LONGEST * start)
+    low, high = start, _rounded(max(_expected(missed), _GROWTH * start), block)
+    if high > _LONGEST * start:
+        return None
     found = made(high, _CANDIDATES)
     while not found.met:
         if high >= _LONGEST * start:
@@ -68,6 +69,11 @@ def _search(missed: Record, block: int, made: Callable[..., Record]) -> Record |
     return found
 
 
+def _expected(missed: Record) -> float:
+    """The length that the record needs, were its information in proportion to its length."""
+    return len(missed.samples) * (missed.worst_ratio**2 if np.isfinite(missed.worst_ratio) else 1.0)
+
+
 def _power(record: Record) -> float:
     """Of all inputs."""
     return float(np.sum(np.mean(record.samples**2, axis=0)))
@@ -79,8 +85,10 @@ def _rounded(length: float, block: int) -> int:
 
 def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None) -> InfeasibleError:
     limits = spec.limits
-    stated = [name for name in ("amplitude", "rate") if getattr(limits, name) is not None]
-    names = " and ".join(f"limits.{name}" for name in stated)
+    keys = [f"limits.{name}" for name in ("amplitude", "rate") if getattr(limits, name) is not None]
+    if spec.signal.quantisation is not None:
+        keys.append("signal.quantisation")
+    names = " and ".join(keys)
     size = len(missed.samples)
     message = (
         f"no record of {size} samples within {names} meets the accuracy: the best found reaches "
@@ -89,7 +97,11 @@ def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None)
         else f"no record of {size} samples within {names} excites every parameter"
     )
     if found is None:
-        hint = f"raise the limits: {_LONGEST} times as many samples were not enough either"
+        hint = (
+            f"raise the limits: about {_expected(missed):.3g} samples would be needed"
+            if _expected(missed) > _LONGEST * size
+            else f"raise the limits: {_LONGEST} times as many samples were not enough either"
+        )
     else:
         hint = (
             f"{len(found.samples)} samples can (power {_power(found):.4g}): set "
@@ -97,5 +109,4 @@ def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None)
         )
         if limits.samples is not None and len(found.samples) > limits.samples:
             hint += f"; limits.samples is {limits.samples}"
-    key = f"limits.{stated[0]}"
-    return InfeasibleError(Complaint("limits-too-tight", message, hint, key, spec.locate(key)))
+    return InfeasibleError(Complaint("limits-too-tight", message, hint, keys[0], spec.locate(keys[0])))

@@ -199,7 +199,7 @@ class _Chooser:
 
     def _nearest(self, values: Array, level: float) -> float:
         """The level of the least ratio, where none is low enough."""
-        levels = level * np.geomspace(0.5, 20.0, 16)
+        levels = level * np.geomspace(0.7, 12.0, 8)
         return float(min(levels, key=lambda a: self._ratio(self.dresser.dress(values, a))))
 
     def _affordable(self, values: Array, level: float) -> Array:

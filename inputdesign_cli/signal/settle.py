@@ -13,6 +13,7 @@ _EXACT = 1e-10
 _COARSE = 1e-3
 _GROWTH = 1.2
 _MOST_GROWTH = 40.0
+_NOTHING = 1e-9
 
 
 def least_level(ratio: Callable[[float], float], start: float) -> float:
@@ -30,7 +31,9 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
     low = high = level
     while ratio(high) > 1.0:
         low, high = high, high * 1.5
-    while ratio(low) <= 1.0 and low > 1e-9 * start:
+    while ratio(low) <= 1.0:
+        if low <= _NOTHING * start:  # what is known without the record is enough
+            return low
         low /= 1.5
     if low < high:
         root = scipy.optimize.brentq(
