@@ -624,8 +624,8 @@ CODES: dict[str, Explanation] = {
         "The spectrum exists, but its records would exceed limits.amplitude, limits.rate or the range of the "
         "converter. Candidates were compressed, clipped and raised as far as the limits allow, and their own "
         "information falls short.",
-        "The hint names a length that was found to suffice, or where none that was tried does, the length that "
-        "information in proportion to it would take. Or raise the limits, or loosen the accuracy.",
+        "The hint names a length that was found to suffice, or else the length that information in "
+        "proportion to it would take. Or raise the limits, or loosen the accuracy.",
     ),
     "no-sample-rate": Explanation(
         "The sampling rate does not fit the file format",

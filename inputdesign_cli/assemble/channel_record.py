@@ -14,8 +14,8 @@ from inputdesign_cli.assemble.channels import excitation_band, frequency_unit, r
 from inputdesign_cli.assemble.record import applied_entry, worst_ratio
 from inputdesign_cli.assemble.result import powers
 from inputdesign_cli.assemble.shortest_record import shortest_record
+from inputdesign_cli.assemble.signal_checks import SHORTEST_BLOCK
 from inputdesign_cli.assemble.signal_settings import (
-    SHORTEST_BLOCK,
     build_channel_bounds,
     build_quantisers,
     build_recipe,

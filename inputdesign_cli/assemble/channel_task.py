@@ -19,7 +19,7 @@ from inputdesign_cli.assemble.experiment import embedded
 from inputdesign_cli.assemble.limits import build_power_limits
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.requirements import build_criterion, build_requirements
-from inputdesign_cli.assemble.signal_settings import check_signal
+from inputdesign_cli.assemble.signal_checks import check_signal
 from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Question
