@@ -622,9 +622,11 @@ CODES: dict[str, Explanation] = {
     ),
     "limits-too-tight": Explanation(
         "No record within the limits on single samples meets the accuracy",
-        "The spectrum exists, but its records would exceed limits.amplitude or limits.rate. Candidates were "
-        "compressed, clipped and raised as far as the limits allow, and their own information falls short.",
-        "The hint names a length that was found to suffice. Or raise the limits, or loosen the accuracy.",
+        "The spectrum exists, but its records would exceed limits.amplitude, limits.rate or the range of the "
+        "converter. Candidates were compressed, clipped and raised as far as the limits allow, and their own "
+        "information falls short.",
+        "The hint names a length that was found to suffice, or else the length that information in "
+        "proportion to it would take. Or raise the limits, or loosen the accuracy.",
     ),
     "no-sample-rate": Explanation(
         "The sampling rate does not fit the file format",

@@ -47,6 +47,7 @@ class MatrixSpectrumCurves:
     lines: bool = False
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
     logarithmic: bool = False  # the axis of frequency
+    record: Array | None = None  # (n, inputs), smoothed periodograms of the record
 
 
 @dataclass(frozen=True)

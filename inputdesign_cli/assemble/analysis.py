@@ -21,7 +21,7 @@ from inputdesign_cli.assemble.experiment import read_excitation_record
 from inputdesign_cli.assemble.given import bad_table, read_spectrum_table
 from inputdesign_cli.assemble.record import given_record, signal_entry, worst_ratio
 from inputdesign_cli.assemble.result import information_entry, requirements_entry
-from inputdesign_cli.assemble.signal_files import signal_curves
+from inputdesign_cli.assemble.signal_files import other_files, signal_curves
 from inputdesign_cli.assemble.task import Task, build_analysis
 from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, Experiment, PowerKind
 from inputdesign_cli.outcome import Outcome, SpectrumCurves, Table
@@ -96,11 +96,14 @@ def analyse_given(spec: Spec) -> Outcome:
     if drawn is not None:
         tables["spectrum"], curves["spectrum"] = drawn
     record = _record(spec, experiment, excitation, worst_ratio(requirements))
+    files: dict[str, bytes] = {}
     if record is not None:
         result["signal"] = signal_entry(spec, experiment, record, requirements)
-        tables["signal"], curves["signal"] = signal_curves(spec, record)
+        given = record.method == "given"
+        tables["signal"], curves["signal"] = signal_curves(spec, record.samples, given=given)
+        files = other_files(spec, record.samples, given=given)
     result["timing_s"] = {"analysis": time.perf_counter() - started}
-    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves)
+    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 
 
 def read_excitation(spec: Spec, experiment: Experiment) -> Excitation:

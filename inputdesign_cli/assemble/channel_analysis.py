@@ -12,7 +12,6 @@ from inputdesign_cli.accuracy import worst
 from inputdesign_cli.assemble.analysis import check_excites
 from inputdesign_cli.assemble.channel_curves import (
     bound_curves_of,
-    channel_signal_curves,
     density_curves,
     entry_bound_curves,
     line_curves,
@@ -30,6 +29,7 @@ from inputdesign_cli.assemble.channel_task import (
     channel_cost,
     channel_requirements,
     check_channels_supported,
+    check_given_signal,
     with_prior,
 )
 from inputdesign_cli.assemble.channels import (
@@ -39,8 +39,9 @@ from inputdesign_cli.assemble.channels import (
 )
 from inputdesign_cli.assemble.ellipses import check_pairs, experiment_ellipses
 from inputdesign_cli.assemble.model_error import model_error_alpha
-from inputdesign_cli.assemble.record import worst_ratio
+from inputdesign_cli.assemble.record import applied_entry, worst_ratio
 from inputdesign_cli.assemble.result import information_entry, requirements_entry
+from inputdesign_cli.assemble.signal_files import other_files, signal_curves
 from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Question
 from inputdesign_cli.information import ChannelExperiment
@@ -58,6 +59,7 @@ def build_channel_analysis(spec: Spec) -> Task:
         SpecError, DataError: see the builders of the parts.
     """
     check_channels_supported(spec)
+    check_given_signal(spec)
     record_step(spec)
     # Any: requirements ask for no more than both kinds of experiments have.
     experiment: Any = with_prior(spec, channel_experiment(spec))
@@ -115,16 +117,20 @@ def analyse_channels(spec: Spec) -> Outcome:
     ellipses = experiment_ellipses(spec, experiment, information, flat)
     if ellipses is not None:
         curves["ellipses"] = ellipses
-    samples = channel_samples(spec, excitation)
+    samples, files = channel_samples(spec, excitation), {}
     if samples is not None:
-        kind = "given" if excitation.samples is not None else "multisine"
-        result["signal"] = {"type": kind, **record_sizes(spec, experiment, samples)}
+        given = excitation.samples is not None
+        result["signal"] = {"type": "given" if given else "multisine"}
+        result["signal"] |= record_sizes(spec, experiment, samples) | applied_entry(
+            spec, samples, given=given
+        )
         if requirements:
             reached = channel_record_information(experiment, samples, record_step(spec))
             result["signal"]["worst_ratio"] = _ratio(requirements, reached)
-        tables["signal"], curves["signal"] = channel_signal_curves(spec, samples)
+        tables["signal"], curves["signal"] = signal_curves(spec, samples, given=given)
+        files = other_files(spec, samples, given=given)
     result["timing_s"] = {"analysis": time.perf_counter() - started}
-    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves)
+    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 
 
 def _even(experiment: ChannelExperiment, power: float) -> ChannelExcitation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import EntryOfPlant, NormError, Requirement
 from inputdesign_cli.assemble.channels import excitation_band, excitation_symbol, frequency_unit
 from inputdesign_cli.assemble.curves import distinct, frequency_header
+from inputdesign_cli.assemble.signal_files import smoothed_periodogram, with_periodogram
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
     MatrixSpectrumCurves,
     OptimalityCurves,
-    SignalCurves,
     SpectrumCurves,
     Table,
 )
@@ -90,22 +91,28 @@ def bound_curves_of(
     white: Array | None,
     *,
     label: str = "design",
+    record: Array | None = None,
 ) -> tuple[Table, ChannelBoundCurves | BoundCurves] | None:
     """bound.csv and its plot of those requirements that bound a model error; None when none does.
 
-    `label` says what gave r_u.
+    `label` says what gave r_u, and `record` is the information of the record to be applied.
     """
     entries = [r for r in requirements if isinstance(r, EntryOfPlant)]
     if entries:
-        return entry_bound_curves(spec, entries, information, white, label=label)
+        return entry_bound_curves(spec, entries, information, white, label=label, record=record)
     for requirement in requirements:
         if isinstance(requirement, NormError):
-            return _norm_bound_curves(spec, requirement, information, white, label)
+            return _norm_bound_curves(spec, requirement, information, white, label, record)
     return None
 
 
 def _norm_bound_curves(
-    spec: Spec, requirement: NormError, information: Array, white: Array | None, label: str
+    spec: Spec,
+    requirement: NormError,
+    information: Array,
+    white: Array | None,
+    label: str,
+    record: Array | None,
 ) -> tuple[Table, BoundCurves]:
     w = _bound_axis([requirement], information)
     r_u, r_adm = requirement.error_bound(information, w), requirement.admissible.at(w)
@@ -114,7 +121,11 @@ def _norm_bound_curves(
     compared = None if white is None else requirement.error_bound(white, w)
     if compared is not None:
         columns["r_u_white"] = compared
-    return Table(columns), BoundCurves(w / frequency_unit(spec), r_u, G, r_adm, compared, label=label)
+    applied = None if record is None else requirement.error_bound(record, w)
+    if applied is not None:
+        columns["r_u_record"] = applied
+    w = w / frequency_unit(spec)
+    return Table(columns), BoundCurves(w, r_u, G, r_adm, compared, label=label, r_u_record=applied)
 
 
 def _bound_axis(requirements: Sequence[EntryOfPlant | NormError], information: Array) -> Array:
@@ -133,10 +144,12 @@ def entry_bound_curves(
     *,
     stated: bool = True,
     label: str = "design",
+    record: Array | None = None,
 ) -> tuple[Table, ChannelBoundCurves]:
     """bound.csv and its plot: r_u, r_adm and |G| of every entry over the band of the requirement.
 
-    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing.
+    Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing. `record` is
+    the information of the record to be applied.
     """
     w = _bound_axis(requirements, information)
     frequency = w / frequency_unit(spec)
@@ -153,7 +166,12 @@ def entry_bound_curves(
         compared = None if white is None else requirement.error_bound(white, w)
         if compared is not None:
             columns[f"r_u_white_{i + 1}{j + 1}"] = compared
-        entries[requirement.label] = BoundCurves(frequency, r_u, G, r_adm, compared, label=label)
+        applied = None if record is None else requirement.error_bound(record, w)
+        if applied is not None:
+            columns[f"r_u_record_{i + 1}{j + 1}"] = applied
+        entries[requirement.label] = BoundCurves(
+            frequency, r_u, G, r_adm, compared, label=label, r_u_record=applied
+        )
     return Table(columns), ChannelBoundCurves(entries)
 
 
@@ -174,17 +192,22 @@ def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | 
     return OptimalityCurves(w / unit, ratio, distinct(np.maximum(support, w[0])) / unit)
 
 
-def channel_signal_curves(spec: Spec, record: Array) -> tuple[Table, SignalCurves]:
-    """signal.csv and its plot: time, u1, u2, .., in closed loop r1, r2, .."""
-    time = spec.sample_time * np.arange(len(record), dtype=np.float64)
-    offset = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), record.shape[1])
-    symbol = excitation_symbol(spec)
-    channels = {f"{symbol}{i + 1}": record[:, i] + offset[i] for i in range(record.shape[1])}
-    limits = {}
-    if spec.limits.amplitude is not None and spec.limits.amplitude.input is not None:
-        most = np.broadcast_to(np.asarray(spec.limits.amplitude.input, dtype=float), record.shape[1])
-        limits = {f"u{i + 1}": (offset[i] - most[i], offset[i] + most[i]) for i in range(most.size)}
-    return Table({f"time_{spec.time_unit}": time, **channels}), SignalCurves(time, channels, limits)
+def with_channel_periodograms(
+    table: Table, curves: SpectrumCurves | MatrixSpectrumCurves, spec: Spec, samples: Array
+) -> tuple[Table, SpectrumCurves | MatrixSpectrumCurves]:
+    """The spectrum with the smoothed periodogram of each channel over it; lines are left as they are."""
+    if isinstance(curves, SpectrumCurves):
+        return with_periodogram(table, curves, spec, samples[:, 0])
+    if curves.lines:
+        return table, curves
+    shown, columns = [], {}
+    for a, column in enumerate(samples.T):
+        w, smooth = smoothed_periodogram(column, spec.sample_time)
+        # Per rad/sample in discrete time, per rad per time unit in continuous time, as the design.
+        density = smooth * (1.0 if spec.plant.sampled else spec.sample_time)
+        shown.append(np.interp(curves.frequency, w, density))
+        columns[f"phi_record_{a + 1}{a + 1}"] = shown[-1]
+    return Table({**table.columns, **columns}), replace(curves, record=np.stack(shown, axis=1))
 
 
 def channel_spectrum_entry(spec: Spec, basis: object, x: Array) -> dict[str, Any]:

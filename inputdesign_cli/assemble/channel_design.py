@@ -5,28 +5,33 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
+
 from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.assemble.channel_curves import (
     bound_curves_of,
     channel_optimality_curves,
-    channel_signal_curves,
     density_curves,
     line_curves,
+    with_channel_periodograms,
 )
 from inputdesign_cli.assemble.channel_record import (
+    channel_drawer,
     channel_signal_entry,
-    lines_of_record,
     make_channel_record,
 )
 from inputdesign_cli.assemble.channel_task import build_channel_task
+from inputdesign_cli.assemble.channels import record_step
 from inputdesign_cli.assemble.design import by_exchange, check_length, plain_errors
 from inputdesign_cli.assemble.ellipses import experiment_ellipses
 from inputdesign_cli.assemble.factor_columns import restrict_columns
+from inputdesign_cli.assemble.record import record_notes
 from inputdesign_cli.assemble.result import design_result, experiment_of
+from inputdesign_cli.assemble.signal_files import other_files, signal_curves
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import Outcome
-from inputdesign_cli.signal import Lines
+from inputdesign_cli.signal import ChannelDrawer, Record, channel_record_information
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spectrum import DirectedLines, LinesBasis
 
@@ -36,8 +41,8 @@ def solve_channels(spec: Spec) -> Outcome:
     return designed_channels(spec)[0]
 
 
-def designed_channels(spec: Spec) -> tuple[Outcome, Lines | None]:
-    """The same, and the sinusoids that stand for the spectrum in a record of its length, if there is one.
+def designed_channels(spec: Spec) -> tuple[Outcome, ChannelDrawer | None]:
+    """The same, and what draws other records of the spectrum, if there is one; see `channel_drawer`.
 
     Raises:
         SpecError, DataError: the spec cannot be used.
@@ -61,20 +66,29 @@ def designed_channels(spec: Spec) -> tuple[Outcome, Lines | None]:
     assert isinstance(experiment, ChannelExperiment)
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
-    _illustrate(spec, design, experiment, tables, curves)
     record = make_channel_record(spec, design, experiment)
+    _illustrate(spec, design, experiment, record, tables, curves)
+    files: dict[str, bytes] = {}
     if record is not None:
         result["signal"] = channel_signal_entry(spec, design, experiment, record)
-        tables["signal"], curves["signal"] = channel_signal_curves(spec, record.samples)
+        tables["signal"], curves["signal"] = signal_curves(spec, record.samples)
+        tables["spectrum"], curves["spectrum"] = with_channel_periodograms(
+            tables["spectrum"], curves["spectrum"], spec, record.samples
+        )
+        files = other_files(spec, record.samples)
+        notes = record_notes(spec, experiment.samples, record)
+        if notes:
+            result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
-    lines = None if record is None else lines_of_record(spec, design, experiment, len(record.samples))
-    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves), lines
+    redrawn = None if record is None else channel_drawer(spec, design, len(record.samples))
+    return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files), redrawn
 
 
 def _illustrate(
     spec: Spec,
     design: Design,
     experiment: ChannelExperiment,
+    record: Record | None,
     tables: dict[str, Any],
     curves: dict[str, Any],
 ) -> None:
@@ -86,7 +100,12 @@ def _illustrate(
     if not found.x.any():
         return
     white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
-    bound = bound_curves_of(spec, (*problem.requirements, *problem.side), found.information, white)
+    known = None
+    if record is not None and np.isfinite(record.worst_ratio):
+        known = channel_record_information(experiment, record.samples, record_step(spec))
+    bound = bound_curves_of(
+        spec, (*problem.requirements, *problem.side), found.information, white, record=known
+    )
     if bound is not None:
         tables["bound"], curves["bound"] = bound
     optimality = channel_optimality_curves(spec, design)

@@ -3,27 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.accuracy import Criterion
-from inputdesign_cli.assemble.channels import frequency_unit, record_step
-from inputdesign_cli.assemble.record import worst_ratio
+from inputdesign_cli.assemble.channel_task import channel_cost
+from inputdesign_cli.assemble.channels import excitation_band, frequency_unit, record_step
+from inputdesign_cli.assemble.record import applied_entry, worst_ratio
 from inputdesign_cli.assemble.result import powers
+from inputdesign_cli.assemble.shortest_record import shortest_record
+from inputdesign_cli.assemble.signal_checks import SHORTEST_BLOCK
+from inputdesign_cli.assemble.signal_settings import (
+    build_channel_bounds,
+    build_quantisers,
+    build_recipe,
+)
 from inputdesign_cli.design.designs import Design
-from inputdesign_cli.errors import Complaint, InfeasibleError
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment
+from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     ChannelBounds,
+    ChannelDrawer,
     ChannelPhases,
-    ChannelRecord,
+    Demand,
     Lines,
-    blocks_of,
-    channel_inputs,
-    channel_outputs,
-    channel_record_information,
+    Recipe,
+    Record,
+    RecordFilter,
     grid_lines,
     low_peak_angles,
     merged,
@@ -34,49 +42,68 @@ from inputdesign_cli.spec import Spec
 from inputdesign_cli.spectrum import DirectedLines, LinesBasis
 
 _CANDIDATES = 8
-_SHORTEST = 8  # samples a period
+_LAGS = 50
 
 
-def make_channel_record(spec: Spec, design: Design, experiment: ChannelExperiment) -> ChannelRecord | None:
+def make_channel_record(spec: Spec, design: Design, experiment: ChannelExperiment) -> Record | None:
     """The best of several records of the designed spectrum.
 
     None when no excitation is needed, or when the record would be too short to hold a multisine
     (criteria per sample without `signal.samples`).
+
+    Raises:
+        InfeasibleError: no record of this length within the limits on single samples meets the accuracy.
     """
     if not design.result.x.any():
         return None
     found = experiment.samples if design.problem.goal == "samples" else spec.signal_samples
-    samples = spec.signal.samples or found
-    phases = channel_phases(spec)
-    if samples < _SHORTEST * blocks_of(phases, experiment.inputs):
+    recipe = build_channel_recipe(spec)
+    samples = -(-(spec.signal.samples or found) // recipe.block) * recipe.block
+    if recipe.period(samples) < SHORTEST_BLOCK * experiment.inputs:
         return None
+    bounds = build_channel_bounds(spec, list(design.problem.limits))
+    demand = _demand(spec, design)
     step = record_step(spec)
-    lines = lines_of_record(spec, design, experiment, samples)
-    first = design.problem.requirements[0]
-    score = worst_ratio(design.problem.requirements)
-    if isinstance(first, Criterion):
-        criterion = first
 
-        def score(information: Array) -> float:
-            return -criterion.level(information)
+    def made(samples: int, candidates: int | None = None) -> Record:
+        count = recipe.candidates if candidates is None else candidates
+        return realise_channels(
+            RecordFilter(experiment, samples, step),
+            replace(
+                channel_drawer(spec, design, samples),
+                recipe=replace(recipe, candidates=count, most_candidates=count),
+                angles=_angles(recipe, experiment, step, bounds),
+            ),
+            demand,
+            total=sum(powers(design.problem, design.result.basis, design.result.x)["excitation"]),
+            bounds=bounds,
+            quantisers=build_quantisers(spec),
+        )
 
-    bounds = build_channel_bounds(spec, design)
-    record = realise_channels(
-        experiment,
-        lines,
-        score,
-        samples=samples,
-        step=step,
-        phases=phases,
-        candidates=spec.signal.candidates or _CANDIDATES,
-        seed=spec.signal.seed or 0,
-        angles=_angles(spec, experiment, lines, samples, step, bounds),
-        bounds=bounds,
-        meets=design.problem.goal != "factor" and spec.signal.scale != "design",
+    record = made(samples)
+    if record.met or recipe.level is not None or not (bounds.hard or spec.signal.quantisation):
+        return record
+    return shortest_record(spec, design, record, recipe.block, made)
+
+
+def channel_drawer(spec: Spec, design: Design, samples: int) -> ChannelDrawer:
+    """What draws records of the designed spectrum, phases of sinusoids uniformly."""
+    step = record_step(spec)
+    lo, hi = excitation_band(spec)
+    return ChannelDrawer(
+        lambda period, hold: design_lines(design, period, hold * step),
+        build_channel_recipe(spec),
+        samples,
+        band=(lo * step, hi * step),
+        phases=channel_phases(spec),
     )
-    if record.short_of > 1.0 + 1e-9 and design.problem.goal != "factor":
-        raise _too_tight(spec, record)
-    return record
+
+
+def build_channel_recipe(spec: Spec) -> Recipe:
+    """What is to be drawn; every candidate takes longer than those of one input."""
+    recipe = build_recipe(spec)
+    count = spec.signal.candidates or min(_CANDIDATES, recipe.candidates)
+    return replace(recipe, candidates=count, most_candidates=count)
 
 
 def channel_phases(spec: Spec) -> ChannelPhases:
@@ -84,126 +111,108 @@ def channel_phases(spec: Spec) -> ChannelPhases:
     return "random" if spec.signal.phases == "random" else "orthogonal"
 
 
-def lines_of_record(spec: Spec, design: Design, experiment: ChannelExperiment, samples: int) -> Lines:
-    """The sinusoids that stand for the design in a record of so many samples."""
-    blocks = blocks_of(channel_phases(spec), experiment.inputs)
-    return design_lines(design, experiment, samples // blocks, record_step(spec))
+def _demand(spec: Spec, design: Design) -> Demand:
+    problem = design.problem
+    first = problem.requirements[0]
+    score = worst_ratio(problem.requirements)
+    if isinstance(first, Criterion):
+        criterion = first
 
+        def score(information: Array) -> float:
+            return -criterion.level(information)
 
-def build_channel_bounds(spec: Spec, design: Design) -> ChannelBounds:
-    """What the record may not exceed, channel by channel."""
-    experiment = design.problem.experiment
-    assert isinstance(experiment, ChannelExperiment)
-    amplitude = spec.limits.amplitude
-    return ChannelBounds(
-        amplitude=None if amplitude is None else _each(amplitude.input, experiment.inputs),
-        rate=_each(spec.limits.rate, experiment.inputs),
-        output=None if amplitude is None else _each(amplitude.output, spec.plant.outputs),
-        powers=tuple(
-            (limit.kind, limit.channel, limit.bound) for limit in design.problem.limits if limit.upper
-        ),
+    weights = channel_cost(spec) or {"excitation": 1.0}
+    spent = powers(problem, design.result.basis, design.result.x)
+    return Demand(
+        score,
+        meets=problem.goal != "factor" and spec.signal.scale != "design",
+        cost=weights,
+        designed=float(sum(np.sum(np.multiply(weight, spent[kind])) for kind, weight in weights.items())),
     )
 
 
-def _each(value: float | tuple[float, ...] | None, channels: int) -> Array | None:
-    """(channels,): a number holds for every channel."""
-    return None if value is None else np.broadcast_to(np.asarray(value, dtype=float), channels)
-
-
 def _angles(
-    spec: Spec, experiment: ChannelExperiment, lines: Lines, samples: int, step: float, bounds: ChannelBounds
-) -> Callable[[np.random.Generator], Array] | None:
+    recipe: Recipe, experiment: ChannelExperiment, step: float, bounds: ChannelBounds
+) -> Callable[[Lines, int, np.random.Generator], Array | None]:
     """How the common phases of the lines are chosen; None for uniform draws."""
-    kind = spec.signal.phases or ("optimised" if bounds.hard else None)
-    if kind == "schroeder":
-        return lambda rng: schroeder_angles(lines, samples)
-    if kind != "optimised":
-        return None
-    outputs = []
-    if bounds.output is not None:
-        response = experiment.response("output", lines.frequencies / step)
-        outputs = [(response[:, i], float(bound)) for i, bound in enumerate(bounds.output)]
+    if recipe.phases == "schroeder":
+        return lambda lines, values, rng: schroeder_angles(lines, values)
+    if recipe.phases != "optimised":
+        return lambda lines, values, rng: None
 
-    def lowered(rng: np.random.Generator) -> Array:
+    def lowered(lines: Lines, values: int, rng: np.random.Generator) -> Array:
+        outputs = []
+        if bounds.output is not None and recipe.hold == 1:
+            response = experiment.response("output", lines.frequencies / step)
+            outputs = [(response[:, i], float(bound)) for i, bound in enumerate(bounds.output)]
         start = 2.0 * np.pi * rng.random(lines.frequencies.size)
-        return low_peak_angles(lines, samples, start, amplitude=bounds.amplitude, outputs=outputs)
+        return low_peak_angles(
+            lines, values, start, amplitude=bounds.amplitude, rate=bounds.rate, outputs=outputs
+        )
 
     return lowered
 
 
-def _too_tight(spec: Spec, record: ChannelRecord) -> InfeasibleError:
-    """The limits on single samples hold the record below the level that the accuracy needs."""
-    stated = [name for name in ("amplitude", "rate") if getattr(spec.limits, name) is not None]
-    names = " and ".join(f"limits.{name}" for name in stated)
-    longer = int(np.ceil(len(record.samples) * record.short_of**2))
-    key = f"limits.{stated[0]}"
-    return InfeasibleError(
-        Complaint(
-            "limits-too-tight",
-            f"no record of {len(record.samples)} samples within {names} meets the accuracy: its level "
-            f"would have to be {record.short_of:.4g} times as high",
-            f"about {longer} samples can (set experiment.samples and signal.samples); or raise the limits, "
-            "or loosen the accuracy",
-            key,
-            spec.locate(key),
-        )
-    )
-
-
-def design_lines(design: Design, experiment: ChannelExperiment, period: int, step: float) -> Lines:
-    """The sinusoids that stand for the design, no stronger at input, output or excitation than it is."""
+def design_lines(design: Design, period: int, step: float) -> Lines:
+    """The sinusoids that stand for the design in a period of values `step` apart."""
     basis, x = design.result.basis, design.result.x
     if isinstance(basis, LinesBasis):
         order = np.argsort(basis.frequencies)
         order = order[x[order] > 0]
-        lines = merged(Lines(basis.frequencies[order] * step, x[order, None, None].astype(complex)), period)
-    elif isinstance(basis, DirectedLines):
-        frequencies, powers = basis.lines(x)
-        lines = merged(Lines(frequencies * step, powers), period)
-    else:
-        w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
-        lines = grid_lines(basis.density(x, w), period, step)  # type: ignore[attr-defined]
-    return lines.scaled(_fitting(design, experiment, lines, step))
-
-
-def _fitting(design: Design, experiment: ChannelExperiment, lines: Lines, step: float) -> float:
-    """What the lines are scaled by, so that no power exceeds that of the design."""
-    at = lines.frequencies / step
-    designed = powers(design.problem, design.result.basis, design.result.x)
-    factors = []
-    for kind in POWER_KINDS:
-        density = experiment.power_density(kind, at)
-        values = density[:, None, None] if density.ndim == 1 else density
-        realised = float(np.einsum("nab,nba->", values, lines.powers).real)
-        if realised > 0:
-            factors.append(sum(designed[kind]) / realised)
-    return min(factors)
+        return merged(Lines(basis.frequencies[order] * step, x[order, None, None].astype(complex)), period)
+    if isinstance(basis, DirectedLines):
+        frequencies, found = basis.lines(x)
+        return merged(Lines(frequencies * step, found), period)
+    w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
+    return grid_lines(basis.density(x, w), period, step)  # type: ignore[attr-defined]
 
 
 def channel_signal_entry(
-    spec: Spec, design: Design, experiment: ChannelExperiment, record: ChannelRecord
+    spec: Spec, design: Design, experiment: ChannelExperiment, record: Record
 ) -> dict[str, Any]:
     """What `result.json` says of a record: powers and peaks by channel, and what it achieves."""
     samples, step = record.samples, record_step(spec)
-    hard = build_channel_bounds(spec, design).hard
-    phases = spec.signal.phases or ("optimised" if hard else record.phases)
-    entry = {"type": "multisine", "phases": phases, **record_sizes(spec, experiment, samples)}
-    information = channel_record_information(experiment, samples, step)
+    entry: dict[str, Any] = {"type": record.method}
+    if record.method == "multisine":
+        phases = build_channel_recipe(spec).phases
+        plain = phases == "random" and spec.signal.phases is None
+        entry["phases"] = "orthogonal" if plain and experiment.inputs > 1 else phases
+    entry |= record_sizes(spec, experiment, samples)
     first = design.problem.requirements[0]
     if isinstance(first, Criterion):
         # Per as many samples as the experiment has, to be compared with the design.
+        information = RecordFilter(experiment, len(samples), step).information(samples)
         reached = first.level(experiment.samples / len(samples) * information)
         entry["criterion"] = first.value(reached)
         entry["efficiency"] = reached / first.level(design.result.information)
-    elif np.isfinite(record.score):
-        entry["worst_ratio"] = record.score
-    return entry
+    elif np.isfinite(record.worst_ratio):
+        entry["worst_ratio"] = record.worst_ratio
+    entry["extra_power"] = record.extra_power
+    entry["spectrum_error"] = channel_spectrum_error(design_lines(design, len(samples), step), samples)
+    return entry | applied_entry(spec, samples)
+
+
+def channel_spectrum_error(lines: Lines, samples: Array) -> float:
+    """The largest error of the record's correlations, lags 0 to 50, against those of the design.
+
+    Those of inputs i and j are relative to the roots of their powers; the total power does not count.
+    """
+    lags = np.arange(min(_LAGS, len(samples) // 4) + 1)
+    turn = np.exp(1j * np.outer(lags, lines.frequencies))
+    wanted = np.einsum("tn,nab->tab", turn, lines.powers).real
+    n = len(samples)
+    found = np.array([samples[lag:].T @ samples[: n - lag] / (n - lag) for lag in lags])
+    found *= np.trace(wanted[0]) / np.trace(found[0])
+    size = np.sqrt(np.diag(wanted[0]))
+    scale = np.where(size > 0.0, size, np.inf)
+    return float(np.abs((found - wanted) / np.outer(scale, scale)).max())
 
 
 def record_sizes(spec: Spec, experiment: ChannelExperiment, samples: Array) -> dict[str, Any]:
     """Length, powers and peaks by channel of a record (n, r)."""
     step = record_step(spec)
-    y, u = channel_outputs(experiment, samples, step), channel_inputs(experiment, samples, step)
+    plant = RecordFilter(experiment, len(samples), step)
+    y, u = plant.outputs(samples), plant.inputs(samples)
     peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
     return {
         "samples": len(samples),

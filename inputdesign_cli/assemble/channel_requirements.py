@@ -142,8 +142,8 @@ def _sensitivity(spec: Spec, model: ChannelModel) -> LoopSensitivity:
     if not isinstance(model, PolynomialChannels):
         raise spec.complain(
             "not-supported",
-            "model_error.sensitivity is that of a loop around a plant in q^-1; of one in s the bound is relative, "
-            "absolute or a table",
+            "model_error.sensitivity is that of a loop around a plant in q^-1; of one in s the bound is "
+            "relative, absolute or a table",
             hint="write relative: 0.05, absolute: 0.1 or table: r_adm.csv",
             key=key,
         )

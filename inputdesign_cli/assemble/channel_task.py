@@ -20,6 +20,7 @@ from inputdesign_cli.assemble.experiment import embedded
 from inputdesign_cli.assemble.limits import build_density_limits, build_power_limits
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.requirements import build_criterion, build_requirements
+from inputdesign_cli.assemble.signal_checks import check_signal
 from inputdesign_cli.assemble.spectra import check_has_density
 from inputdesign_cli.assemble.tables import read_columns
 from inputdesign_cli.assemble.task import Task
@@ -53,6 +54,7 @@ def build_channel_task(spec: Spec) -> Task:
     goal = _GOALS[spec.goal]
     experiment.whitened(1.0)  # says which parameters cannot be told apart
     check_pairs(spec, model.names)
+    check_signal(spec)
     basis = spectrum_basis(spec, experiment.inputs, band)
     _check_columns(spec, basis)
     check_has_density(spec, basis)
@@ -134,8 +136,8 @@ def channel_cost(spec: Spec) -> dict[PowerKind, Weight]:
     return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
 
 
-_SIGNALS = (None, "multisine")
-_SIGNAL_KEYS = (*("periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "also"),)
+# Keys of signals that mean something for a record that the tool makes.
+_MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation")
 
 
 def check_channels_supported(spec: Spec) -> None:
@@ -163,15 +165,8 @@ def check_channels_supported(spec: Spec) -> None:
         _check_loop_supported(spec, refuse)
     if spec.solver.method != "exchange":
         raise refuse("solver.method", f"use the {spec.solver.method} method here", "use exchange")
-    if spec.signal.type not in _SIGNALS:
-        raise refuse(
-            "signal.type",
-            f"make {spec.signal.type} signals for several channels or in continuous time",
-            "use type: multisine, which has any spectrum exactly",
-        )
-    for name in _SIGNAL_KEYS:
-        if getattr(spec.signal, name) is not None:
-            raise refuse(f"signal.{name}", f"apply signal.{name} here", "remove it")
+    if not spec.plant.sampled:
+        _check_interpolated(spec)
     _check_band(spec)
 
 
@@ -183,6 +178,37 @@ def _check_loop_supported(spec: Spec, refuse: Callable[[str, str, str], Exceptio
         raise refuse("limits.amplitude.input", "limit single samples of u in this loop", "limit input_power")
     if spec.limits.rate is not None:
         raise refuse("limits.rate", "limit the moves of u in this loop", "limit input_power")
+
+
+def check_given_signal(spec: Spec) -> None:
+    """A given excitation is shown by one record of it, as it is.
+
+    Raises:
+        SpecError: `not-supported`.
+    """
+    for name in _MADE:
+        if getattr(spec.signal, name) is not None and (name, spec.signal.type) != ("type", "multisine"):
+            raise spec.complain(
+                "not-supported",
+                f"this version does not apply signal.{name} to a given excitation of this plant",
+                hint="remove it",
+                key=f"signal.{name}",
+            )
+
+
+def _check_interpolated(spec: Spec) -> None:
+    """In continuous time samples are interpolated within their band: between them there are no levels."""
+    kinds = ("binary", "ternary", "prbs")
+    bits = spec.signal.bits is not None
+    if spec.signal.type in kinds or spec.signal.hold is not None or bits:
+        key = "signal.hold" if spec.signal.hold is not None else "signal.bits" if bits else "signal.type"
+        raise spec.complain(
+            "not-supported",
+            "a plant in s is driven by the band-limited interpolation of the samples, which has no levels "
+            "and holds nothing between them",
+            hint="write plant.sample: zoh for a signal that is held between samples, or use a multisine",
+            key=key,
+        )
 
 
 def _check_band(spec: Spec) -> None:

@@ -65,7 +65,7 @@ def solve_convex(spec: Spec) -> Outcome:
         result["signal"] = signal_entry(
             spec, experiment, record, design.problem.requirements, (basis, design.result.x)
         )
-        notes = record_notes(spec, experiment, record)
+        notes = record_notes(spec, experiment.samples, record)
         if notes:
             result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
@@ -92,12 +92,12 @@ def solve_convex(spec: Spec) -> Outcome:
         if optimality is not None:
             curves["optimality"] = optimality
     if record is not None:
-        tables["signal"], curves["signal"] = signal_curves(spec, record)
+        tables["signal"], curves["signal"] = signal_curves(spec, record.samples)
         tables["spectrum"], curves["spectrum"] = with_periodogram(
             tables["spectrum"], curves["spectrum"], spec, record.samples
         )
         curves["bound"] = with_record(curves["bound"], spec, experiment, task.alpha, record.samples)
-    files = {} if record is None else other_files(spec, record)
+    files = {} if record is None else other_files(spec, record.samples)
     return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from inputdesign_cli.accuracy import Criterion, Requirement
 from inputdesign_cli.assemble.result import powers
 from inputdesign_cli.assemble.shortest_record import shortest_record
-from inputdesign_cli.assemble.signal_files import operating_point, wav_scale
-from inputdesign_cli.assemble.signal_settings import build_bounds, build_recipe
+from inputdesign_cli.assemble.signal_files import wav_scale
+from inputdesign_cli.assemble.signal_settings import build_bounds, build_recipe, operating_points
 from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Design
 from inputdesign_cli.information import Experiment
@@ -68,13 +68,13 @@ def make_record(spec: Spec, task: Task, design: Design, experiment: Experiment) 
         return realise(experiment, basis, design.result.x, demand, tried, samples=samples, bounds=bounds)
 
     record = made(samples)
-    if record.met or recipe.level is not None or not bounds.hard:
+    if record.met or recipe.level is not None or not (bounds.hard or recipe.quantiser):
         return record
-    return shortest_record(spec, task, design, record, recipe.block, made)
+    return shortest_record(spec, design, record, recipe.block, made)
 
 
-def record_notes(spec: Spec, experiment: Experiment, record: Record) -> list[str]:
-    """What a user should know before applying the record."""
+def record_notes(spec: Spec, length: int, record: Record) -> list[str]:
+    """What a user should know before applying the record; `length` is that of the experiment."""
     notes = []
     if not record.met:
         notes.append(
@@ -82,10 +82,10 @@ def record_notes(spec: Spec, experiment: Experiment, record: Record) -> list[str
             "powers, or the level asked for, leave no room to raise it: a little more power or a few more "
             "samples would do"
         )
-    asked = spec.signal.samples or experiment.samples
-    if record.method != "given" and record.samples.size > asked + build_recipe(spec).block:
+    asked = spec.signal.samples or length
+    if record.method != "given" and len(record.samples) > asked + build_recipe(spec).block:
         notes.append(
-            f"within the limits on single samples the accuracy takes {record.samples.size} samples; the "
+            f"within the limits on single samples the accuracy takes {len(record.samples)} samples; the "
             f"spectrum alone would take {asked}"
         )
     return notes
@@ -160,12 +160,19 @@ def signal_entry(
         entry["extra_power"] = record.extra_power
     if basis is not None:
         entry["spectrum_error"] = spectrum_error(*basis, samples)
-    if spec.signal.offset is not None and record.method != "given":
-        entry["operating_point"] = [operating_point(spec)]
-    if "wav" in (spec.signal.also or ()):
-        entry["wav_full_scale"] = wav_scale(spec, samples)
+    entry |= applied_entry(spec, samples, given=record.method == "given")
     if record.factor_residual is not None:
         entry["spectral_factor_residual"] = record.factor_residual
+    return entry
+
+
+def applied_entry(spec: Spec, samples: Array, *, given: bool = False) -> dict[str, Any]:
+    """What must be known to read the files of the record as its deviations."""
+    entry: dict[str, Any] = {}
+    if spec.signal.offset is not None and not given:
+        entry["operating_point"] = operating_points(spec).tolist()
+    if "wav" in (spec.signal.also or ()):
+        entry["wav_full_scale"] = wav_scale(spec, samples, given=given)
     return entry
 
 

@@ -10,42 +10,39 @@ import numpy as np
 
 from inputdesign_cli.accuracy import error_bound
 from inputdesign_cli.assemble.curves import frequency_header
-from inputdesign_cli.assemble.signal_settings import build_bounds, build_recipe, sampling_rate
+from inputdesign_cli.assemble.signal_settings import (
+    build_channel_bounds,
+    operating_points,
+    sampling_rate,
+)
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.outcome import BoundCurves, SignalCurves, SpectrumCurves, Table
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import Record, record_information
+from inputdesign_cli.signal import record_information
 from inputdesign_cli.spec import Spec
 
 
-def applied(spec: Spec, samples: Array) -> Array:
-    """(n,): the values to be applied, the operating point included."""
-    return samples + operating_point(spec)
+def applied(spec: Spec, samples: Array, *, given: bool = False) -> Array:
+    """(n, r): the values of the samples (n,) or (n, r) to be applied, shifted to the operating points.
 
-
-def operating_point(spec: Spec) -> float:
-    """The offset, or the value of the converter next to it."""
-    quantiser = build_recipe(spec).quantiser
-    if quantiser is not None:
-        return quantiser.operating_point
-    offset = spec.signal.offset
-    return float(offset[0] if isinstance(offset, tuple) else offset or 0.0)
-
-
-def signal_curves(spec: Spec, record: Record) -> tuple[Table, SignalCurves]:
-    """signal.csv, with time stamps in the unit of the spec, and its plot with the limits on u.
-
-    A record that was given is left as it is; others are shifted to the operating point.
+    A record that was `given` is left as it is.
     """
-    time = spec.sample_time * np.arange(record.samples.size, dtype=np.float64)
-    channel = "r1" if spec.closed_loop else "u1"
-    given = record.method == "given"
-    values = {channel: record.samples if given else applied(spec, record.samples)}
-    most = build_bounds(spec, []).amplitude
+    values = samples.reshape(len(samples), -1)
+    return values if given else values + operating_points(spec)
+
+
+def signal_curves(spec: Spec, samples: Array, *, given: bool = False) -> tuple[Table, SignalCurves]:
+    """signal.csv, with time stamps in the unit of the spec, and its plot with the limits on u."""
+    time = spec.sample_time * np.arange(len(samples), dtype=np.float64)
+    shown = applied(spec, samples, given=given)
+    letter = "r" if spec.closed_loop else "u"
+    channels = {f"{letter}{a + 1}": shown[:, a] for a in range(shown.shape[1])}
+    most = build_channel_bounds(spec, []).amplitude
     limits = {}
     if most is not None and not spec.closed_loop and not given:
-        limits[channel] = (operating_point(spec) - most, operating_point(spec) + most)
-    return Table({f"time_{spec.time_unit}": time, **values}), SignalCurves(time, values, limits)
+        around = operating_points(spec)
+        limits = {f"u{a + 1}": (around[a] - most[a], around[a] + most[a]) for a in range(most.size)}
+    return Table({f"time_{spec.time_unit}": time, **channels}), SignalCurves(time, channels, limits)
 
 
 def with_periodogram(
@@ -54,14 +51,19 @@ def with_periodogram(
     """The spectrum with the smoothed periodogram of the record over it; lines are left as they are."""
     if curves.density is None:
         return table, curves
+    w, smooth = smoothed_periodogram(samples, spec.sample_time)
+    record = np.interp(table.columns[frequency_header(spec)], w, smooth)
+    shown = np.interp(curves.frequency, w, smooth)
+    return Table({**table.columns, "phi_record": record}), replace(curves, record=shown)
+
+
+def smoothed_periodogram(samples: Array, step: float) -> tuple[Array, Array]:
+    """Frequencies in rad per unit of the `step`, and the smoothed periodogram there of samples (n,)."""
     periodogram = np.abs(np.fft.rfft(samples)) ** 2 / samples.size
     reach = int(samples.size**0.4 / 4)
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     smooth = np.convolve(np.pad(periodogram, reach, mode="reflect"), window, mode="valid")
-    w = 2 * np.pi * np.arange(periodogram.size) / samples.size / spec.sample_time
-    record = np.interp(table.columns[frequency_header(spec)], w, smooth)
-    shown = np.interp(curves.frequency, w, smooth)
-    return Table({**table.columns, "phi_record": record}), replace(curves, record=shown)
+    return 2 * np.pi * np.arange(periodogram.size) / samples.size / step, smooth
 
 
 def with_record(
@@ -76,15 +78,15 @@ def with_record(
     return replace(curves, r_u_record=r_u)
 
 
-def other_files(spec: Spec, record: Record) -> dict[str, bytes]:
-    """signal.mat (time, u1 or r1, sample_time) and signal.wav (32-bit float, full scale 1 is `scale`)."""
+def other_files(spec: Spec, samples: Array, *, given: bool = False) -> dict[str, bytes]:
+    """signal.mat (time, u1, .. or r1, sample_time) and signal.wav (32-bit float, 1 being `wav_scale`)."""
     wanted = spec.signal.also or ()
     if not wanted:
         return {}
     import scipy.io
     import scipy.io.wavfile
 
-    table, _ = signal_curves(spec, record)
+    table, _ = signal_curves(spec, samples, given=given)
     files: dict[str, bytes] = {}
     if "mat" in wanted:
         buffer = io.BytesIO()
@@ -95,13 +97,15 @@ def other_files(spec: Spec, record: Record) -> dict[str, bytes]:
     if "wav" in wanted:
         buffer = io.BytesIO()
         rate = round(sampling_rate(spec))
-        values = applied(spec, record.samples) / wav_scale(spec, record.samples)
+        values = applied(spec, samples, given=given) / wav_scale(spec, samples, given=given)
         scipy.io.wavfile.write(buffer, rate, values.astype(np.float32))
         files["signal.wav"] = buffer.getvalue()
     return files
 
 
-def wav_scale(spec: Spec, samples: Array) -> float:
-    """What full scale stands for in signal.wav: the range of the converter, or the largest value."""
+def wav_scale(spec: Spec, samples: Array, *, given: bool = False) -> float:
+    """What full scale stands for in signal.wav, in all channels: the largest range or the largest value."""
     stated = spec.signal.quantisation
-    return float(np.abs(applied(spec, samples)).max()) if stated is None else stated.range
+    if stated is not None and not given:
+        return float(np.max(stated.range))
+    return float(np.abs(applied(spec, samples, given=given)).max())

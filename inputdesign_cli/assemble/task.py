@@ -12,7 +12,7 @@ from inputdesign_cli.assemble.experiment import build_cost, build_experiment
 from inputdesign_cli.assemble.limits import build_density_limits, build_power_limits
 from inputdesign_cli.assemble.model_error import build_model_error, model_error_alpha
 from inputdesign_cli.assemble.requirements import build_criterion, build_requirements
-from inputdesign_cli.assemble.signal_settings import check_signal
+from inputdesign_cli.assemble.signal_checks import check_signal
 from inputdesign_cli.assemble.spectra import band_of_lines, build_basis
 from inputdesign_cli.design.designs import Question
 from inputdesign_cli.design.problem import Goal

@@ -30,6 +30,10 @@ def draw_matrix_spectrum(curves: MatrixSpectrumCurves, path: Path, time_unit: st
         for number, (i, j) in enumerate(pairs[:MOST]):
             label = rf"$|\Phi_{{{i + 1}{j + 1}}}|$"
             handles += _curve(above, curves, entries[:, i, j], number, label)
+        if curves.record is not None:
+            drawn = above.plot(curves.frequency, curves.record, color=GREY, linewidth=0.8, zorder=1)
+            drawn[0].set_label("record, smoothed")
+            handles += drawn[:1]
         of = f"power of each line of ${curves.symbol}$"
         above.set_ylabel(of if curves.lines else rf"density of ${curves.symbol}$")
         _linear_if_flat(above, entries[:, [i for i, _ in pairs], [j for _, j in pairs]])

@@ -13,6 +13,7 @@ from inputdesign_cli.report.style import BLUE, GREY, ORANGE, figure
 SHOWN = 1000  # samples that a figure of this width can show one by one
 STEPS_TO = 300  # up to here the hold between samples is visible
 ROWS = 4  # channels that fit
+MARGIN = 0.08  # above and below, of what is shown
 
 
 def draw_signal(curves: SignalCurves, path: Path, time_unit: str) -> None:
@@ -29,6 +30,10 @@ def draw_signal(curves: SignalCurves, path: Path, time_unit: str) -> None:
             for bound in curves.limits.get(name, ()):
                 for axes in (record, histogram):
                     axes.axhline(bound, color=ORANGE, linewidth=1.0, linestyle=(0, (5, 2)))
+            reached = [float(values.min()), float(values.max()), *curves.limits.get(name, ())]
+            low, high = min(reached), max(reached)
+            if high > low:
+                record.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
         last, counts = grid[-1]
         last.set_xlabel(f"time ({time_unit})")
         counts.set_xlabel("share (%)")
@@ -45,7 +50,6 @@ def _draw_record(axes: Axes, time: Array, values: Array) -> None:
     steps = "steps-post" if values.size <= STEPS_TO else "default"
     axes.plot(time, values, color=BLUE, linewidth=0.9, drawstyle=steps)
     axes.set_xlim(time[0], time[-1])
-    axes.margins(y=0.08)
 
 
 def _draw_histogram(axes: Axes, values: Array) -> None:

@@ -2,61 +2,119 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.information import ChannelExperiment, PowerKind
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # e^-32 is below rounding; a plant that remembers longer than this many samples is cut there.
 _FORGOTTEN = 32.0
 _LONGEST_MEMORY = 2**20
 _FREQUENCIES_AT_ONCE = 16384
+# Frequency responses of more numbers than this are computed anew for each record.
+_KEPT = 2**22
+
+
+@dataclass(frozen=True)
+class RecordFilter:
+    """The plant or its loop, from rest, as it answers records of `samples` samples of the excitation.
+
+    Filtering is by FFT, padded past memory. In continuous time the plant is driven by the band-limited
+    interpolation of the samples, `step` apart, and its outputs are read at the same instants.
+    """
+
+    experiment: ChannelExperiment
+    samples: int
+    step: float
+
+    def information(self, record: Array) -> Array:
+        """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of the samples (n, r), M0 scaled to n."""
+        psi = self._answer(record, "gradient")
+        flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
+        noise = self.samples / self.experiment.samples * self.experiment.noise_information
+        return self.experiment.prior_information + noise + flat @ flat.T
+
+    def outputs(self, record: Array) -> Array:
+        """(n, p): what the samples (n, r) alone cause."""
+        return self._answer(record, "output")[:, 0]
+
+    def inputs(self, record: Array) -> Array:
+        """(n, r): what the samples (n, r) alone cause at the inputs; in open loop they are the inputs."""
+        if self.experiment.loop is None:
+            return record
+        return self._answer(record, "input")[:, 0]
+
+    def output(self, record: Array, channel: int) -> Array:
+        """(n,): one of the outputs."""
+        transform = np.fft.rfft(record, self._length, axis=0)
+        answer = np.einsum("nr,nr->n", self._plant[:, channel], transform)
+        return np.asarray(np.fft.irfft(answer, self._length)[: self.samples])
+
+    def output_adjoint(self, weights: Array, channel: int) -> Array:
+        """(n, r): the transpose of `output`, applied to weights (n,)."""
+        transform = np.fft.rfft(weights, self._length)
+        answer = self._plant[:, channel].conj() * transform[:, None]
+        return np.asarray(np.fft.irfft(answer, self._length, axis=0)[: self.samples])
+
+    @cached_property
+    def _length(self) -> int:
+        experiment = self.experiment
+        damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
+            self.step if experiment.model.continuous else 1.0
+        )
+        memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
+        return int(2 ** np.ceil(np.log2(self.samples + memory)))
+
+    @cached_property
+    def _frequencies(self) -> Array:
+        w = 2.0 * np.pi * np.arange(self._length // 2 + 1) / self._length
+        return w / self.step if self.experiment.model.continuous else w
+
+    @cached_property
+    def _plant(self) -> ComplexArray:
+        return self.experiment.response("output", self._frequencies)
+
+    @cached_property
+    def _gradient(self) -> ComplexArray:
+        return self._filters("gradient", self._frequencies)
+
+    def _filters(self, of: PowerKind | Literal["gradient"], w: Array) -> ComplexArray:
+        """(n, k, p, r) those of the prediction gradient, or (n, 1, channels, r)."""
+        if of == "gradient":
+            return self.experiment.excitation_gradient(w)
+        return self.experiment.response(of, w)[:, None]
+
+    def _answer(self, record: Array, of: PowerKind | Literal["gradient"]) -> NDArray[np.float64]:
+        """(n, k, p) the prediction gradient, or (n, 1, channels)."""
+        transform = np.fft.rfft(record, self._length, axis=0)
+        model = self.experiment.model
+        size = self.experiment.size * model.outputs * model.inputs * len(transform)
+        if of == "gradient" and size <= _KEPT:
+            answer = np.einsum("nkpr,nr->nkp", self._gradient, transform)
+            return np.fft.irfft(answer, self._length, axis=0)[: len(record)]
+        parts = []
+        for start in range(0, len(transform), _FREQUENCIES_AT_ONCE):
+            part = slice(start, start + _FREQUENCIES_AT_ONCE)
+            F = self._filters(of, self._frequencies[part])
+            parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
+        return np.fft.irfft(np.concatenate(parts), self._length, axis=0)[: len(record)]
 
 
 def channel_record_information(experiment: ChannelExperiment, record: Array, step: float) -> Array:
-    """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of the samples (n, r), from rest, M0 scaled to n.
-
-    In continuous time the plant is driven by the band-limited interpolation of the samples, `step`
-    apart, and its outputs are read at the same instants.
-    """
-    psi = _response(experiment, record, step, of="gradient")
-    flat = psi.transpose(1, 0, 2).reshape(experiment.size, -1)
-    noise = len(record) / experiment.samples * experiment.noise_information
-    return experiment.prior_information + noise + flat @ flat.T
+    """(k, k): the information of one record (n, r), see `RecordFilter`."""
+    return RecordFilter(experiment, len(record), step).information(record)
 
 
 def channel_outputs(experiment: ChannelExperiment, record: Array, step: float) -> Array:
     """(n, p): what the samples alone cause at the outputs, from rest."""
-    return _response(experiment, record, step, of="output")[:, 0]
+    return RecordFilter(experiment, len(record), step).outputs(record)
 
 
 def channel_inputs(experiment: ChannelExperiment, record: Array, step: float) -> Array:
     """(n, r): what the samples alone cause at the inputs; in open loop they are the inputs."""
-    return record if experiment.loop is None else _response(experiment, record, step, of="input")[:, 0]
-
-
-def _response(
-    experiment: ChannelExperiment, record: Array, step: float, *, of: PowerKind | Literal["gradient"]
-) -> NDArray[np.float64]:
-    """(n, k, p) the prediction gradient, or (n, 1, channels): filtering by FFT, padded past memory."""
-    damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
-        step if experiment.model.continuous else 1.0
-    )
-    memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
-    length = int(2 ** np.ceil(np.log2(len(record) + memory)))
-    transform = np.fft.rfft(record, length, axis=0)
-    w = 2.0 * np.pi * np.arange(length // 2 + 1) / length
-    if experiment.model.continuous:
-        w = w / step
-    parts = []
-    for start in range(0, w.size, _FREQUENCIES_AT_ONCE):
-        part = slice(start, start + _FREQUENCIES_AT_ONCE)
-        if of == "gradient":
-            F = experiment.excitation_gradient(w[part])
-        else:
-            F = experiment.response(of, w[part])[:, None]
-        parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
-    return np.fft.irfft(np.concatenate(parts), length, axis=0)[: len(record)]
+    return RecordFilter(experiment, len(record), step).inputs(record)

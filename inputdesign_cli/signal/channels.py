@@ -33,6 +33,29 @@ class Lines:
         """The same with all powers multiplied."""
         return Lines(self.frequencies, factor * self.powers, self.period)
 
+    @property
+    def inputs(self) -> int:
+        """How many signals share the lines."""
+        return int(self.powers.shape[1])
+
+    @property
+    def mean_squares(self) -> Array:
+        """(r,): the powers of the inputs."""
+        return np.asarray(np.einsum("naa->a", self.powers).real)
+
+    def dense(self, period: int) -> ComplexArray:
+        """(period // 2 + 1, r, r): the powers, each at the harmonic of the period that is next to it."""
+        powers = np.zeros((period // 2 + 1, self.inputs, self.inputs), dtype=complex)
+        nearest = np.rint(self.frequencies * period / (2.0 * np.pi)).astype(int)
+        np.add.at(powers, np.minimum(nearest, period // 2), self.powers)
+        return powers
+
+    @classmethod
+    def of_period(cls, powers: ComplexArray, period: int) -> Lines:
+        """The harmonics of a period that carry power, from the matrices (period // 2 + 1, r, r) of all."""
+        kept = np.trace(powers, axis1=1, axis2=2).real > 0
+        return cls(2.0 * np.pi * np.flatnonzero(kept) / period, powers[kept], period)
+
 
 def merged(lines: Lines, samples: int) -> Lines:
     """Lines that a record of so many samples cannot tell apart as one each, with the sum of their powers.
@@ -77,9 +100,7 @@ def grid_lines(density: NDArray, period: int, step: float) -> Lines:
     power[0] *= 0.5
     if period % 2 == 0:
         power[-1] *= 0.5
-    w = 2.0 * np.pi * np.arange(len(power)) / period
-    kept = np.trace(power, axis1=1, axis2=2).real > 0
-    return Lines(w[kept], power[kept], period)
+    return Lines.of_period(np.asarray(power, dtype=complex), period)
 
 
 def multisine_record(
@@ -106,8 +127,7 @@ def multisine_record(
     turn = np.where(real, np.where(common < 0.5, 1.0, -1.0), np.exp(2j * np.pi * common))
     if angles is not None:
         turn = np.where(real, np.where(np.cos(angles) >= 0, 1.0, -1.0), np.exp(1j * angles))
-    roots = _roots(lines.powers)
-    roots = np.where(real[:, None, None], _roots(lines.powers.real.astype(complex)), roots)
+    roots = roots_of(lines, int(edges[1]))
     out = np.empty((samples, r))
     for block in range(edges.size - 1):
         if phases == "random":
@@ -120,6 +140,16 @@ def multisine_record(
         amplitude = np.where(real, 1.0, np.sqrt(2.0))[:, None] * vectors
         out[edges[block] : edges[block + 1]] = _sinusoids(lines, amplitude, edges[block + 1] - edges[block])
     return out
+
+
+def gaussian_record(lines: Lines, rng: np.random.Generator) -> Array:
+    """(period, r): Gaussian noise that is periodic, with random amplitudes at all of its harmonics."""
+    assert lines.period is not None
+    random = rng.standard_normal((2, len(lines.powers), lines.inputs))
+    real = is_real(lines.frequencies, lines.period)[:, None]
+    mix = np.where(real, random[0], (random[0] + 1j * random[1]) / np.sqrt(2.0))
+    vectors = np.einsum("nab,nb->na", roots_of(lines, lines.period), mix)
+    return _sinusoids(lines, np.where(real, 1.0, np.sqrt(2.0)) * vectors, lines.period)
 
 
 def in_phase_record(frequencies: Array, amplitudes: Array, samples: int, rng: np.random.Generator) -> Array:
@@ -135,11 +165,14 @@ def in_phase_record(frequencies: Array, amplitudes: Array, samples: int, rng: np
 
 def block_vectors(lines: Lines, samples: int, block: int) -> ComplexArray:
     """(L, r): root(P) q_b, the line vectors of a period of an orthogonal record but for the common phase."""
-    r = lines.powers.shape[1]
-    real = is_real(lines.frequencies, samples // r)
-    roots = _roots(lines.powers)
-    roots = np.where(real[:, None, None], _roots(lines.powers.real.astype(complex)), roots)
-    return np.asarray(roots @ orthogonal_columns(r)[:, block].astype(complex))
+    r = lines.inputs
+    return np.asarray(roots_of(lines, samples // r) @ orthogonal_columns(r)[:, block].astype(complex))
+
+
+def roots_of(lines: Lines, samples: int) -> ComplexArray:
+    """(L, r, r): Hermitian square roots of the powers, real ones at 0 and pi."""
+    real = is_real(lines.frequencies, samples)[:, None, None]
+    return np.where(real, _roots(lines.powers.real.astype(complex)), _roots(lines.powers))
 
 
 def is_real(w: Array, samples: int) -> NDArray[np.bool_]:

@@ -16,8 +16,8 @@ import scipy.optimize
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
-_POWERS = (4, 8, 16, 32, 64, 128, 256, 512)
-_STEPS = 150
+POWERS = (4, 8, 16, 32, 64, 128, 256, 512)
+STEPS = 150
 _NEGLIGIBLE = 1e-40
 
 
@@ -26,8 +26,8 @@ def optimise_phases(
     start: Array,
     *,
     gains: Sequence[ComplexArray] = (),
-    powers: Sequence[int] = _POWERS,
-    steps: int = _STEPS,
+    powers: Sequence[int] = POWERS,
+    steps: int = STEPS,
 ) -> Array:
     """(L,): phases from `start` (L,) on that keep the largest of all samples low.
 

@@ -19,19 +19,20 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.crest import optimise_phases
 from inputdesign_cli.signal.sinusoids import Sinusoids
 
+# The 4-norm alone makes the modulus even.
+EVEN, EVEN_STEPS = (4,), 60
 _ROUNDS = 60
-_STEPS = 60
 _LONGEST_REGISTER = 32
 
 
 def two_level(lines: Sinusoids, rng: np.random.Generator) -> Array:
     """(samples,) of +1 and -1: one period whose line powers are near those of `lines` (on the grid)."""
-    return _alternate(lines, rng, _signs)
+    return _of_lines(lines, rng, signs)
 
 
 def three_level(lines: Sinusoids, rng: np.random.Generator) -> Array:
     """(samples,) of +1, 0 and -1 likewise; the share of zeros is what fits best."""
-    return _alternate(lines, rng, _signs_and_zeros)
+    return _of_lines(lines, rng, signs_and_zeros)
 
 
 def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:
@@ -54,34 +55,52 @@ def register_length(samples: int) -> int:
     return min(max(2, int(np.ceil(np.log2(samples + 1)))), _LONGEST_REGISTER)
 
 
-def _alternate(lines: Sinusoids, rng: np.random.Generator, nearest: Callable[[Array], Array]) -> Array:
-    """The pair's better half: the levels whose line powers, at their best scale, fit best."""
-    phases = optimise_phases(lines, lines.random_phases(rng), powers=(4,), steps=_STEPS)
-    start = lines.record(phases)
-    magnitude = np.zeros(lines.samples // 2 + 1)
-    magnitude[lines.harmonics] = lines.samples * lines.amplitudes * np.where(lines.real, 1.0, 0.5)
+def alternate(
+    start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
+) -> Array:
+    """The best signal of few levels that is met on the way between the two things wanted.
+
+    Args:
+        start: the first signal of any values.
+        nearest: the signal of few levels next to one of any values.
+        restored: the signal with the wanted spectrum next to one of few levels, and the misfit of that.
+    """
     levels = nearest(start)
     best, least = levels, np.inf
     for _ in range(_ROUNDS):
-        transform = np.fft.rfft(levels)
-        modulus = np.abs(transform)
-        fit = float(magnitude @ modulus / (modulus @ modulus))
-        misfit = float(np.sum((magnitude - fit * modulus) ** 2))
+        wanted, misfit = restored(levels)
         if misfit < least:
             best, least = levels, misfit
-        restored = magnitude * np.where(modulus > 0, transform, 1.0) / np.where(modulus > 0, modulus, 1.0)
-        following = nearest(np.fft.irfft(restored, lines.samples))
+        following = nearest(wanted)
         if np.array_equal(following, levels):
             break
         levels = following
     return best
 
 
-def _signs(record: Array) -> Array:
+def _of_lines(lines: Sinusoids, rng: np.random.Generator, nearest: Callable[[Array], Array]) -> Array:
+    """The levels whose line powers, at their best scale, fit best."""
+    phases = optimise_phases(lines, lines.random_phases(rng), powers=EVEN, steps=EVEN_STEPS)
+    magnitude = np.zeros(lines.samples // 2 + 1)
+    magnitude[lines.harmonics] = lines.samples * lines.amplitudes * np.where(lines.real, 1.0, 0.5)
+
+    def restored(levels: Array) -> tuple[Array, float]:
+        transform = np.fft.rfft(levels)
+        modulus = np.abs(transform)
+        fit = float(magnitude @ modulus / (modulus @ modulus))
+        misfit = float(np.sum((magnitude - fit * modulus) ** 2))
+        direction = np.where(modulus > 0, transform, 1.0) / np.where(modulus > 0, modulus, 1.0)
+        return np.fft.irfft(magnitude * direction, lines.samples), misfit
+
+    return alternate(lines.record(phases), nearest, restored)
+
+
+def signs(record: Array) -> Array:
+    """The nearest multiple of a signal of -1 and 1."""
     return np.where(record >= 0.0, 1.0, -1.0)
 
 
-def _signs_and_zeros(record: Array) -> Array:
+def signs_and_zeros(record: Array) -> Array:
     """The nearest multiple of a signal of -1, 0, 1: the m largest values are kept, m the best of all."""
     size = np.abs(record)
     order = np.sort(size)[::-1]

@@ -59,8 +59,9 @@ class Recipe:
 
     `hold`: each value stands for this many samples; `periods`: equal ones in the record; `ramp`: samples
     over which it fades in and out; `bits`: register of a pseudo-random sequence; `level`: the peak that
-    the record is to have, whatever that buys. Up to `most_candidates` are drawn while the best of the first
-    `candidates` costs more than a twentieth beyond the design.
+    the record is to have (or the peaks of its inputs), whatever that buys; `quantiser`: of a single input.
+    Up to `most_candidates` are drawn while the best of the first `candidates` costs more than a twentieth
+    beyond the design.
     """
 
     method: Method = "filtered_noise"
@@ -70,7 +71,7 @@ class Recipe:
     hold: int = 1
     ramp: int = 0
     bits: int | None = None
-    level: float | None = None
+    level: float | Array | None = None
     quantiser: Quantiser | None = None
     candidates: int = 20
     most_candidates: int = 80

@@ -11,8 +11,9 @@ import scipy.optimize
 # the coarser one where limits and rounding make it depend on the level in another way.
 _EXACT = 1e-10
 _COARSE = 1e-3
-_GROWTH = 1.12
+_GROWTH = 1.2
 _MOST_GROWTH = 40.0
+_NOTHING = 1e-9
 
 
 def least_level(ratio: Callable[[float], float], start: float) -> float:
@@ -30,14 +31,13 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
     low = high = level
     while ratio(high) > 1.0:
         low, high = high, high * 1.5
-    while ratio(low) <= 1.0 and low > 1e-9 * start:
+    while ratio(low) <= 1.0:
+        if low <= _NOTHING * start:  # what is known without the record is enough
+            return low
         low, high = low / 1.5, low
-    if ratio(low) > 1.0:
-        high = float(
-            scipy.optimize.brentq(lambda a: np.log(ratio(a)), low, high, xtol=_EXACT * low, rtol=1e-14)
-        )
-        while ratio(high) > 1.0:
-            high *= 1.0 + _EXACT
+    high = float(scipy.optimize.brentq(lambda a: np.log(ratio(a)), low, high, xtol=_EXACT * low, rtol=1e-14))
+    while ratio(high) > 1.0:
+        high *= 1.0 + _EXACT
     return high
 
 
@@ -58,6 +58,20 @@ def first_level(accepted: Callable[[float], bool], start: float) -> float | None
         else:
             low = middle
     return high
+
+
+def last_level(accepted: Callable[[float], bool], start: float) -> float:
+    """The greatest level below `start` that is accepted, to a thousandth, where lower ones are as well."""
+    low, high = start / _GROWTH, start
+    while not accepted(low) and low > start / _MOST_GROWTH:
+        low, high = low / _GROWTH, low
+    while high > low * (1.0 + _COARSE):
+        middle = np.sqrt(low * high)
+        if accepted(middle):
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def level_of_power(power: Callable[[float], float], wanted: float, start: float) -> float:

@@ -92,8 +92,8 @@ class Sinusoids:
         return np.where(self.real, 0.0, -(vector * transform).imag)
 
 
-def select(line_power: Array, lines: Selection) -> Array:
-    """The powers (P // 2 + 1,) of a period gathered into some of its lines; the total is kept.
+def select(line_power: NDArray, lines: Selection) -> NDArray:
+    """The powers (P // 2 + 1, ..) of a period gathered into some of its lines; the total is kept.
 
     The power of each line goes to the nearest chosen one, halves to both if two are equally near.
 
@@ -103,19 +103,20 @@ def select(line_power: Array, lines: Selection) -> Array:
     """
     if lines is None:
         return line_power
-    top = line_power.size - 1
+    top = len(line_power) - 1
     if lines == "odd":
         chosen = np.arange(1, top + 1, 2)
     elif isinstance(lines, int):
         chosen = np.unique(np.rint(np.linspace(1, top, min(lines, top))).astype(int))
     else:
         chosen = np.unique(np.asarray(lines, dtype=int))
-    every = np.arange(line_power.size)
+    every = np.arange(len(line_power))
     right = np.clip(np.searchsorted(chosen, every), 0, chosen.size - 1)
     left = np.maximum(right - 1, 0)
     to_left, to_right = np.abs(every - chosen[left]), np.abs(chosen[right] - every)
     share = np.where(to_left < to_right, 1.0, np.where(to_left == to_right, 0.5, 0.0))
-    gathered = np.zeros(line_power.size)
+    share = share.reshape(-1, *np.ones(line_power.ndim - 1, dtype=int))
+    gathered = np.zeros_like(line_power)
     np.add.at(gathered, chosen[left], share * line_power)
     np.add.at(gathered, chosen[right], (1.0 - share) * line_power)
     return gathered

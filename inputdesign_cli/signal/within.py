@@ -20,9 +20,9 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class Watched:
-    """A signal that is linear in the record, such as the output, and the largest modulus it may have.
+    """A signal (n,) that is linear in the record, such as an output, and the largest modulus it may have.
 
-    `adjoint` is the transpose of `apply`.
+    `adjoint` is the transpose of `apply`: it answers in the shape of the record.
     """
 
     apply: LinearMap
@@ -77,24 +77,25 @@ def compressed(values: Array, peak: float) -> Array:
 
 
 def restrained(values: Array, watched: tuple[Watched, ...]) -> Array:
-    """The record near `values` (n,) whose `watched` signals all keep to their bounds.
+    """The record near `values` (n,) or (n, r) whose `watched` signals all keep to their bounds.
 
-    Least squares with the excess penalised ever more (a quasi-Newton method), scaled down at the end so
-    that the bounds hold exactly.
+    Least squares, each input in its own root mean square, with the excess penalised ever more (a
+    quasi-Newton method), scaled down at the end so that the bounds hold exactly.
     """
     record = values
     if peak_ratio(record, watched) > 1.0:
-        scale = float(np.sqrt(np.mean(values**2)))
+        rms = np.sqrt(np.mean(values**2, axis=0))
+        scale = np.where(rms > 0.0, rms, 1.0)
         for penalty in _PENALTIES:
             found = scipy.optimize.minimize(
                 _penalised,
-                record,
-                args=(values, watched, penalty * scale**2),
+                (record / scale).ravel(),
+                args=(values, scale, watched, penalty),
                 jac=True,
                 method="L-BFGS-B",
                 options={"maxiter": _STEPS},
             )
-            record = found.x
+            record = found.x.reshape(values.shape) * scale
     excess = peak_ratio(record, watched)
     return record if excess <= 1.0 else record * (_INSIDE / excess)
 
@@ -105,13 +106,15 @@ def peak_ratio(values: Array, watched: tuple[Watched, ...]) -> float:
 
 
 def _penalised(
-    record: Array, wanted: Array, watched: tuple[Watched, ...], penalty: float
+    relative: Array, wanted: Array, scale: Array, watched: tuple[Watched, ...], penalty: float
 ) -> tuple[float, Array]:
-    away = record - wanted
-    value, slope = 0.5 * float(away @ away), away
+    """Half the squared distance, relative to `scale`, with the penalties, and its slope."""
+    record = relative.reshape(wanted.shape) * scale
+    away = (record - wanted) / scale
+    value, slope = 0.5 * float(np.sum(away**2)), away
     for signal in watched:
-        relative = signal.apply(record) / signal.bound
-        excess = relative - np.clip(relative, -_INSIDE, _INSIDE)
+        ratio = signal.apply(record) / signal.bound
+        excess = ratio - np.clip(ratio, -_INSIDE, _INSIDE)
         value += 0.5 * penalty * float(excess @ excess)
-        slope = slope + penalty * signal.adjoint(excess) / signal.bound
-    return value, slope
+        slope = slope + penalty * signal.adjoint(excess) / signal.bound * scale
+    return value, slope.ravel()

@@ -36,6 +36,8 @@ def channels(spec: Spec) -> Iterator[Finding]:
         (signal.amplitudes, ("signal", "amplitudes"), inputs, "inputs"),
         (signal.offset, ("signal", "offset"), inputs, "inputs"),
     ]
+    if signal.quantisation is not None:
+        sized.append((signal.quantisation.range, ("signal", "quantisation", "range"), inputs, "inputs"))
     if limits.amplitude is not None:
         sized.append((limits.amplitude.input, ("limits", "amplitude", "input"), inputs, "inputs"))
         sized.append((limits.amplitude.output, ("limits", "amplitude", "output"), outputs, "outputs"))

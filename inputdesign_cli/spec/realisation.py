@@ -12,7 +12,6 @@ from inputdesign_cli.spec.fields import (
     Harmonics,
     Index,
     PerChannel,
-    Positive,
     PositivePerChannel,
     RegisterLength,
     Tolerance,
@@ -37,8 +36,10 @@ class Quantisation(Section):
     """The digital-to-analogue converter that applies the signal."""
 
     bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
-    range: Positive = Field(
-        description="They span [-range, range), in the unit of u, the offset included.", examples=[10.0]
+    range: PositivePerChannel = Field(
+        description="They span [-range, range), in the unit of u, the offset included; a number or one per "
+        "input.",
+        examples=[10.0],
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
+    ChannelDrawer,
     ChannelPhases,
     Lines,
     Recipe,
@@ -68,6 +69,26 @@ class Multisine:
 
     def information(self, experiment: ChannelExperiment) -> Array:
         return _line_information(experiment, self.lines, self.step)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Records of the designed spectrum, drawn anew in each run and scaled to its power exactly."""
+
+    name: str
+    drawer: ChannelDrawer
+    power: float
+    step: float
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        values = np.stack([self.drawer.values(rng) for _ in range(runs)])
+        return _scaled(np.repeat(values, self.drawer.recipe.hold, axis=1), self.power)
+
+    def information(self, experiment: ChannelExperiment) -> Array:
+        single = self.drawer.recipe.block == 1
+        lines = self.drawer.lines if single else self.drawer.design(self.drawer.samples, 1)
+        total = float(np.trace(lines.powers.sum(axis=0)).real)
+        return _line_information(experiment, lines.scaled(self.power / total), self.step)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from inputdesign_cli.assemble.channels import record_step
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import Outcome, Table
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import Lines, Recipe
+from inputdesign_cli.signal import ChannelDrawer, Recipe
 from inputdesign_cli.signal.recipe import Method
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.realisation import Simulation
@@ -19,6 +19,7 @@ from inputdesign_cli.spec.spectrum import GivenMultisine, GivenSpectrum
 from inputdesign_cli.spectrum import TabulatedChannels
 from inputdesign_cli.study.channel_excitations import (
     ChannelExcitation,
+    Drawn,
     Flat,
     InPhase,
     Multisine,
@@ -30,13 +31,17 @@ _METHODS: dict[str, Method] = {"white": "filtered_noise", "prbs": "prbs", "binar
 
 
 def study_excitations(
-    spec: Spec, study: Simulation, experiment: ChannelExperiment, outcome: Outcome, lines: Lines | None
+    spec: Spec,
+    study: Simulation,
+    experiment: ChannelExperiment,
+    outcome: Outcome,
+    drawer: ChannelDrawer | None,
 ) -> list[ChannelExcitation]:
     """The design, what `compare` names at equal power, and white noise of the power that it would need.
 
     Args:
         experiment: the nominal one.
-        lines: the sinusoids that stand for the design, see `designed_channels`.
+        drawer: draws other records of the designed spectrum, see `designed_channels`.
 
     Raises:
         SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
@@ -51,9 +56,13 @@ def study_excitations(
             key="accuracy",
         )
     design = Recorded("design", _record(spec, table, experiment.inputs), step)
-    renewed = _renewed(spec, experiment, design, lines) if study.excitation == "new" else None
-    listed: list[ChannelExcitation] = [renewed or design]
     power = float(np.sum(result["power"]["excitation"]))
+    renewed = None
+    if study.excitation == "new":
+        renewed = (
+            _redrawn(spec, experiment, design) if drawer is None else Drawn("design", drawer, power, step)
+        )
+    listed: list[ChannelExcitation] = [renewed or design]
     samples = len(design.record)
     listed += [_flat(spec, experiment, name, name, power, samples) for name in study.compare]
     needed = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation")
@@ -69,13 +78,8 @@ def _record(spec: Spec, table: Table, inputs: int) -> Array:
     return samples - np.asarray(spec.signal.offset or 0.0, dtype=float)
 
 
-def _renewed(
-    spec: Spec, experiment: ChannelExperiment, record: Recorded, lines: Lines | None
-) -> ChannelExcitation | None:
-    """What realises the spectrum anew; None for a given signal."""
-    phases = channel_phases(spec)
-    if spec.designs:
-        return None if lines is None else Multisine("design", lines, phases, record.step)
+def _redrawn(spec: Spec, experiment: ChannelExperiment, record: Recorded) -> ChannelExcitation | None:
+    """What realises a given spectrum anew; None for a given signal."""
     assert isinstance(spec.spectrum, GivenSpectrum)
     given = spec.spectrum.given
     if isinstance(given, GivenMultisine):
@@ -83,7 +87,7 @@ def _renewed(
         return InPhase("design", frequencies * record.step, amplitudes, record.step)
     excitation = read_channel_excitation(spec, experiment)
     found = given_lines(spec, excitation, len(record.record))
-    return None if found is None else Multisine("design", found, phases, record.step)
+    return None if found is None else Multisine("design", found, channel_phases(spec), record.step)
 
 
 def _flat(

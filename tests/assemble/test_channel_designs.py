@@ -226,7 +226,7 @@ spectrum: {{type: polynomial, order: 8, band: [0, 2.0]}}
     outcome = solve(changed(text))
     assert outcome.result["information"]["parameters"] == ["b0", "a0", "a1"]
     assert outcome.result["objective"]["relative_gap"] <= 1e-6
-    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi"]
+    assert list(outcome.tables["spectrum"].columns) == ["frequency_rad_per_s", "phi", "phi_record"]
     assert outcome.result["signal"]["efficiency"] > 0.9
 
 
@@ -257,7 +257,8 @@ BAD = {
         "not-supported",
         "relative, absolute or a table",
     ),
-    "noise by filter": ("signal.type=filtered_noise", "not-supported", ""),
+    "levels in continuous time": ("signal.type=binary", "not-supported", "has no levels"),
+    "hold in continuous time": ("signal.hold=2", "not-supported", "holds nothing"),
     "columns without a criterion": (
         "accuracy={standard_deviation: {'b0[1,1]': 0.1}}",
         "not-supported",

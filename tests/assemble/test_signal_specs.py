@@ -71,6 +71,21 @@ def test_a_record_that_is_too_short_names_one_that_is_not():
     assert signal["peak"][0] <= 0.6
 
 
+def test_a_converter_of_too_small_a_range_is_named():
+    text = "signal: {candidates: 1, quantisation: {bits: 8, range: 0.45}}\n"
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(BASE + text))
+    (complaint,) = error.value.complaints
+    assert (complaint.code, complaint.key) == ("limits-too-tight", "signal.quantisation")
+    assert 500 < int(complaint.hint.split()[0]) < 2000
+
+
+def test_limits_that_no_length_makes_up_for():
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(BASE + "limits: {amplitude: 0.01}\nsignal: {candidates: 1}\n"))
+    assert "would be needed" in error.value.complaints[0].hint
+
+
 def test_the_shortest_experiment_delivers_the_longer_record():
     text = BASE.replace("experiment: {samples: 500}\n", "objective: shortest_experiment\n")
     outcome = solve(

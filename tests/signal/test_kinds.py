@@ -15,6 +15,7 @@ from inputdesign_cli.signal import (
 from inputdesign_cli.signal.draw import Drawer
 from inputdesign_cli.signal.levels import pseudo_random, register_length, three_level, two_level
 from inputdesign_cli.signal.spectral_factor import autocorrelation
+from inputdesign_cli.signal.within import compressed
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
@@ -73,6 +74,19 @@ def test_crest_factor_of_64_flat_lines(samples):
     random = [crest_factor(lines.record(lines.random_phases(rng(seed)))) for seed in range(20)]
     assert np.median(random) > 2.7
     assert crest_factor(lines.record(lines.schroeder_phases())) > 1.6
+
+
+@pytest.mark.parametrize("count", [15, 31])
+def test_crest_factors_of_classical_cases_beat_the_published_constructions(count):
+    """Schroeder's phases, Newman's, and clip and restore from five random starts."""
+    lines = flat(count, 16 * count)
+    starts = [lines.random_phases(rng(seed)) for seed in range(5)]
+    found = min(crest_factor(lines.record(optimise_phases(lines, start))) for start in starts)
+    newman = np.pi * np.arange(count) ** 2 / count
+    clipped = [compressed(lines.record(start), 1.3) for start in starts]
+    others = [lines.record(lines.schroeder_phases()), lines.record(newman), *clipped]
+    assert found < min(crest_factor(record) for record in others)
+    assert found < 1.42
 
 
 def test_crest_factor_of_several_signals_at_once():

@@ -13,7 +13,7 @@ from inputdesign_cli.signal import (
     realise,
     record_information,
 )
-from inputdesign_cli.signal.settle import first_level, least_level
+from inputdesign_cli.signal.settle import first_level, last_level, least_level
 from inputdesign_cli.signal.within import compressed, slow_moves
 from inputdesign_cli.spectrum import FirBasis
 
@@ -54,6 +54,15 @@ def test_least_level_of_any_size(known):
     for gain in 10.0 ** np.random.default_rng(0).uniform(-6, 6, 200):
         level = least_level(lambda a, g=gain: (known + g * a**2) ** -0.4, 1.0)
         assert level == pytest.approx(np.sqrt((1 - known) / gain), rel=1e-8)
+
+
+def test_no_level_is_needed_where_enough_is_known():
+    assert least_level(lambda a: (1.5 + a**2) ** -0.5, 1.0) < 1e-8
+
+
+def test_last_level():
+    assert last_level(lambda a: a <= 0.3, 1.0) == pytest.approx(0.3, rel=2e-3)
+    assert last_level(lambda a: a <= 0.3, 1.0) <= 0.3
 
 
 def test_first_level():
