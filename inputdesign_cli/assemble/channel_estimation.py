@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from inputdesign_cli.assemble.estimates import Blocks
@@ -10,52 +11,87 @@ from inputdesign_cli.identification import (
     ChannelBatch,
     ChannelEstimate,
     fit_channel_batch,
+    fit_transfer_matrices,
     identify_channels,
+    identify_transfer_matrix,
+    simulate_transfer_matrix,
 )
-from inputdesign_cli.plant import ChannelModel, PolynomialChannels
+from inputdesign_cli.plant import (
+    ChannelModel,
+    ContinuousChannels,
+    PolynomialChannels,
+    SampledChannels,
+    caused_by_inputs,
+    caused_by_noise,
+)
 from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.plant import with_paths
 
 
-def check_estimable(spec: Spec, model: ChannelModel) -> None:
-    """Whether there is an estimator for the kind of `model`.
+def estimated(model: ChannelModel, u: Array, y: Array, step: float, start: Array) -> ChannelEstimate:
+    """The structure of `model` estimated from u (samples, r), y (samples, p) and a start (k,).
+
+    `step` is the time between samples of a plant in continuous time, see `record_step`.
 
     Raises:
-        SpecError: `not-supported` for plants in s.
+        SpecError: the data do not determine the parameters.
     """
-    if not isinstance(model, PolynomialChannels):
-        raise spec.complain(
-            "not-supported",
-            "this version does not identify plants in s",
-            hint="write the plant as polynomials A, B, F in q^-1",
-            key="plant",
-        )
+    if isinstance(model, PolynomialChannels):
+        return identify_channels(model, u, y, start=start)
+    plant, interval, hold = _in_s(model, step)
+    return identify_transfer_matrix(plant, u, y, interval, hold=hold, start=start)
 
 
-def estimated(model: ChannelModel, u: Array, y: Array, start: Array) -> ChannelEstimate:
-    """The structure of `model` estimated from u (samples, r), y (samples, p) and a start (k,)."""
-    assert isinstance(model, PolynomialChannels)
-    return identify_channels(model, u, y, start=start)
-
-
-def estimated_runs(model: ChannelModel, u: Array, y: Array, start: Array) -> ChannelBatch:
+def estimated_runs(model: ChannelModel, u: Array, y: Array, step: float, start: Array) -> ChannelBatch:
     """The same of many records, u (runs, samples, r) and y (runs, samples, p), in one pass."""
-    assert isinstance(model, PolynomialChannels)
-    return fit_channel_batch(model, u, y, start=start)
+    if isinstance(model, PolynomialChannels):
+        return fit_channel_batch(model, u, y, start=start)
+    plant, interval, hold = _in_s(model, step)
+    return fit_transfer_matrices(plant, u, y, interval, hold=hold, start=start)
+
+
+def simulated(model: ChannelModel, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+    """What u (runs, samples, r) and the white noise e (runs, samples, p) cause at the outputs, from rest."""
+    if isinstance(model, PolynomialChannels):
+        return caused_by_inputs(model, u), caused_by_noise(model, e)
+    plant, interval, hold = _in_s(model, step)
+    return simulate_transfer_matrix(plant, u, interval, hold=hold), e
 
 
 def moved(model: ChannelModel, theta: Array, covariance: Array) -> ChannelModel:
     """`model` with other parameters (k,) and another covariance of e (p, p)."""
-    assert isinstance(model, PolynomialChannels)
+    if isinstance(model, SampledChannels):
+        return replace(model, continuous_plant=model.continuous_plant.at(theta, covariance))
+    assert isinstance(model, PolynomialChannels | ContinuousChannels)
     return model.at(theta, covariance)
+
+
+def _in_s(model: ChannelModel, step: float) -> tuple[ContinuousChannels, float, bool]:
+    """The plant in s, the time between samples, and whether its input is held there."""
+    if isinstance(model, SampledChannels):
+        return model.continuous_plant, model.sample_time, True
+    assert isinstance(model, ContinuousChannels)
+    return model, step, False
 
 
 def blocks_of(model: ChannelModel) -> Blocks:
     """`plant` and `noise` of a model in the words of the spec; polynomials that are 1 are left out."""
-    assert isinstance(model, PolynomialChannels)
-    plant = {"A": _rows(model.A), "B": _matrix(model.B), "F": _matrix(model.F)}
+    covariance = model.covariance
+    variance = float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()
+    if not isinstance(model, PolynomialChannels):
+        plant, _, held = _in_s(model, 1.0)
+        below = _descending(plant.denominator)
+        i, j = plant.active[0]
+        matrix = {
+            "numerator": _descending(plant.numerator),
+            "denominator": below[i][j] if plant.common else below,
+        }
+        return {
+            "plant": {"continuous": matrix} | ({"sample": "zoh"} if held else {}),
+            "noise": {"variance": variance},
+        }
+    polynomials = {"A": _rows(model.A), "B": _matrix(model.B), "F": _matrix(model.F)}
     noise = {"C": _rows(model.C), "D": _rows(model.D)}
 
     def plain(polynomials: Mapping[str, Any]) -> dict[str, Any]:
@@ -65,9 +101,7 @@ def blocks_of(model: ChannelModel) -> Blocks:
             if name == "B" or any(len(p) > 1 for _, p in with_paths(value))
         }
 
-    covariance = model.covariance
-    variance = float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()
-    return {"plant": plain(plant), "noise": {**plain(noise), "variance": variance}}
+    return {"plant": plain(polynomials), "noise": {**plain(noise), "variance": variance}}
 
 
 def predictor_of(model: ChannelModel) -> dict[str, list[Array]]:
@@ -84,3 +118,7 @@ def _rows(polynomials: tuple[Array, ...]) -> list:
 
 def _matrix(rows: Rows) -> list:
     return [[p.tolist() for p in row] for row in rows]
+
+
+def _descending(rows: Rows) -> list:
+    return [[p[::-1].tolist() for p in row] for row in rows]

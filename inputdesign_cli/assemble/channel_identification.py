@@ -15,7 +15,6 @@ from inputdesign_cli.accuracy import worst
 from inputdesign_cli.assemble.channel_curves import bound_curves_of, entry_bound_curves
 from inputdesign_cli.assemble.channel_estimation import (
     blocks_of,
-    check_estimable,
     estimated,
     moved,
     predictor_of,
@@ -30,6 +29,7 @@ from inputdesign_cli.assemble.channels import (
 )
 from inputdesign_cli.assemble.data import Data, read_channel_data
 from inputdesign_cli.assemble.estimates import (
+    REFUTED,
     estimate_result,
     identification_entry,
     model_notes,
@@ -85,7 +85,14 @@ class ChannelIdentified:
     @property
     def notes(self) -> list[str]:
         """What a user should know of the data, and what speaks against the model."""
-        return [*self.data.notes, *model_notes(self.estimate, predictor_of(self.model))]
+        notes = [*self.data.notes, *model_notes(self.estimate, predictor_of(self.model))]
+        tests = self.estimate.whiteness, self.estimate.independence
+        if self.model.continuous and min(test.probability for test in tests) < REFUTED:
+            notes.append(
+                "the input was taken for the band-limited interpolation of its samples; where it is held "
+                "between them, write plant.sample: zoh"
+            )
+        return notes
 
     def requirements(self) -> list[RequirementFactory]:
         """What the spec asks for, at the estimate."""
@@ -107,14 +114,13 @@ def channels_identified(spec: Spec, path: Path, *, remove_means: bool = False) -
     """The estimate from the data in `path`; the nominal parameters are one of the starts.
 
     Raises:
-        SpecError: `not-supported`, or the data do not determine the parameters.
+        SpecError: the spec has no such model, or the data do not determine the parameters.
         DataError: the file cannot be used.
     """
     nominal = build_channel_model(spec)
-    check_estimable(spec, nominal)
-    record_step(spec)
+    step = record_step(spec)
     data = read_channel_data(spec, path, remove_means=remove_means)
-    estimate = estimated(nominal, data.u, data.y, nominal.theta)
+    estimate = estimated(nominal, data.u, data.y, step, nominal.theta)
     model = moved(nominal, estimate.theta, estimate.noise)
     replaced = parse_spec(
         spec.to_yaml(),

@@ -12,7 +12,7 @@ from inputdesign_cli.identification import ChannelEstimate, Estimate, ResidualTe
 from inputdesign_cli.plant.polynomial import Array, roots_in_z
 
 # A residual test below this probability speaks against the model.
-_REFUTED = 0.01
+REFUTED = 0.01
 
 AnyEstimate = Estimate | ChannelEstimate
 Blocks = dict[str, dict[str, Any]]
@@ -95,13 +95,13 @@ def model_notes(estimate: AnyEstimate, predictor: Mapping[str, Sequence[Array]])
             "samples can tell: the covariance is not to be trusted there, and a design on this model would "
             "count on noise that vanishes or never fades; take more data, or a lower order"
         )
-    if estimate.whiteness.probability < _REFUTED:
+    if estimate.whiteness.probability < REFUTED:
         remedy = "raise the orders of C and D (or A)" if predictor else "a model in q^-1 can describe it"
         notes.append(
             f"the residuals are not white (probability {estimate.whiteness.probability:.1e}): the noise has "
             f"more structure than the model, and the covariance is not to be trusted; {remedy}"
         )
-    if estimate.independence.probability < _REFUTED:
+    if estimate.independence.probability < REFUTED:
         remedy = ", or another delay; raise the orders of B and F (or A)" if predictor else ""
         notes.append(
             f"past inputs explain residuals (probability {estimate.independence.probability:.1e}): the plant "

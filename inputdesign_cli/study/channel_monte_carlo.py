@@ -16,7 +16,6 @@ import numpy as np
 from inputdesign_cli.assemble.channel_analysis import analyse_channels
 from inputdesign_cli.assemble.channel_curves import bound_curves_of, entry_bound_curves
 from inputdesign_cli.assemble.channel_design import designed_channels
-from inputdesign_cli.assemble.channel_estimation import check_estimable
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, unstated_errors
 from inputdesign_cli.assemble.channel_task import channel_cost, channel_prior
 from inputdesign_cli.assemble.channels import (
@@ -62,7 +61,6 @@ def simulate_channels(spec: Spec, *, executor: Executor | None = None) -> Outcom
         SpecError: what cannot be simulated, and all that `solve` raises.
     """
     model = build_channel_model(spec)
-    check_estimable(spec, model)
     study = spec.simulation or Simulation()
     outcome, drawer = designed_channels(spec) if spec.designs else (analyse_channels(spec), None)
     started = time.perf_counter()

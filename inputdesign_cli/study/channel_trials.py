@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Absolute, EntryError, NormError
-from inputdesign_cli.assemble.channel_estimation import estimated, estimated_runs, moved
+from inputdesign_cli.assemble.channel_estimation import estimated, estimated_runs, moved, simulated
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ChannelModel, PolynomialChannels, caused_by_inputs, caused_by_noise
+from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import channel_outputs
 from inputdesign_cli.study.channel_excitations import ChannelExcitation
 from inputdesign_cli.study.trials import averaged, with_prior
 from inputdesign_cli.study.verdict import Promise
@@ -104,15 +103,12 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
     true, system, start = job.true, job.true.model, job.model.theta
     e = rng.standard_normal((runs, true.samples, system.outputs)) @ np.linalg.cholesky(system.covariance).T
     u = job.excitation.draw(runs, true.samples, rng)
-    if isinstance(system, PolynomialChannels):
-        y_u, y_e = caused_by_inputs(system, u), caused_by_noise(system, e)
-    else:
-        y_u, y_e = np.array([channel_outputs(true, record, job.step) for record in u]), e
+    y_u, y_e = simulated(system, u, e, job.step)
     y = y_u + y_e
-    found = estimated_runs(job.model, u, y, start)
+    found = estimated_runs(job.model, u, y, job.step, start)
     theta, information, converged = found.theta, found.information, found.converged.copy()
     for run in np.flatnonzero(~converged):
-        again = estimated(job.model, u[run], y[run], start)
+        again = estimated(job.model, u[run], y[run], job.step, start)
         theta[run], information[run], converged[run] = again.theta, again.information, again.converged
     if true.prior is not None and system.names == job.model.names:
         theta = with_prior(theta, information, true.prior, system.theta, rng)

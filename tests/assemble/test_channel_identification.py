@@ -2,6 +2,7 @@ import json
 
 import numpy as np
 import pytest
+import scipy.signal
 import yaml
 from channel_records import simulated
 from typer.testing import CliRunner
@@ -68,6 +69,69 @@ def test_the_blocks_can_be_pasted(given, tmp_path):
     stated = yaml.safe_load(uncommented)["experiment"]["prior"]
     assert tuple(stated["parameters"]) == model.names
     np.testing.assert_allclose(stated["information"], outcome.result["information"]["matrix"])
+
+
+IN_S = """
+sample_time: 0.5
+plant:
+  continuous: {numerator: [[[3.1], [1, 3.2]], [[5.3], [1.6]]], denominator: DENOMINATOR}
+noise: {variance: [[0.5, 0.1], [0.1, 0.3]]}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.05}}
+limits: {band: [0, 3]}
+spectrum: {type: multisine, lines: 8}
+"""
+EACH = "[[[1, 1.5, 1.5], [1, 2, 1]], [[1, 0.5, 1], [1, 1, 0.3]]]"
+
+
+def recorded_in_s(spec, samples, hold, rng):
+    """The same for a plant in s, held inputs or their band-limited interpolation, by scipy's simulation."""
+    matrix, step, finer = spec.plant.continuous, spec.sample_time, 1 if hold else 40
+    u = rng.standard_normal((samples, 2))
+    driven = u if hold else scipy.signal.resample(np.concatenate([u, 0 * u]), 2 * samples * finer)
+    y = rng.standard_normal((samples, 2)) @ np.linalg.cholesky(spec.noise.covariance(2)).T
+    for i, j in np.ndindex(2, 2):
+        system = matrix.numerator_matrix[i][j], matrix.denominator_matrix[i][j]
+        at = step / finer * np.arange(len(driven))
+        _, found, _ = scipy.signal.lsim(system, driven[:, j], at, interp=not hold)
+        y[:, i] += found[: samples * finer : finer]
+    return {"time_s": step * np.arange(samples), "u1": u[:, 0], "u2": u[:, 1], "y1": y[:, 0], "y2": y[:, 1]}
+
+
+@pytest.mark.parametrize("hold", [True, False])
+@pytest.mark.parametrize("denominator", [EACH, "[1, 1.5, 1.5]"])
+def test_plants_in_s_come_back(hold, denominator, tmp_path):
+    overrides = ["plant.sample=zoh"] if hold else []
+    spec = parse_spec(IN_S.replace("DENOMINATOR", denominator), overrides=overrides)
+    model = build_channel_model(spec)
+    columns = recorded_in_s(spec, 1500, hold, np.random.default_rng(1))
+    outcome = identify(spec, write(tmp_path / "d.csv", columns))
+    found = outcome.result["identification"]
+    for name, true in zip(model.names, model.theta, strict=True):
+        assert abs(found["theta"][name] - true) < 4.5 * found["standard_deviation"][name]
+    np.testing.assert_allclose(found["variance"], model.covariance, atol=0.06)
+    assert "notes" not in outcome.result
+    pasted = yaml.safe_load(outcome.files["model.yaml"].decode())
+    again = parse_spec(yaml.safe_dump({**yaml.safe_load(spec.to_yaml()), **pasted}))
+    assert build_channel_model(again).names == model.names
+    np.testing.assert_allclose(build_channel_model(again).theta, list(found["theta"].values()))
+
+
+@pytest.mark.parametrize(("relative", "enough"), [(2.0, True), (0.1, False)])
+def test_plants_in_s_are_assessed(relative, enough, tmp_path):
+    overrides = [f"accuracy.model_error.relative={relative}", "plant.sample=zoh"]
+    spec = parse_spec(IN_S.replace("DENOMINATOR", "[1, 1.5, 1.5]"), overrides=overrides)
+    data = write(tmp_path / "d.csv", recorded_in_s(spec, 500, True, np.random.default_rng(1)))
+    found = assess(spec, data)
+    assert found.met == enough
+    if not enough:
+        assert found.outcome.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_held_input_taken_for_its_interpolation_is_told(tmp_path):
+    spec = parse_spec(IN_S.replace("DENOMINATOR", EACH))
+    data = write(tmp_path / "d.csv", recorded_in_s(spec, 1500, True, np.random.default_rng(1)))
+    assert any("plant.sample: zoh" in note for note in identify(spec, data).result["notes"])
 
 
 def test_the_files_hold_what_they_say(data):

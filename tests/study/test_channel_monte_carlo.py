@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, simulate
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import PolynomialChannels
 from inputdesign_cli.signal import Lines, Recipe, channel_record_information
@@ -20,6 +19,17 @@ noise: {C: [[1, 0.5], [1, -0.3]], D: [1, -0.6], variance: [[0.2, 0.05], [0.05, 0
 experiment: {samples: 400}
 accuracy: {model_error: {relative: 0.1}}
 spectrum: {type: fir, order: 4}
+simulation: {runs: 100, seed: 2}
+"""
+IN_S = """
+sample_time: 0.5
+plant: {continuous: {numerator: [[[3.1], [1, 3.2]]], denominator: [1, 1.5, 1.5]}}
+noise: {variance: 0.5}
+experiment: {samples: 600}
+accuracy: {model_error: {relative: 0.1}}
+limits: {band: [0, 3]}
+spectrum: {type: multisine, lines: 6}
+signal: {samples: 600}
 simulation: {runs: 100, seed: 2}
 """
 
@@ -155,10 +165,14 @@ def test_the_result_does_not_depend_on_where_it_is_computed():
     assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
 
 
-def test_plants_in_s_are_refused():
-    with pytest.raises(SpecError) as caught:
-        simulate(load_spec("specs/two_by_two.yaml"))
-    assert caught.value.complaints[0].code == "not-supported"
+@pytest.mark.parametrize("hold", [True, False])
+def test_plants_in_s_keep_their_promise(hold):
+    overrides = ["plant.sample=zoh"] if hold else []
+    simulation = simulate(parse_spec(IN_S, overrides=overrides)).result["simulation"]
+    within_wishart(simulation)
+    design = simulation["inputs"]["design"]
+    assert design["within_r_adm_limits"][1] > 0.95
+    assert design["within_r_u"] == design["within_r_adm"]
 
 
 def model(B):
