@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import worst
+from inputdesign_cli.accuracy import worst_violation
 from inputdesign_cli.assemble.channel_curves import bound_curves_of, entry_bound_curves
 from inputdesign_cli.assemble.channel_estimation import (
     blocks_of,
@@ -20,14 +20,14 @@ from inputdesign_cli.assemble.channel_estimation import (
     predictor_of,
 )
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, unstated_errors
-from inputdesign_cli.assemble.channel_task import channel_prior, channel_requirements
+from inputdesign_cli.assemble.channel_task import channel_requirements, with_prior
 from inputdesign_cli.assemble.channels import (
     build_channel_model,
-    excitation_band,
+    channel_experiment,
     frequency_unit,
     record_step,
 )
-from inputdesign_cli.assemble.data import Data, read_channel_data
+from inputdesign_cli.assemble.data import Data, read_channel_data, told_of
 from inputdesign_cli.assemble.estimates import (
     REFUTED,
     estimate_result,
@@ -38,7 +38,6 @@ from inputdesign_cli.assemble.estimates import (
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.design.problem import RequirementFactory
 from inputdesign_cli.identification import ChannelEstimate
-from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import (
     BoundCurves,
     ChannelBoundCurves,
@@ -64,10 +63,12 @@ class ChannelIdentified:
 
     @cached_property
     def experiment(self) -> Any:
-        """The experiment of the data on the estimated model, in raw parameters."""
-        band = excitation_band(self.spec)
-        bare = ChannelExperiment(self.model, 1, band)
-        return ChannelExperiment(self.model, len(self.data.y), band, channel_prior(self.spec, bare))
+        """The experiment of the data on the estimated model, in raw parameters.
+
+        Raises:
+            SpecError: the loop is unstable with the estimate.
+        """
+        return replace(with_prior(self.spec, channel_experiment(self.spec)), samples=len(self.data.y))
 
     @property
     def frequency_unit(self) -> float:
@@ -114,13 +115,14 @@ def channels_identified(spec: Spec, path: Path, *, remove_means: bool = False) -
     """The estimate from the data in `path`; the nominal parameters are one of the starts.
 
     Raises:
-        SpecError: the spec has no such model, or the data do not determine the parameters.
-        DataError: the file cannot be used.
+        SpecError: the spec has no such model.
+        DataError: the file cannot be used, or the data do not determine the parameters.
     """
     nominal = build_channel_model(spec)
     step = record_step(spec)
     data = read_channel_data(spec, path, remove_means=remove_means)
-    estimate = estimated(nominal, data.u, data.y, step, nominal.theta)
+    with told_of(path):
+        estimate = estimated(nominal, data.u, data.y, step, nominal.theta)
     model = moved(nominal, estimate.theta, estimate.noise)
     replaced = parse_spec(
         spec.to_yaml(),
@@ -137,7 +139,8 @@ def _data_curves(spec: Spec, found: ChannelIdentified) -> tuple[dict[str, Table]
     instants = spec.sample_time * np.arange(len(y), dtype=np.float64)
     predicted = y - estimate.errors
     stable = [fit is not None for fit in estimate.fit]
-    simulated = channel_outputs(found.experiment, u, record_step(spec)) if any(stable) else None
+    open_loop = replace(found.experiment, loop=None)
+    simulated = channel_outputs(open_loop, u, record_step(spec)) if any(stable) else None
     columns = {f"time_{spec.time_unit}": instants, **_columns("u{}", u), **_columns("y{}", y)}
     columns |= _columns("y{}_predicted", predicted)
     outputs = {}
@@ -182,7 +185,8 @@ def _bound(found: ChannelIdentified) -> tuple[Table, ChannelBoundCurves | BoundC
     entry: dict[str, Any] = {"alpha": model_error_alpha(spec, experiment)}
     stated = build_entry_errors(spec, experiment)
     if stated:
-        violation = worst([v for error in stated for v in error.violations(information)])
+        violations = [worst_violation(error, information) for error in stated]
+        violation = max(violations, key=lambda v: v.ratio)
         entry["worst_ratio"] = violation.ratio
         if violation.frequency is not None:
             entry["worst_frequency"] = violation.frequency / found.frequency_unit

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.assemble.tables import read_columns
-from inputdesign_cli.errors import Complaint, DataError, Location
+from inputdesign_cli.errors import Complaint, DataError, Location, SpecError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
 
@@ -73,6 +75,27 @@ def read_channel_data(spec: Spec, path: Path, *, remove_means: bool = False) -> 
             )
     u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
     return Data(u, y, tuple(notes))
+
+
+@contextmanager
+def told_of(path: Path) -> Iterator[None]:
+    """What an estimator says against the signals is said of the columns of the file that they came from.
+
+    Raises:
+        DataError: in place of the estimator's `SpecError`.
+    """
+    try:
+        yield
+    except SpecError as error:
+        header = _header(path)
+
+        def placed(complaint: Complaint) -> Complaint:
+            named = [name for name in header if name.startswith(complaint.key or "u")]
+            before = header[: header.index(named[0])] if named else []
+            column = 1 + sum(len(name) + 1 for name in before)
+            return replace(complaint, location=Location(str(path), 1, column, ",".join(header)))
+
+        raise DataError([placed(complaint) for complaint in error.complaints]) from error
 
 
 def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:

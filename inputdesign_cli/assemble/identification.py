@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import scipy.signal
 
-from inputdesign_cli.accuracy import error_bound
+from inputdesign_cli.accuracy import error_bound, worst_violation
 from inputdesign_cli.assemble.channel_identification import ChannelIdentified, channels_identified
 from inputdesign_cli.assemble.channels import has_channels
 from inputdesign_cli.assemble.curves import axis, frequency_header
-from inputdesign_cli.assemble.data import Data, read_data
+from inputdesign_cli.assemble.data import Data, read_data, told_of
 from inputdesign_cli.assemble.estimates import (
     Blocks,
     estimate_result,
@@ -86,8 +86,8 @@ def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Out
     """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
 
     Raises:
-        SpecError: the plant is not supported, or the data do not determine the parameters.
-        DataError: the file cannot be used.
+        SpecError: the plant is not supported.
+        DataError: the file cannot be used, or the data do not determine the parameters.
     """
     try:
         started = time.perf_counter()
@@ -107,7 +107,8 @@ def identified(spec: Spec, path: Path, *, remove_means: bool = False) -> Identif
     nominal = build_experiment(spec)
     data = read_data(spec, path, remove_means=remove_means)
     structure = Structure.of(nominal.model)
-    estimate = identify_record(structure, data.u, data.y, start=nominal.model.theta)
+    with told_of(path):
+        estimate = identify_record(structure, data.u, data.y, start=nominal.model.theta)
     replaced = parse_spec(
         spec.to_yaml(),
         file=f"{path.name} (estimate)",
@@ -183,7 +184,7 @@ def _bound(found: Identified) -> tuple[Table, BoundCurves, dict[str, Any]]:
     if stated is not None:
         r_adm = stated.admissible.at(w)
         columns["r_adm"] = r_adm
-        worst = max(stated.violations(found.estimate.information), key=lambda v: v.ratio)
+        worst = worst_violation(stated, found.estimate.information)
         entry["worst_ratio"] = worst.ratio
         if worst.frequency is not None:
             entry["worst_frequency"] = worst.frequency / spec.sample_time

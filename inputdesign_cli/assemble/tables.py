@@ -67,9 +67,8 @@ def _rows(path: Path, key: str) -> list[tuple[int, list[str]]]:
                 (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
             ]
     except FileNotFoundError:
-        raise _unreadable(
-            path, key, "does not exist", "paths are relative to the folder of the spec"
-        ) from None
+        hint = "paths are relative to the folder of the spec" if key else "check the name and the folder"
+        raise _unreadable(path, key, "does not exist", hint) from None
     except IsADirectoryError:
         raise _unreadable(path, key, "is a folder", "name a CSV file") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:

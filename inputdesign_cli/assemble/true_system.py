@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.assemble.channels import build_channel_model
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment, Experiment
-from inputdesign_cli.plant import Loop
+from inputdesign_cli.plant import ChannelLoop, Loop, PolynomialChannels
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.experiment import Noise
 from inputdesign_cli.spec.plant import PolynomialPlant
@@ -52,7 +53,7 @@ def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) 
             variance=_variance(spec, result),
         )
     loop = Loop(model, nominal.loop.controller)
-    loop.check_stability()
+    _check_stability(spec, loop)
     return replace(nominal, loop=loop, factor=None)
 
 
@@ -62,7 +63,8 @@ def true_channel_experiment(
     """The same with several channels; noise of a relative size refers to the weakest output.
 
     Raises:
-        SpecError: `not-supported` for a true plant in s of a nominal one in q^-1, or the other way round.
+        SpecError: `not-supported` for a true plant in s of a nominal one in q^-1, or the other way round;
+            a loop that is unstable with the true plant.
     """
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):
@@ -83,7 +85,25 @@ def true_channel_experiment(
         if noise.relative_std is not None:
             variance = noise.relative_std**2 * float(np.min(result["power"]["output"]))
         changes["noise"] = Noise.model_construct(C=noise.C, D=noise.D, variance=variance)
-    return replace(nominal, model=build_channel_model(spec.model_copy(update=changes)), factor=None)
+    model, loop = build_channel_model(spec.model_copy(update=changes)), nominal.loop
+    if loop is not None:
+        assert isinstance(model, PolynomialChannels)  # as the nominal one is
+        loop = replace(loop, model=model)
+        _check_stability(spec, loop)
+    return replace(nominal, model=model, loop=loop, factor=None)
+
+
+def _check_stability(spec: Spec, loop: Loop | ChannelLoop) -> None:
+    try:
+        loop.check_stability()
+    except SpecError as error:
+        found = error.complaints[0]
+        raise spec.complain(
+            found.code,
+            f"with the true plant {found.message}",
+            hint="give a true plant that the controller stabilises as well",
+            key="simulation.plant",
+        ) from error
 
 
 def _variance(spec: Spec, result: Mapping[str, Any]) -> float:

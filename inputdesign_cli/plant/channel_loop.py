@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.signal
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.errors import bad_spec
@@ -167,6 +168,22 @@ class ChannelLoop:
         return LoopResponse(
             y_x=solved[:, :p, :r], u_x=solved[:, p:, :r], y_e=solved[:, :p, r:], u_e=solved[:, p:, r:]
         )
+
+    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        """y (.., n, p) and u (.., n, r) for samples r (.., n, r) and e (.., n, p), from rest."""
+        m, samples = self.model, r.shape[-2]
+        right = np.empty((*r.shape[:-1], m.outputs + m.inputs))
+        for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):
+            right[..., i] = scipy.signal.lfilter(np.convolve(self._others(i), c), d, e[..., i])
+        for j, q in enumerate(self.controller.denominator):
+            right[..., m.outputs + j] = scipy.signal.lfilter(q, [1.0], r[..., j])
+        inverse = np.linalg.inv(self._left[..., 0])
+        back = [(inverse @ self._left[..., lag]).T for lag in range(1, self._left.shape[-1])]
+        found = right @ inverse.T
+        for t in range(1, samples):
+            for lag, block in enumerate(back[:t], start=1):
+                found[..., t, :] -= found[..., t - lag, :] @ block
+        return found[..., : m.outputs], found[..., m.outputs :]
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""

@@ -7,7 +7,7 @@ import numpy as np
 from inputdesign_cli.assemble.channel_given import given_lines, given_sinusoids, read_channel_excitation
 from inputdesign_cli.assemble.channel_given import spectral as spectral_excitation
 from inputdesign_cli.assemble.channel_record import channel_phases
-from inputdesign_cli.assemble.channels import record_step
+from inputdesign_cli.assemble.channels import excitation_symbol, record_step
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.outcome import Outcome, Table
 from inputdesign_cli.plant.polynomial import Array
@@ -74,7 +74,8 @@ def study_excitations(
 
 def _record(spec: Spec, table: Table, inputs: int) -> Array:
     """The samples (n, r) of signal.csv, as deviations from the operating point."""
-    samples = np.stack([np.asarray(table.columns[f"u{i + 1}"]) for i in range(inputs)], axis=1)
+    names = [f"{excitation_symbol(spec)}{i + 1}" for i in range(inputs)]
+    samples = np.stack([np.asarray(table.columns[name]) for name in names], axis=1)
     return samples - np.asarray(spec.signal.offset or 0.0, dtype=float)
 
 

@@ -17,13 +17,8 @@ from inputdesign_cli.assemble.channel_analysis import analyse_channels
 from inputdesign_cli.assemble.channel_curves import bound_curves_of, entry_bound_curves
 from inputdesign_cli.assemble.channel_design import designed_channels
 from inputdesign_cli.assemble.channel_requirements import build_entry_errors, unstated_errors
-from inputdesign_cli.assemble.channel_task import channel_cost, channel_prior
-from inputdesign_cli.assemble.channels import (
-    build_channel_model,
-    excitation_band,
-    frequency_unit,
-    record_step,
-)
+from inputdesign_cli.assemble.channel_task import channel_cost, with_prior
+from inputdesign_cli.assemble.channels import channel_experiment, frequency_unit, record_step
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.true_system import true_channel_experiment
 from inputdesign_cli.design.problem import weights_of
@@ -60,15 +55,11 @@ def simulate_channels(spec: Spec, *, executor: Executor | None = None) -> Outcom
     Raises:
         SpecError: what cannot be simulated, and all that `solve` raises.
     """
-    model = build_channel_model(spec)
     study = spec.simulation or Simulation()
     outcome, drawer = designed_channels(spec) if spec.designs else (analyse_channels(spec), None)
     started = time.perf_counter()
     result = dict(outcome.result)
-    band = excitation_band(spec)
-    nominal = ChannelExperiment(
-        model, int(result["samples"]), band, channel_prior(spec, ChannelExperiment(model, 1, band))
-    )
+    nominal = replace(with_prior(spec, channel_experiment(spec)), samples=int(result["samples"]))
     excitations = study_excitations(spec, study, nominal, outcome, drawer)
     nominal = replace(nominal, samples=int(result["signal"]["samples"]))
     true = true_channel_experiment(spec, nominal, result)
@@ -91,7 +82,7 @@ def simulate_channels(spec: Spec, *, executor: Executor | None = None) -> Outcom
         if drawn is not None:
             curves[f"cloud_{name}"] = drawn
     rng = np.random.default_rng(study.seed)
-    size = len(model.names)
+    size = len(nominal.model.names)
     result["simulation"] = {
         "runs": study.runs,
         "seed": study.seed,

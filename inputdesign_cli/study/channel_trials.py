@@ -102,9 +102,14 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
     """
     true, system, start = job.true, job.true.model, job.model.theta
     e = rng.standard_normal((runs, true.samples, system.outputs)) @ np.linalg.cholesky(system.covariance).T
-    u = job.excitation.draw(runs, true.samples, rng)
-    y_u, y_e = simulated(system, u, e, job.step)
-    y = y_u + y_e
+    r = job.excitation.draw(runs, true.samples, rng)
+    if true.loop is None:
+        u_r, u = r, r
+        y_r, y_e = simulated(system, r, e, job.step)
+    else:
+        (y_r, u_r), (y_e, u_e) = true.loop.signals(r, 0.0 * e), true.loop.signals(0.0 * r, e)
+        u = u_r + u_e
+    y = y_r + y_e
     found = estimated_runs(job.model, u, y, job.step, start)
     theta, information, converged = found.theta, found.information, found.converged.copy()
     for run in np.flatnonzero(~converged):
@@ -112,9 +117,9 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
         theta[run], information[run], converged[run] = again.theta, again.information, again.converged
     if true.prior is not None and system.names == job.model.names:
         theta = with_prior(theta, information, true.prior, system.theta, rng)
-    inputs, outputs = _mean_squares(u), _mean_squares(y_u)
-    power = {"input": inputs, "output": outputs, "excitation": inputs}
-    total = {"input": inputs, "output": _mean_squares(y)}
+    caused = {"input": u_r, "output": y_r, "excitation": r}
+    power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
+    total = {"input": _mean_squares(u), "output": _mean_squares(y)}
     return ChannelTrials(true, job.model, theta, converged, power, total)
 
 

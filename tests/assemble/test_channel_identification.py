@@ -8,7 +8,7 @@ from channel_records import simulated
 from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, validate
-from inputdesign_cli.assemble.channels import build_channel_model
+from inputdesign_cli.assemble.channels import build_channel_model, channel_experiment
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.outcome import Table
@@ -132,6 +132,29 @@ def test_a_held_input_taken_for_its_interpolation_is_told(tmp_path):
     spec = parse_spec(IN_S.replace("DENOMINATOR", EACH))
     data = write(tmp_path / "d.csv", recorded_in_s(spec, 1500, True, np.random.default_rng(1)))
     assert any("plant.sample: zoh" in note for note in identify(spec, data).result["notes"])
+
+
+def recorded_in_loop(spec, samples, rng):
+    """u and y of the loop of a spec, under white r; what it is made of is tested with the loop."""
+    experiment = channel_experiment(spec)
+    e = rng.standard_normal((samples, 2)) @ np.linalg.cholesky(experiment.model.covariance).T
+    y, u = experiment.loop.signals(10.0 * rng.standard_normal((samples, 2)), e)
+    return {"time_s": np.arange(samples), "u1": u[:, 0], "u2": u[:, 1], "y1": y[:, 0], "y2": y[:, 1]}
+
+
+def test_a_loop_is_identified_directly_and_topped_up(tmp_path):
+    spec = load_spec("specs/two_by_two_loop.yaml", ["spectrum.order=4", "experiment.samples=1000"])
+    data = write(tmp_path / "d.csv", recorded_in_loop(spec, 1000, np.random.default_rng(1)))
+    outcome = identify(spec, data)
+    model, found = build_channel_model(spec), outcome.result["identification"]
+    for name, true in zip(model.names, model.theta, strict=True):
+        assert abs(found["theta"][name] - true) < 4.5 * found["standard_deviation"][name]
+    assert found["fit_percent"][0] is None  # the plant alone is unstable there
+    assessed = assess(spec, data)
+    assert not assessed.met
+    assert {"r1", "r2"} < set(assessed.outcome.tables["signal"].columns)
+    after = assessed.outcome.result["information"]["standard_deviation"]
+    assert all(after[name] < found["standard_deviation"][name] for name in model.names)
 
 
 def test_the_files_hold_what_they_say(data):

@@ -209,6 +209,17 @@ def test_responses_are_those_of_matrix_algebra(experiment):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
 
 
+def test_signals_are_those_of_the_equations_sample_by_sample():
+    rng = np.random.default_rng(0)
+    plant = box_jenkins()
+    r, e = rng.standard_normal((2, 150, 3)), rng.standard_normal((2, 150, 2))
+    y, u = ChannelLoop(plant, controller()).signals(r, e)
+    for run in range(2):
+        expected = simulated(plant, r[run], e[run])
+        np.testing.assert_allclose(y[run], expected[0], atol=1e-9)
+        np.testing.assert_allclose(u[run], expected[1], atol=1e-9)
+
+
 def test_unstable_and_algebraic_loops_are_refused():
     plant = box_jenkins()
     with pytest.raises(SpecError) as caught:

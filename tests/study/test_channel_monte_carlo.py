@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, simulate
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import PolynomialChannels
 from inputdesign_cli.signal import Lines, Recipe, channel_record_information
@@ -11,6 +12,7 @@ from inputdesign_cli.study.channel_excitations import Flat, InPhase, Multisine, 
 from inputdesign_cli.study.executor import Finished
 
 SPEC = "specs/two_by_two_arx.yaml"
+LOOP = "specs/two_by_two_loop.yaml"
 JENKINS = """
 plant:
   B: [[[0, 1.0], [0, 0.5]], [[0, 0, 0.7], [0]]]
@@ -107,6 +109,29 @@ def test_a_true_system_of_another_structure_has_no_theory():
     design = simulate(load_spec(SPEC, overrides)).result["simulation"]["inputs"]["design"]
     assert "within_r_u" not in design
     assert "within_r_adm" in design
+
+
+def test_a_loop_keeps_its_promise():
+    result = simulate(load_spec(LOOP, ["simulation={runs: 100, compare: [white]}"])).result
+    simulation = result["simulation"]
+    within_wishart(simulation)
+    design = simulation["inputs"]["design"]
+    assert design["within_r_adm_limits"][1] > 0.95
+    for kind in ("input", "output", "excitation"):  # the runs start from rest
+        np.testing.assert_allclose(design["power"][kind], result["power"][kind], rtol=0.01)
+        if kind in design["total_power"]:
+            assert np.all(np.array(design["total_power"][kind]) > design["power"][kind])
+    white = simulation["inputs"]["white"]
+    assert white["theory_on_truth"]["worst_ratio"] > 1.2
+    assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
+
+
+def test_a_true_system_that_the_controller_does_not_hold_is_refused():
+    plant = "{A: [[1, -1.1], [1, -0.6]], B: [[[0, -1.0, -0.4], [0, 0]], [[0, 0], [0, 1.2, -0.5]]]}"
+    with pytest.raises(SpecError) as caught:
+        simulate(load_spec(LOOP, [f"simulation={{runs: 5, plant: {plant}}}"]))
+    assert caught.value.complaints[0].code == "unstable-loop"
+    assert caught.value.complaints[0].key == "simulation.plant"
 
 
 def test_prior_information_narrows_the_estimates():
