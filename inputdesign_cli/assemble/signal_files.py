@@ -20,6 +20,7 @@ from inputdesign_cli.outcome import BoundCurves, SignalCurves, SpectrumCurves, T
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import record_information
 from inputdesign_cli.spec import Spec
+from inputdesign_cli.spec.spectrum import GivenSignal, GivenSpectrum
 
 
 def applied(spec: Spec, samples: Array, *, given: bool = False) -> Array:
@@ -29,6 +30,15 @@ def applied(spec: Spec, samples: Array, *, given: bool = False) -> Array:
     """
     values = samples.reshape(len(samples), -1)
     return values if given else values + operating_points(spec)
+
+
+def deviations(spec: Spec, table: Table) -> Array:
+    """(n, r): the samples of signal.csv from their operating points; a record that was given as it is."""
+    letter = "r" if spec.closed_loop else "u"
+    names = [f"{letter}{a + 1}" for a in range(spec.plant.inputs)]
+    values = np.stack([np.asarray(table.columns[name]) for name in names], axis=1)
+    given = isinstance(spec.spectrum, GivenSpectrum) and isinstance(spec.spectrum.given, GivenSignal)
+    return values if given else values - operating_points(spec)
 
 
 def signal_curves(spec: Spec, samples: Array, *, given: bool = False) -> tuple[Table, SignalCurves]:

@@ -7,10 +7,10 @@ import numpy as np
 from inputdesign_cli.assemble.channel_given import given_lines, given_sinusoids, read_channel_excitation
 from inputdesign_cli.assemble.channel_given import spectral as spectral_excitation
 from inputdesign_cli.assemble.channel_record import channel_phases
-from inputdesign_cli.assemble.channels import excitation_symbol, record_step
+from inputdesign_cli.assemble.channels import record_step
+from inputdesign_cli.assemble.signal_files import deviations
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.outcome import Outcome, Table
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.signal import ChannelDrawer, Recipe
 from inputdesign_cli.signal.recipe import Method
 from inputdesign_cli.spec import Spec
@@ -55,7 +55,7 @@ def study_excitations(
             hint="ask for more accuracy or a longer signal, or give an excitation under spectrum.given",
             key="accuracy",
         )
-    design = Recorded("design", _record(spec, table, experiment.inputs), step)
+    design = Recorded("design", deviations(spec, table), step)
     power = float(np.sum(result["power"]["excitation"]))
     renewed = None
     if study.excitation == "new":
@@ -70,13 +70,6 @@ def study_excitations(
         suffices = float(np.sum(needed))
         listed.append(_flat(spec, experiment, "white_that_suffices", "white", suffices, samples))
     return listed
-
-
-def _record(spec: Spec, table: Table, inputs: int) -> Array:
-    """The samples (n, r) of signal.csv, as deviations from the operating point."""
-    names = [f"{excitation_symbol(spec)}{i + 1}" for i in range(inputs)]
-    samples = np.stack([np.asarray(table.columns[name]) for name in names], axis=1)
-    return samples - np.asarray(spec.signal.offset or 0.0, dtype=float)
 
 
 def _redrawn(spec: Spec, experiment: ChannelExperiment, record: Recorded) -> ChannelExcitation | None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from inputdesign_cli.assemble import solve
 from inputdesign_cli.assemble.experiment import build_cost, build_experiment
+from inputdesign_cli.assemble.signal_files import deviations
 from inputdesign_cli.assemble.signal_settings import build_recipe
 from inputdesign_cli.assemble.true_system import true_experiment
 from inputdesign_cli.identification import Structure
@@ -134,8 +135,7 @@ def _excitations(spec: Spec, study: Simulation, outcome: Outcome) -> list[Excita
     result = outcome.result
     spectrum = result["spectrum"]
     table = outcome.tables.get("signal")
-    record = None if table is None else list(table.columns.values())[1]
-    if record is None:
+    if table is None:
         raise spec.complain(
             "nothing-to-simulate",
             "no excitation is needed, so that there is no experiment to simulate",
@@ -143,7 +143,7 @@ def _excitations(spec: Spec, study: Simulation, outcome: Outcome) -> list[Excita
             key="accuracy",
         )
     if study.excitation == "record" or ("coefficients" not in spectrum and "frequencies" not in spectrum):
-        design = Excitation("design", record=record)
+        design = Excitation("design", record=deviations(spec, table)[:, 0])
     elif "coefficients" in spectrum:
         x = np.asarray(spectrum["coefficients"], dtype=float)
         design = Excitation("design", FirBasis(x.size - 1), x, build_recipe(spec))

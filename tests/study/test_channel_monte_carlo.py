@@ -164,9 +164,14 @@ def test_a_given_table_is_tried(tmp_path):
     np.testing.assert_allclose(simulation["inputs"]["design"]["power"]["input"], [9.0, 4.0], rtol=0.01)
 
 
-def test_the_delivered_record_can_be_tried():
-    overrides = [GIVEN, "simulation={runs: 40, excitation: record}"]
-    result = simulate(load_spec(SPEC, overrides)).result
+@pytest.mark.parametrize("signal", [{}, {"offset": [5.0, -3.0], "quantisation": {"bits": 5, "range": 100}}])
+@pytest.mark.parametrize("spec", [SPEC, "specs/first_order.yaml"])
+def test_the_delivered_record_is_tried_about_its_operating_point(spec, signal):
+    overrides = ["simulation={runs: 20, excitation: record}", "spectrum.order=3"]
+    if signal and "first" in spec:
+        signal = {"offset": 5.0, "quantisation": {"bits": 8, "range": 10}}
+    overrides += [f"signal.{key}={value}" for key, value in signal.items()]
+    result = simulate(load_spec(spec, overrides)).result
     np.testing.assert_allclose(
         result["simulation"]["inputs"]["design"]["power"]["input"], result["signal"]["power"]
     )
