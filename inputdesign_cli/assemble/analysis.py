@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import worst
+from inputdesign_cli.accuracy import Requirement, worst
 from inputdesign_cli.assemble.curves import (
     axis,
     bound_curves,
@@ -71,19 +71,9 @@ def analyse_given(spec: Spec) -> Outcome:
     white = FirBasis(0).integrals(experiment.information_density, experiment.singularities)
     level = cost / _white_cost(experiment, task)
     flat = experiment.baseline_information + level * white[0]
-    met = all(worst(r.violations(information)).ratio <= 1.0 + 1e-9 for r in requirements)
-    result: dict[str, Any] = {
-        "format": 1,
-        "title": spec.title,
-        "status": "given" if not requirements else "met" if met else "missed",
-        "cost": cost,
-        "samples": experiment.samples,
-        "power": excitation.power,
-        "information": information_entry(experiment, information),
-        "spectrum": _entry(spec, excitation),
-        "baseline": {"white": {"cost": cost, "excitation_power": level}},
-    }
-    result |= requirements_entry(spec, task, requirements, information, np.zeros(0))
+    result = given_result(spec, task, experiment, information, requirements)
+    result |= {"cost": cost, "power": excitation.power, "spectrum": _entry(spec, excitation)}
+    result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
     tables["bound"], curves["bound"] = bound_curves(
@@ -104,6 +94,21 @@ def analyse_given(spec: Spec) -> Outcome:
         files = other_files(spec, record.samples, given=given)
     result["timing_s"] = {"analysis": time.perf_counter() - started}
     return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
+
+
+def given_result(
+    spec: Spec, task: Task, experiment: Any, information: Array, requirements: tuple[Requirement, ...]
+) -> dict[str, Any]:
+    """What `result.json` says of the information (k, k) that a given excitation has."""
+    met = all(worst(r.violations(information)).ratio <= 1.0 + 1e-9 for r in requirements)
+    result: dict[str, Any] = {
+        "format": 1,
+        "title": spec.title,
+        "status": "given" if not requirements else "met" if met else "missed",
+        "samples": experiment.samples,
+        "information": information_entry(experiment, information),
+    }
+    return result | requirements_entry(spec, task, requirements, information, np.zeros(0))
 
 
 def read_excitation(spec: Spec, experiment: Experiment) -> Excitation:

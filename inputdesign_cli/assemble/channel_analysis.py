@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import worst
-from inputdesign_cli.assemble.analysis import check_excites
+from inputdesign_cli.assemble.analysis import check_excites, given_result
 from inputdesign_cli.assemble.channel_curves import (
     bound_curves_of,
     density_curves,
@@ -40,7 +39,6 @@ from inputdesign_cli.assemble.channels import (
 from inputdesign_cli.assemble.ellipses import check_pairs, experiment_ellipses
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.record import applied_entry, worst_ratio
-from inputdesign_cli.assemble.result import information_entry, requirements_entry
 from inputdesign_cli.assemble.signal_files import other_files, signal_curves
 from inputdesign_cli.assemble.task import Task
 from inputdesign_cli.design.designs import Question
@@ -91,19 +89,9 @@ def analyse_channels(spec: Spec) -> Outcome:
     cost, white = excitation.cost(channel_cost(spec)), _even(raw, 1.0)
     level = cost / white.cost(channel_cost(spec))
     flat = _even(raw, level).information(experiment)
-    met = all(worst(r.violations(information)).ratio <= 1.0 + 1e-9 for r in requirements)
-    result: dict[str, Any] = {
-        "format": 1,
-        "title": spec.title,
-        "status": "given" if not requirements else "met" if met else "missed",
-        "cost": cost,
-        "samples": experiment.samples,
-        "power": excitation.power,
-        "information": information_entry(experiment, information),
-        "spectrum": _entry(spec, excitation),
-        "baseline": {"white": {"cost": cost, "excitation_power": level}},
-    }
-    result |= requirements_entry(spec, task, requirements, information, np.zeros(0))
+    result = given_result(spec, task, experiment, information, requirements)
+    result |= {"cost": cost, "power": excitation.power, "spectrum": _entry(spec, excitation)}
+    result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
     bound = bound_curves_of(spec, requirements, information, flat)

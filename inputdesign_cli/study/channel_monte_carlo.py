@@ -21,26 +21,21 @@ from inputdesign_cli.assemble.channel_task import channel_cost, with_prior
 from inputdesign_cli.assemble.channels import channel_experiment, frequency_unit, record_step
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.true_system import true_channel_experiment
-from inputdesign_cli.design.problem import weights_of
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.outcome import ChannelErrorBandCurves, ErrorBandCurves, Outcome
+from inputdesign_cli.outcome import BoundCurves, ChannelBoundCurves, Outcome
+from inputdesign_cli.plant import ChannelLoop
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.realisation import Simulation
 from inputdesign_cli.study.batches import run_batches
-from inputdesign_cli.study.channel_excitations import (
-    ChannelExcitation,
-)
+from inputdesign_cli.study.channel_excitations import ChannelExcitation
 from inputdesign_cli.study.channel_inputs import study_excitations
-from inputdesign_cli.study.channel_trials import (
-    ChannelTrialJob,
-    ChannelTrials,
-    joined_channels,
-    run_channel_job,
-)
+from inputdesign_cli.study.channel_trials import ChannelTrialJob, ChannelTrials, run_channel_job
+from inputdesign_cli.study.comparison import Comparison, compared
+from inputdesign_cli.study.disturbance import Response
 from inputdesign_cli.study.executor import Executor
-from inputdesign_cli.study.statistics import wishart_range
-from inputdesign_cli.study.verdict import Promise, cloud, error_bands, fractions, gap_notes, judged
+from inputdesign_cli.study.trials import joined
+from inputdesign_cli.study.verdict import Promise
 
 # Runs that are simulated and identified in one pass.
 _BATCH = 50
@@ -58,127 +53,64 @@ def simulate_channels(spec: Spec, *, executor: Executor | None = None) -> Outcom
     study = spec.simulation or Simulation()
     outcome, drawer = designed_channels(spec) if spec.designs else (analyse_channels(spec), None)
     started = time.perf_counter()
-    result = dict(outcome.result)
+    result = outcome.result
     nominal = replace(with_prior(spec, channel_experiment(spec)), samples=int(result["samples"]))
     excitations = study_excitations(spec, study, nominal, outcome, drawer)
     nominal = replace(nominal, samples=int(result["signal"]["samples"]))
     true = true_channel_experiment(spec, nominal, result)
-    promise = _promise(spec, nominal, outcome, excitations[0].information(nominal))
-    inputs: dict[str, Any] = {}
-    curves: dict[str, Any] = {}
-    for excitation in excitations:
-        name = excitation.name
-        trials = _run(spec, true, nominal, excitation, study, executor)
-        information = _theory(trials, excitation)
-        entry = judged(
-            trials, promise, information, name=name, cost=_cost(spec, trials), unit=frequency_unit(spec)
+
+    def tried(experiment: ChannelExperiment, excitation: ChannelExcitation) -> ChannelTrials:
+        job = ChannelTrialJob(experiment, nominal.model, excitation, record_step(spec))
+        # The same seed for every input: they meet the same noise.
+        parts = run_batches(
+            run_channel_job, job, runs=study.runs, size=_BATCH, seed=study.seed, executor=executor
         )
-        if true is not nominal:
-            modelled = _run(spec, nominal, nominal, excitation, study, executor)
-            entry["on_design_model"] = fractions(modelled, promise, _theory(modelled, excitation), name=name)
-        inputs[name] = entry
-        curves[f"errors_{name}"] = _error_bands(spec, trials, promise, name)
-        drawn = cloud(trials, information)
-        if drawn is not None:
-            curves[f"cloud_{name}"] = drawn
-    rng = np.random.default_rng(study.seed)
-    size = len(nominal.model.names)
-    result["simulation"] = {
-        "runs": study.runs,
-        "seed": study.seed,
-        "samples": true.samples,
-        "excitation": study.excitation,
-        "true_parameters": dict(zip(true.model.names, true.model.theta.tolist(), strict=True)),
-        "true_variance": true.model.covariance,
-        "wishart_range": list(wishart_range(size, study.runs, rng)) if study.runs > 1 else [],
-        "inputs": inputs,
-    }
-    notes = gap_notes(spec, inputs)
-    if notes:
-        result["notes"] = [*result.get("notes", []), *notes]
-    result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
-    return replace(outcome, result=result, curves={**outcome.curves, **curves})
+        return joined(parts)
 
-
-def _run(
-    spec: Spec,
-    true: ChannelExperiment,
-    nominal: ChannelExperiment,
-    excitation: ChannelExcitation,
-    study: Simulation,
-    executor: Executor | None,
-) -> ChannelTrials:
-    job = ChannelTrialJob(true, nominal.model, excitation, record_step(spec))
-    # The same seed for every input: they meet the same noise.
-    parts = run_batches(
-        run_channel_job, job, runs=study.runs, size=_BATCH, seed=study.seed, executor=executor
+    comparison = Comparison(
+        spec=spec,
+        study=study,
+        outcome=outcome,
+        nominal=nominal,
+        true=true,
+        excitations=excitations,
+        promise=_promise(spec, nominal, outcome, excitations[0].information(nominal)),
+        tried=tried,
+        cost=channel_cost(spec),
+        variance=true.model.covariance,
+        loop=None if true.loop is None else _response(true.loop),
     )
-    return joined_channels(parts)
+    return compared(comparison, started)
 
 
-def _theory(trials: ChannelTrials, excitation: ChannelExcitation) -> Array | None:
-    return excitation.information(trials.true) if trials.same_structure else None
+def _response(loop: ChannelLoop) -> Response:
+    def caused(r: Array) -> tuple[Array, Array]:
+        y, u = loop.signals(r, np.zeros((len(r), loop.model.outputs)))
+        return u, y
 
-
-def _cost(spec: Spec, trials: ChannelTrials) -> float:
-    return sum(
-        weight * (sum(trials.power[kind]) if channel is None else trials.power[kind][channel])
-        for kind, channel, weight in weights_of(channel_cost(spec))
-    )
+    return Response(caused, loop.closed_poles)
 
 
 def _promise(spec: Spec, nominal: ChannelExperiment, outcome: Outcome, information: Array) -> Promise:
     """What bound.csv says; where there is none, the r_u that the `information` gives."""
     experiment: Any = nominal
-    table = outcome.tables.get("bound")
-    if table is None:
+    bound = outcome.curves.get("bound")
+    if bound is None:
         stated = build_entry_errors(spec, experiment)
-        table, _ = bound_curves_of(spec, stated, information, None) or entry_bound_curves(
+        _, bound = bound_curves_of(spec, stated, information, None) or entry_bound_curves(
             spec, unstated_errors(spec, experiment), information, None, stated=False
         )
-    columns = dict(table.columns)
-    w, alpha = (
-        np.asarray(next(iter(columns.values()))) * frequency_unit(spec),
-        model_error_alpha(spec, experiment),
-    )
-    if "r_u" in columns:  # of the norm of all entries
-        return Promise(w, columns["r_u"], columns.get("r_adm"), alpha)
-    places = [name.removeprefix("r_u_") for name in columns if re.fullmatch(r"r_u_\d+", name)]
-    stacked = {
-        kind: np.concatenate([columns[f"{kind}_{place}"] for place in places])
-        for kind in ("r_u", "r_adm")
-        if f"{kind}_{places[0]}" in columns
-    }
-    entries = np.repeat([[int(place[0]) - 1, int(place[1]) - 1] for place in places], w.size, axis=0)
+    unit, alpha = frequency_unit(spec), model_error_alpha(spec, experiment)
+    if isinstance(bound, BoundCurves):  # of the norm of all entries
+        return Promise(bound.frequency * unit, bound.r_u, bound.r_adm, alpha)
+    assert isinstance(bound, ChannelBoundCurves)
+    panels = list(bound.entries.values())
+    places = [tuple(int(number) - 1 for number in re.findall(r"\d+", name)) for name in bound.entries]
+    admissible = [panel.r_adm for panel in panels if panel.r_adm is not None]
     return Promise(
-        w=np.tile(w, len(places)),
-        r_u=stacked["r_u"],
-        r_adm=stacked.get("r_adm"),
+        w=np.concatenate([panel.frequency for panel in panels]) * unit,
+        r_u=np.concatenate([panel.r_u for panel in panels]),
+        r_adm=np.concatenate(admissible) if admissible else None,
         alpha=alpha,
-        entries=entries,
+        entries=np.repeat([place or (0, 0) for place in places], [p.frequency.size for p in panels], axis=0),
     )
-
-
-def _error_bands(
-    spec: Spec, trials: ChannelTrials, promise: Promise, name: str
-) -> ChannelErrorBandCurves | ErrorBandCurves:
-    errors = trials.errors(promise)
-    if promise.entries is None:
-        return error_bands(
-            errors,
-            frequency=promise.w / frequency_unit(spec),
-            r_u=promise.r_u if name == "design" else None,
-            r_adm=promise.r_adm,
-            name=name,
-        )
-    panels = {}
-    for i, j in np.unique(promise.entries, axis=0):
-        own = np.all(promise.entries == (i, j), axis=1)
-        panels[f"[{i + 1},{j + 1}]"] = error_bands(
-            errors[:, own],
-            frequency=promise.w[own] / frequency_unit(spec),
-            r_u=promise.r_u[own] if name == "design" else None,
-            r_adm=None if promise.r_adm is None else promise.r_adm[own],
-            name=name,
-        )
-    return ChannelErrorBandCurves(panels, name.replace("_", " "))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.study.channel_excitations import ChannelExcitation
-from inputdesign_cli.study.trials import averaged, with_prior
+from inputdesign_cli.study.trials import settled
 from inputdesign_cli.study.verdict import Promise
 
 
@@ -27,6 +26,7 @@ class ChannelTrials:
         theta: (runs, k) estimates; `converged` (runs,).
         power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
         total_power: mean squares of inputs and outputs, noise included.
+        first: (samples, r) the excitation of the first run.
     """
 
     true: ChannelExperiment
@@ -35,6 +35,7 @@ class ChannelTrials:
     converged: NDArray[np.bool_]
     power: dict[str, list[float]]
     total_power: dict[str, list[float]]
+    first: Array
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -111,28 +112,17 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
         u = u_r + u_e
     y = y_r + y_e
     found = estimated_runs(job.model, u, y, job.step, start)
-    theta, information, converged = found.theta, found.information, found.converged.copy()
-    for run in np.flatnonzero(~converged):
-        again = estimated(job.model, u[run], y[run], job.step, start)
-        theta[run], information[run], converged[run] = again.theta, again.information, again.converged
-    if true.prior is not None and system.names == job.model.names:
-        theta = with_prior(theta, information, true.prior, system.theta, rng)
+    theta, converged = settled(
+        found,
+        lambda run: estimated(job.model, u[run], y[run], job.step, start),
+        prior=true.prior if system.names == job.model.names else None,
+        truth=system.theta,
+        rng=rng,
+    )
     caused = {"input": u_r, "output": y_r, "excitation": r}
     power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
     total = {"input": _mean_squares(u), "output": _mean_squares(y)}
-    return ChannelTrials(true, job.model, theta, converged, power, total)
-
-
-def joined_channels(parts: Sequence[ChannelTrials]) -> ChannelTrials:
-    """All batches of one study as one; mean squares are weighted by the number of runs."""
-    weights = [len(part.theta) for part in parts]
-    return replace(
-        parts[0],
-        theta=np.concatenate([part.theta for part in parts]),
-        converged=np.concatenate([part.converged for part in parts]),
-        power=averaged([part.power for part in parts], weights),
-        total_power=averaged([part.total_power for part in parts], weights),
-    )
+    return ChannelTrials(true, job.model, theta, converged, power, total, np.array(r[0]))
 
 
 def _mean_squares(x: Array) -> list[float]:

@@ -20,7 +20,7 @@ from inputdesign_cli.assemble.signal_settings import build_recipe
 from inputdesign_cli.assemble.true_system import true_experiment
 from inputdesign_cli.identification import Structure
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.outcome import ErrorBandCurves, Outcome, SignalCurves, Table
+from inputdesign_cli.outcome import Outcome
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import Recipe, input_and_output
 from inputdesign_cli.signal.recipe import Method
@@ -28,14 +28,13 @@ from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.realisation import Simulation
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 from inputdesign_cli.study.batches import run_batches
+from inputdesign_cli.study.comparison import Comparison, compared
+from inputdesign_cli.study.disturbance import Response
 from inputdesign_cli.study.excitations import Excitation
 from inputdesign_cli.study.executor import Executor
-from inputdesign_cli.study.statistics import wishart_range
 from inputdesign_cli.study.trials import TrialJob, Trials, joined, run_job
-from inputdesign_cli.study.verdict import Promise, cloud, error_bands, fractions, gap_notes, judged
+from inputdesign_cli.study.verdict import Promise
 
-# Time constants of the loop that a figure shows after the end of the excitation.
-_FADED = 3.0
 # Inputs to compare with have a flat spectrum; white noise is Gaussian.
 _METHODS: dict[str, Method] = {
     "white": "filtered_noise",
@@ -60,68 +59,41 @@ def simulate_polynomial(spec: Spec, *, executor: Executor | None = None) -> Outc
     study = spec.simulation or Simulation()
     outcome = solve(spec)
     started = time.perf_counter()
-    result = dict(outcome.result)
+    result = outcome.result
     nominal = replace(nominal, samples=int(result["samples"]))
     excitations = _excitations(spec, study, outcome)
     nominal = replace(nominal, samples=_length(excitations[0], nominal, result))
     true = true_experiment(spec, nominal, result)
-    promise = _promise(spec, outcome)
     structure = Structure.of(nominal.model)
-    differs = study.plant is not None or study.noise is not None
-    inputs: dict[str, Any] = {}
-    curves: dict[str, Any] = {}
-    tables: dict[str, Any] = {}
-    for excitation in excitations:
-        name = excitation.name
-        trials = _run(true, nominal, structure, excitation, study, executor)
-        information = _theory(trials, excitation)
-        cost = sum(weight * trials.power[kind][0] for kind, weight in build_cost(spec).items())
-        entry = judged(trials, promise, information, name=name, cost=cost, unit=spec.sample_time)
-        if differs:
-            modelled = _run(nominal, nominal, structure, excitation, study, executor)
-            entry["on_design_model"] = fractions(modelled, promise, _theory(modelled, excitation), name=name)
-        inputs[name] = entry
-        curves[f"errors_{name}"] = _error_bands(spec, trials, excitation, promise)
-        drawn = cloud(trials, information)
-        if drawn is not None:
-            curves[f"cloud_{name}"] = drawn
-        if spec.closed_loop:
-            tables[f"disturbance_{name}"], curves[f"disturbance_{name}"] = _disturbance(spec, trials)
-    rng = np.random.default_rng(study.seed)
-    result["simulation"] = {
-        "runs": study.runs,
-        "seed": study.seed,
-        "samples": true.samples,
-        "excitation": study.excitation,
-        "true_parameters": dict(zip(true.model.names, true.model.theta.tolist(), strict=True)),
-        "true_variance": true.model.variance,
-        "wishart_range": list(wishart_range(structure.size, study.runs, rng)) if study.runs > 1 else [],
-        "inputs": inputs,
-    }
-    notes = gap_notes(spec, inputs)
-    if notes:
-        result["notes"] = [*result.get("notes", []), *notes]
-    result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
-    return replace(
-        outcome,
-        result=result,
-        tables={**outcome.tables, **tables},
-        curves={**outcome.curves, **curves},
+
+    def tried(experiment: Experiment, excitation: Excitation) -> Trials:
+        job = TrialJob(experiment, structure, nominal.model.theta, excitation)
+        # The same seed for every input: they meet the same noise.
+        parts = run_batches(run_job, job, runs=study.runs, size=_BATCH, seed=study.seed, executor=executor)
+        return joined(parts)
+
+    comparison = Comparison(
+        spec=spec,
+        study=study,
+        outcome=outcome,
+        nominal=nominal,
+        true=true,
+        excitations=excitations,
+        promise=_promise(spec, outcome),
+        tried=tried,
+        cost=build_cost(spec),
+        variance=true.model.variance,
+        loop=_loop(true) if spec.closed_loop else None,
     )
+    return compared(comparison, started)
 
 
-def _run(
-    true: Experiment,
-    nominal: Experiment,
-    structure: Structure,
-    excitation: Excitation,
-    study: Simulation,
-    executor: Executor | None,
-) -> Trials:
-    job = TrialJob(true, structure, nominal.model.theta, excitation)
-    # The same seed for every input: they meet the same noise.
-    parts = run_batches(run_job, job, runs=study.runs, size=_BATCH, seed=study.seed, executor=executor)
-    return joined(parts)
+def _loop(true: Experiment) -> Response:
+    def caused(r: Array) -> tuple[Array, Array]:
+        u, y = input_and_output(true, r[:, 0])
+        return u[:, None], y[:, None]
+
+    return Response(caused, true.loop.poles)
 
 
 def _length(excitation: Excitation, nominal: Experiment, result: Mapping[str, Any]) -> int:
@@ -168,30 +140,4 @@ def _promise(spec: Spec, outcome: Outcome) -> Promise:
         r_u=np.asarray(table["r_u"]),
         r_adm=None if "r_adm" not in table else np.asarray(table["r_adm"]),
         alpha=float(outcome.result["model_error"]["alpha"]),
-    )
-
-
-def _disturbance(spec: Spec, trials: Trials) -> tuple[Table, SignalCurves]:
-    """What the excitation of the first run alone does to the loop: r, u_r and y_r, until they have faded."""
-    slowest = float(np.abs(trials.true.loop.poles).max(initial=0.0))
-    tail = min(int(np.ceil(_FADED / (1.0 - slowest))), trials.first.size)
-    r = np.concatenate([trials.first, np.zeros(tail)])
-    u_r, y_r = input_and_output(trials.true, r)
-    instants = spec.sample_time * np.arange(r.size, dtype=np.float64)
-    channels = {"r1": r, "u1_r": u_r, "y1_r": y_r}
-    drawn = {"r": r, "ur": u_r, "yr": y_r}
-    return Table({f"time_{spec.time_unit}": instants, **channels}), SignalCurves(instants, drawn)
-
-
-def _theory(trials: Trials, excitation: Excitation) -> Array | None:
-    return excitation.information(trials.true) if trials.same_structure else None
-
-
-def _error_bands(spec: Spec, trials: Trials, excitation: Excitation, promise: Promise) -> ErrorBandCurves:
-    return error_bands(
-        trials.errors(promise),
-        frequency=promise.w / spec.sample_time,
-        r_u=promise.r_u if excitation.name == "design" else None,
-        r_adm=promise.r_adm,
-        name=excitation.name,
     )

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import error_bound
-from inputdesign_cli.identification import Structure, fit_batch, identify
+from inputdesign_cli.identification import (
+    BatchEstimate,
+    ChannelBatch,
+    ChannelEstimate,
+    Estimate,
+    Structure,
+    fit_batch,
+    identify,
+)
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import input_and_output
 from inputdesign_cli.study.excitations import Excitation
 from inputdesign_cli.study.verdict import Promise
 
+AnyTrials = TypeVar("AnyTrials", bound=Any)
 # Complex numbers of frequency responses held at a time.
 _CHUNK = 2_000_000
 
@@ -72,7 +82,13 @@ class Trials:
 
 @dataclass(frozen=True)
 class TrialJob:
-    """What all batches of one study share: the arguments of `run_trials` but the number of runs."""
+    """What all batches of one study share.
+
+    Attributes:
+        true: the true system and the length of its experiment.
+        structure: of what is estimated.
+        start: (k,) where the search begins, the model that the design was made on.
+    """
 
     true: Experiment
     structure: Structure
@@ -80,57 +96,44 @@ class TrialJob:
     excitation: Excitation
 
 
-def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
-    """One batch of the study; see `run_trials`."""
-    return run_trials(job.true, job.structure, job.start, job.excitation, runs=runs, rng=rng)
-
-
-def joined(parts: Sequence[Trials]) -> Trials:
+def joined(parts: Sequence[AnyTrials]) -> AnyTrials:
     """All batches of one study as one; mean squares are weighted by the number of runs."""
     weights = [len(part.theta) for part in parts]
+
+    def averaged(entries: Sequence[dict[str, list[float]]]) -> dict[str, list[float]]:
+        return {
+            name: np.average([entry[name] for entry in entries], axis=0, weights=weights).tolist()
+            for name in entries[0]
+        }
+
     return replace(
         parts[0],
         theta=np.concatenate([part.theta for part in parts]),
         converged=np.concatenate([part.converged for part in parts]),
-        power=averaged([part.power for part in parts], weights),
-        total_power=averaged([part.total_power for part in parts], weights),
+        power=averaged([part.power for part in parts]),
+        total_power=averaged([part.total_power for part in parts]),
     )
 
 
-def averaged(entries: Sequence[dict[str, list[float]]], weights: Sequence[int]) -> dict[str, list[float]]:
-    """Mean squares of several batches as one, name by name and channel by channel."""
-    return {
-        name: np.average([entry[name] for entry in entries], axis=0, weights=weights).tolist()
-        for name in entries[0]
-    }
+def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
+    """Simulate a batch of experiments from rest on the true system and identify each of them.
 
-
-def run_trials(
-    true: Experiment,
-    structure: Structure,
-    start: Array,
-    excitation: Excitation,
-    *,
-    runs: int,
-    rng: np.random.Generator,
-) -> Trials:
-    """Simulate `runs` experiments from rest on the `true` system and identify each of them.
-
-    The search begins at `start` (k,), the model that the design was made on. Runs where it does not settle
-    are repeated from several starts. Prior information of `true` enters as an estimate from earlier data
-    would: with an error of its own in each run.
+    Runs where the search does not settle are repeated from several starts. Prior information of the true
+    experiment enters as an estimate from earlier data would: with an error of its own in each run.
     """
+    true, structure, start, excitation = job.true, job.structure, job.start, job.excitation
     r = excitation.draw(runs, true.samples, rng)
     u_x, y_x = input_and_output(true, r)
     u_e, y_e = _noise(true, runs, rng)
     u, y = u_x + u_e, y_x + y_e
     found = fit_batch(structure, u, y, start=start)
-    theta, information, converged = found.theta, found.information, found.converged.copy()
-    for run in np.flatnonzero(~converged):
-        again = identify(structure, u[run], y[run], start=start)
-        theta[run], information[run], converged[run] = again.theta, again.information, again.converged
-    if true.prior is not None and true.model.names == structure.names:
-        theta = with_prior(theta, information, true.prior, true.model.theta, rng)
+    theta, converged = settled(
+        found,
+        lambda run: identify(structure, u[run], y[run], start=start),
+        prior=true.prior if true.model.names == structure.names else None,
+        truth=true.model.theta,
+        rng=rng,
+    )
     mean_squares = {
         "input": [float(np.mean(u_x**2))],
         "output": [float(np.mean(y_x**2))],
@@ -154,7 +157,31 @@ def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> tuple[Array
     return u, y
 
 
-def with_prior(
+def settled(
+    found: BatchEstimate | ChannelBatch,
+    again: Callable[[int], Estimate | ChannelEstimate],
+    *,
+    prior: Array | None,
+    truth: Array,
+    rng: np.random.Generator,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Estimates (runs, k) and whether they converged (runs,).
+
+    Args:
+        again: estimates a run from several starts, for those where the search of the batch did not settle.
+        prior: (k, k) enters as an estimate from earlier data would: with an error of its own in each run.
+        truth: (k,), about which the earlier estimates scatter.
+    """
+    theta, information, converged = found.theta, found.information, found.converged.copy()
+    for run in np.flatnonzero(~converged):
+        other = again(int(run))
+        theta[run], information[run], converged[run] = other.theta, other.information, other.converged
+    if prior is not None:
+        theta = _with_prior(theta, information, prior, truth, rng)
+    return theta, converged
+
+
+def _with_prior(
     theta: Array, information: Array, prior: Array, centre: Array, rng: np.random.Generator
 ) -> Array:
     """Estimates (runs, k) combined with earlier ones of information `prior`, which may be singular."""

@@ -52,6 +52,11 @@ class Trials(Protocol):
         ...
 
     @property
+    def same_structure(self) -> bool:
+        """Whether the true system has the parameters of the model."""
+        ...
+
+    @property
     def converged(self) -> NDArray[np.bool_]: ...
 
     @property
@@ -59,6 +64,11 @@ class Trials(Protocol):
 
     @property
     def total_power(self) -> dict[str, Any]: ...
+
+    @property
+    def first(self) -> Array:
+        """The excitation of the first run."""
+        ...
 
     def errors(self, promise: Promise) -> Array:
         """|G_hat - G_0| (runs, n) where the promise is made."""

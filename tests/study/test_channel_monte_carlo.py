@@ -112,8 +112,8 @@ def test_a_true_system_of_another_structure_has_no_theory():
 
 
 def test_a_loop_keeps_its_promise():
-    result = simulate(load_spec(LOOP, ["simulation={runs: 100, compare: [white]}"])).result
-    simulation = result["simulation"]
+    outcome = simulate(load_spec(LOOP, ["simulation={runs: 100, compare: [white]}"]))
+    result, simulation = outcome.result, outcome.result["simulation"]
     within_wishart(simulation)
     design = simulation["inputs"]["design"]
     assert design["within_r_adm_limits"][1] > 0.95
@@ -121,6 +121,12 @@ def test_a_loop_keeps_its_promise():
         np.testing.assert_allclose(design["power"][kind], result["power"][kind], rtol=0.01)
         if kind in design["total_power"]:
             assert np.all(np.array(design["total_power"][kind]) > design["power"][kind])
+    shown = outcome.tables["disturbance_design"].columns
+    for i in (1, 2):  # until it has faded
+        assert np.abs(shown[f"y{i}_r"][-1]) < 0.2 * np.abs(shown[f"y{i}_r"]).max()
+        assert np.sum(shown[f"y{i}_r"] ** 2) / 2000 == pytest.approx(
+            result["power"]["output"][i - 1], rel=0.1
+        )
     white = simulation["inputs"]["white"]
     assert white["theory_on_truth"]["worst_ratio"] > 1.2
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
