@@ -33,6 +33,7 @@ from inputdesign_cli.signal import (
     Record,
     RecordFilter,
     grid_lines,
+    limited_responses,
     low_peak_angles,
     merged,
     realise_channels,
@@ -140,14 +141,18 @@ def _angles(
     if recipe.phases != "optimised":
         return lambda lines, values, rng: None
 
+    open_loop = experiment.loop is None
+
     def lowered(lines: Lines, values: int, rng: np.random.Generator) -> Array:
-        outputs = []
-        if bounds.output is not None and recipe.hold == 1:
-            response = experiment.response("output", lines.frequencies / step)
-            outputs = [(response[:, i], float(bound)) for i, bound in enumerate(bounds.output)]
         start = 2.0 * np.pi * rng.random(lines.frequencies.size)
+        held = recipe.hold > 1
         return low_peak_angles(
-            lines, values, start, amplitude=bounds.amplitude, rate=bounds.rate, outputs=outputs
+            lines,
+            values,
+            start,
+            amplitude=bounds.amplitude if open_loop else None,
+            rate=bounds.rate if open_loop else None,
+            outputs=[] if held else limited_responses(experiment, bounds, lines.frequencies, step),
         )
 
     return lowered

@@ -173,11 +173,6 @@ def check_channels_supported(spec: Spec) -> None:
 def _check_loop_supported(spec: Spec, refuse: Callable[[str, str, str], Exception]) -> None:
     if not isinstance(spec.plant, PolynomialPlant):
         raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
-    bound = spec.limits.amplitude
-    if bound is not None and bound.input is not None:
-        raise refuse("limits.amplitude.input", "limit single samples of u in this loop", "limit input_power")
-    if spec.limits.rate is not None:
-        raise refuse("limits.rate", "limit the moves of u in this loop", "limit input_power")
 
 
 def check_given_signal(spec: Spec) -> None:

@@ -5,6 +5,7 @@ from inputdesign_cli.signal.achieved import prediction_gradient as prediction_gr
 from inputdesign_cli.signal.achieved import record_information as record_information
 from inputdesign_cli.signal.bounds import Bounds as Bounds
 from inputdesign_cli.signal.channel_bounds import ChannelBounds as ChannelBounds
+from inputdesign_cli.signal.channel_bounds import limited_responses as limited_responses
 from inputdesign_cli.signal.channel_crest import low_peak_angles as low_peak_angles
 from inputdesign_cli.signal.channel_crest import schroeder_angles as schroeder_angles
 from inputdesign_cli.signal.channel_draw import ChannelDrawer as ChannelDrawer

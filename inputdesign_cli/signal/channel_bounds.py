@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.information import PowerKind
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.channel_information import RecordFilter
 from inputdesign_cli.signal.dress import Dresser
 from inputdesign_cli.signal.recipe import Quantiser, Recipe
@@ -37,11 +37,16 @@ class ChannelBounds:
 def channel_dresser(
     plant: RecordFilter, recipe: Recipe, bounds: ChannelBounds, quantisers: Sequence[Quantiser | None]
 ) -> Dresser:
-    """What enforces the bounds on records of the length of the `plant`'s, with a converter an input."""
+    """What enforces the bounds on records of the length of the `plant`'s, with a converter an input.
+
+    Limits on u are those of the record itself in open loop only.
+    """
+    open_loop = plant.experiment.loop is None
+    amplitude, rate = (bounds.amplitude, bounds.rate) if open_loop else (None, None)
     rooms = tuple(
         Room(
-            None if bounds.amplitude is None else float(bounds.amplitude[a]),
-            None if bounds.rate is None else float(bounds.rate[a]),
+            None if amplitude is None else float(amplitude[a]),
+            None if rate is None else float(rate[a]),
             quantiser,
         )
         for a, quantiser in enumerate(quantisers)
@@ -49,37 +54,53 @@ def channel_dresser(
     return Dresser(recipe, rooms, _watched(plant, recipe.hold, bounds))
 
 
+def limited_responses(
+    experiment: ChannelExperiment, bounds: ChannelBounds, frequencies: Array, step: float
+) -> list[tuple[ComplexArray, float]]:
+    """From sinusoids of the record to each signal that is limited, (L, r) in steady state, and its bound.
+
+    `frequencies` (L,) are in rad per sample. In open loop u is the record itself and left out.
+    """
+    found: list[tuple[ComplexArray, float]] = []
+    if bounds.output is not None:
+        response = experiment.response("output", frequencies / step)
+        found += [(response[:, i], float(bound)) for i, bound in enumerate(bounds.output)]
+    if experiment.loop is not None and (bounds.amplitude is not None or bounds.rate is not None):
+        u = experiment.response("input", frequencies / step)
+        moves = u * (1.0 - np.exp(-1j * frequencies))[:, None, None]
+        for response, limits in ((u, bounds.amplitude), (moves, bounds.rate)):
+            if limits is not None:
+                found += [(response[:, a], float(bound)) for a, bound in enumerate(limits)]
+    return found
+
+
 def _watched(plant: RecordFilter, hold: int, bounds: ChannelBounds) -> tuple[Watched, ...]:
-    """Every output that is limited, and then also what the search for them might spoil."""
-    if bounds.output is None:
+    """What the record is no room for: outputs, in closed loop u, and what the search might spoil."""
+    outputs, inputs = bounds.output, range(plant.experiment.inputs)
+    if outputs is None and plant.experiment.loop is None:
         return ()
-    found = [_output(plant, channel, hold, float(bound)) for channel, bound in enumerate(bounds.output)]
-    for a in range(plant.experiment.inputs):
-        if bounds.amplitude is not None:
-            found.append(_value(a, plant.experiment.inputs, float(bounds.amplitude[a])))
-        if bounds.rate is not None:
-            found.append(_move(a, plant.experiment.inputs, float(bounds.rate[a])))
+    found = [] if outputs is None else [_signal(plant, "output", i, hold, b) for i, b in enumerate(outputs)]
+    if bounds.amplitude is not None:
+        found += [_signal(plant, "input", a, hold, bounds.amplitude[a]) for a in inputs]
+    if bounds.rate is not None:
+        found += [_moves(_signal(plant, "input", a, hold, bounds.rate[a])) for a in inputs]
     return tuple(found)
 
 
-def _output(plant: RecordFilter, channel: int, hold: int, bound: float) -> Watched:
+def _signal(plant: RecordFilter, of: PowerKind, channel: int, hold: int, bound: float) -> Watched:
     def adjoint(weights: Array) -> Array:
-        each = plant.output_adjoint(weights, channel)
+        each = plant.adjoint(of, weights, channel)
         return each.reshape(-1, hold, each.shape[1]).sum(axis=1)
 
-    return Watched(lambda values: plant.output(np.repeat(values, hold, axis=0), channel), adjoint, bound)
+    return Watched(
+        lambda values: plant.channel(of, np.repeat(values, hold, axis=0), channel), adjoint, float(bound)
+    )
 
 
-def _value(channel: int, inputs: int, bound: float) -> Watched:
-    unit = np.eye(inputs)[channel]
-    return Watched(lambda values: values[:, channel], lambda weights: np.outer(weights, unit), bound)
-
-
-def _move(channel: int, inputs: int, bound: float) -> Watched:
-    """From one value to the next, the first from rest; the hold between them does not move."""
-    unit = np.eye(inputs)[channel]
-
-    def adjoint(weights: Array) -> Array:
-        return np.outer(weights - np.append(weights[1:], 0.0), unit)
-
-    return Watched(lambda values: np.diff(values[:, channel], prepend=0.0), adjoint, bound)
+def _moves(signal: Watched) -> Watched:
+    """From one sample of a signal to the next, the first from rest."""
+    return Watched(
+        lambda values: np.diff(signal.apply(values), prepend=0.0),
+        lambda weights: signal.adjoint(weights - np.append(weights[1:], 0.0)),
+        signal.bound,
+    )

@@ -33,9 +33,9 @@ def low_peak_angles(
     Args:
         samples: of the whole record, in as many periods as there are inputs.
         start: (L,), where to begin.
-        amplitude: (r,), what each input may reach; its root mean square when not given.
+        amplitude: (r,), what each input may reach; its root mean square when nothing is limited.
         rate: (r,), what each may move from one value to the next; any distance when not given.
-        outputs: rows (L, r) of the plant at the lines, each with what that output may reach.
+        outputs: rows (L, r) of responses at the lines, each with what that signal may reach.
         powers, steps: see `optimise_phases`.
     """
     inputs = lines.inputs
@@ -46,7 +46,8 @@ def low_peak_angles(
     gains: list[ComplexArray] = []
     for block in range(blocks):
         vectors = block_vectors(lines, samples, block)
-        gains += [vectors[:, a] / scale[a] for a in range(inputs) if rms[a] > 0]
+        if amplitude is not None or (rate is None and not outputs):
+            gains += [vectors[:, a] / scale[a] for a in range(inputs) if rms[a] > 0]
         if rate is not None:
             gains += [moves * vectors[:, a] / rate[a] for a in range(inputs) if rms[a] > 0]
         gains += [np.einsum("na,na->n", row, vectors) / bound for row, bound in outputs]

@@ -45,21 +45,27 @@ class RecordFilter:
 
     def inputs(self, record: Array) -> Array:
         """(n, r): what the samples (n, r) alone cause at the inputs; in open loop they are the inputs."""
-        if self.experiment.loop is None:
-            return record
-        return self._answer(record, "input")[:, 0]
+        return record if self._is_record("input") else self._answer(record, "input")[:, 0]
 
-    def output(self, record: Array, channel: int) -> Array:
-        """(n,): one of the outputs."""
+    def channel(self, of: PowerKind, record: Array, channel: int) -> Array:
+        """(n,): one of the outputs, or of the inputs."""
+        if self._is_record(of):
+            return record[:, channel]
         transform = np.fft.rfft(record, self._length, axis=0)
-        answer = np.einsum("nr,nr->n", self._plant[:, channel], transform)
+        answer = np.einsum("nr,nr->n", self._responses(of)[:, channel], transform)
         return np.asarray(np.fft.irfft(answer, self._length)[: self.samples])
 
-    def output_adjoint(self, weights: Array, channel: int) -> Array:
-        """(n, r): the transpose of `output`, applied to weights (n,)."""
+    def adjoint(self, of: PowerKind, weights: Array, channel: int) -> Array:
+        """(n, r): the transpose of `channel`, applied to weights (n,)."""
+        if self._is_record(of):
+            return np.outer(weights, np.eye(self.experiment.inputs)[channel])
         transform = np.fft.rfft(weights, self._length)
-        answer = self._plant[:, channel].conj() * transform[:, None]
+        answer = self._responses(of)[:, channel].conj() * transform[:, None]
         return np.asarray(np.fft.irfft(answer, self._length, axis=0)[: self.samples])
+
+    def _is_record(self, of: PowerKind) -> bool:
+        """Whether a signal is the excitation itself."""
+        return of == "excitation" or (of == "input" and self.experiment.loop is None)
 
     @cached_property
     def _length(self) -> int:
@@ -76,8 +82,14 @@ class RecordFilter:
         return w / self.step if self.experiment.model.continuous else w
 
     @cached_property
-    def _plant(self) -> ComplexArray:
-        return self.experiment.response("output", self._frequencies)
+    def _kept(self) -> dict[PowerKind, ComplexArray]:
+        return {}
+
+    def _responses(self, of: PowerKind) -> ComplexArray:
+        """(n, channels, r) at all frequencies of the transform."""
+        if of not in self._kept:
+            self._kept[of] = self.experiment.response(of, self._frequencies)
+        return self._kept[of]
 
     @cached_property
     def _gradient(self) -> ComplexArray:

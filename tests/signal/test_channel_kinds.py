@@ -155,8 +155,8 @@ def test_the_adjoint_of_an_output():
     model = arx()
     for channel in range(2):
         y = sum(scipy.signal.lfilter(model.B[channel][j], model.A[channel], u[:, j]) for j in range(2))
-        np.testing.assert_allclose(plant.output(u, channel), y, atol=1e-10)
-        assert weights @ y == pytest.approx(np.sum(plant.output_adjoint(weights, channel) * u))
+        np.testing.assert_allclose(plant.channel("output", u, channel), y, atol=1e-10)
+        assert weights @ y == pytest.approx(np.sum(plant.adjoint("output", weights, channel) * u))
 
 
 BOUNDS = {
