@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from inputdesign_cli.document.study_words import study_caption
 from inputdesign_cli.outcome import Array, BoundCurves, OptimalityCurves, SignalCurves, SpectrumCurves
 from inputdesign_cli.report.plots import Curves, draw
 from inputdesign_cli.textformats import read_csv
@@ -78,7 +79,7 @@ def png_chart(path: Path) -> Chart:
     """A figure of the run as it is."""
     data = base64.b64encode(path.read_bytes()).decode()
     name = path.stem.replace("_", " ")
-    caption = _CAPTIONS.get(path.stem, f"The figure {name} of the run.")
+    caption = _CAPTIONS.get(path.stem) or study_caption(path.stem) or f"The figure {name} of the run."
     return Chart(f"data:image/png;base64,{data}", caption, caption)
 
 

@@ -8,6 +8,13 @@ from typing import Any
 
 from inputdesign_cli.document.charts import run_charts
 from inputdesign_cli.document.render import provenance, shown
+from inputdesign_cli.document.study_words import (
+    estimate_answer,
+    estimate_facts,
+    estimate_table,
+    simulation_table,
+    verdict_table,
+)
 from inputdesign_cli.document.words import ANSWERS, MAXIMISED, assumptions, citations, question
 from inputdesign_cli.errors import Complaint, DataError, SpecError
 from inputdesign_cli.record import read_run
@@ -15,15 +22,22 @@ from inputdesign_cli.spec import Spec, parse_spec
 
 Result = Mapping[str, Any]
 
-# Headings and the charts that belong under them; the others come last.
+# Headings and the charts that belong under them; those of data and of simulated runs have their own.
 _SECTIONS = (
     ("Accuracy", ("bound",)),
     ("Spectrum", ("spectrum",)),
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),
 )
-_NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "simulation"})
+_OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound")
+_OF_RUNS = ("errors_", "cloud_", "disturbance_")
+_NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256"})
 _MOST_ENTRIES = 16
+_COMMANDS = {
+    "assess": "idesign assess spec.yaml DATA",
+    "identify": "idesign identify DATA --spec spec.yaml",
+    **{verb: f"idesign {verb} spec.yaml" for verb in ("simulate", "solve", "analyse")},
+}
 
 
 def run_page(run: Path) -> dict[str, Any]:
@@ -35,25 +49,32 @@ def run_page(run: Path) -> dict[str, Any]:
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
         raise DataError(Complaint("run-unreadable", message, hint="run the spec again")) from error
-    verb = "solve" if "objective" in result else "analyse"
-    if result.get("simulation"):
-        verb = "simulate"
+    verb = _verb(result)
     charts = run_charts(run, result, spec.time_unit, closed_loop=spec.closed_loop)
-    placed = {name for _, names in _SECTIONS for name in names}
+    data = [name for name in _OF_DATA if name in charts]
+    runs = [name for name in charts if name.startswith(_OF_RUNS)]
+    placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
     sections = [(heading, [n for n in names if n in charts]) for heading, names in _SECTIONS]
     sections.append(("Further figures", [name for name in charts if name not in placed]))
     proofs = _proofs(result)
     return {
         "title": spec.title or run.resolve().name,
         "question": question(spec, verb),
-        "answer": _answer(result),
+        "answer": estimate_answer(result) if "identification" in result else _answer(result),
+        "notes": result.get("notes", []),
+        "estimate": estimate_table(result),
+        "estimate_facts": list(estimate_facts(result)),
+        "verdicts": verdict_table(result, spec.time_unit),
+        "data_charts": data,
         "facts": list(_facts(result, spec)),
         "charts": charts,
         "sections": [(h, names) for h, names in sections if names or (h == "The certificate" and proofs)],
         "proofs": proofs,
-        "simulation": flat(result.get("simulation") or {}),
+        "simulation": simulation_table(result),
+        "simulated_runs": result.get("simulation", {}).get("runs"),
+        "run_charts": runs,
         "assumptions": assumptions(spec, result),
-        "command": f"idesign {verb} spec.yaml",
+        "command": _COMMANDS[verb],
         "files": [],
         "spec": text,
         "provenance": provenance(
@@ -64,6 +85,16 @@ def run_page(run: Path) -> dict[str, Any]:
         "citations": citations(spec, result),
         "numbers": flat({key: value for key, value in result.items() if key not in _NOT_NUMBERS}),
     }
+
+
+def _verb(result: Result) -> str:
+    if "assessment" in result:
+        return "assess"
+    if "identification" in result:
+        return "identify"
+    if result.get("simulation"):
+        return "simulate"
+    return "solve" if "objective" in result else "analyse"
 
 
 def _answer(result: Result) -> str:
@@ -99,7 +130,7 @@ def _facts(result: Result, spec: Spec) -> Iterator[tuple[str, str, str]]:
         yield (
             ANSWERS.get(objective.get("kind", ""), ("value", ""))[0],
             shown(objective["value"]),
-            str(result.get("status", "")),
+            str(result.get("assessment", {}).get("top_up_status") or result.get("status", "")),
         )
     if objective.get("kind") != "least_cost" and "cost" in result:
         yield "cost", shown(result["cost"]), ""

@@ -222,6 +222,10 @@ def _limits(spec: Spec) -> list[str]:
 
 
 def _goal(spec: Spec, verb: str) -> str:
+    if verb == "identify":
+        return "Asked: the model that explains the recorded data, and how sure it is."
+    if verb == "assess":
+        return "Asked: do the recorded data meet this accuracy; if not, which experiment makes up for it?"
     if not spec.designs or verb == "analyse":
         return "Asked: what accuracy the given excitation buys."
     family = _SPECTRA.get(getattr(spec.spectrum, "type", ""), "")
