@@ -38,8 +38,8 @@ def _draw(axes: Axes, pair: Ellipse, probability: float) -> None:
     axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
     axes.set_xlabel(pair.names[0])
     axes.set_ylabel(pair.names[1])
-    axes.locator_params(axis="x", nbins=2)  # wide labels stand close in three columns
-    axes.locator_params(axis="y", nbins=4)
+    axes.locator_params(nbins=4)
+    axes.tick_params(axis="x", labelrotation=30)  # the labels are wide for three columns
 
 
 def boundary(center: Array, covariance: Array, probability: float) -> Array:
