@@ -149,10 +149,9 @@ class _Chooser:
             return self._affordable(values, _FAR * level), False
         if not dresser.plain:
             values = self._lowered(values, level)
-            found = first_level(lambda a: self._accepts(dresser.dress(values, a)), 0.98 * level)
-            if found is not None:
-                return dresser.dress(values, found), True
-            level = self._nearest(values, level)
+            level, met = first_level(lambda a: self._figure(dresser.dress(values, a)), 0.98 * level)
+            if met:
+                return dresser.dress(values, level), True
         return self._affordable(values, level), False
 
     def _of_designed_power(self, values: Array) -> Array:
@@ -184,7 +183,11 @@ class _Chooser:
         return compressed(values, reach / level) if reach is not None and alone and not fixed else values
 
     def _accepts(self, samples: Array) -> bool:
-        return self._ratio(samples) <= _MET and self._share(samples) >= 1.0 / _MET
+        return self._figure(samples) <= 1.0
+
+    def _figure(self, samples: Array) -> float:
+        """At most one for a record that does what is asked; infinite beyond the limits on the powers."""
+        return self._ratio(samples) / _MET if self._share(samples) >= 1.0 / _MET else np.inf
 
     def _share(self, samples: Array) -> float:
         """The largest factor on its powers that the limits leave to the record."""
@@ -196,11 +199,6 @@ class _Chooser:
             for kind, channel, most in self.bench.limits
         ]
         return min((most / power for most, power in spent if power > 0.0), default=np.inf)
-
-    def _nearest(self, values: Array, level: float) -> float:
-        """The level of the least ratio, where none is low enough."""
-        levels = level * np.geomspace(0.7, 12.0, 8)
-        return float(min(levels, key=lambda a: self._ratio(self.dresser.dress(values, a))))
 
     def _affordable(self, values: Array, level: float) -> Array:
         """The record at this level, or as much of it as the limits on the powers allow."""

@@ -13,6 +13,9 @@ _EXACT = 1e-10
 _COARSE = 1e-3
 _GROWTH = 1.2
 _MOST_GROWTH = 40.0
+# A level that leaves more than this share of the figure gains nothing worth having; so many may.
+_WORTH = 0.998
+_PATIENCE = 4
 _NOTHING = 1e-9
 
 
@@ -41,23 +44,28 @@ def least_level(ratio: Callable[[float], float], start: float) -> float:
     return high
 
 
-def first_level(accepted: Callable[[float], bool], start: float) -> float | None:
-    """The least of rising levels that is accepted, to a thousandth, or None when none is.
+def first_level(figure: Callable[[float], float], start: float) -> tuple[float, bool]:
+    """The least of rising levels at which a `figure` is at most one, to a thousandth, and True.
 
-    Where limits bite, raising the level first helps, and at last changes nothing any more.
+    Where limits bite, raising the level first helps, and at last changes nothing any more: when several
+    levels in a row gain nothing worth having, the level of the least figure, and False.
     """
     low, high = start / _GROWTH, start
-    while not accepted(high):
+    best, least, idle = start, np.inf, 0
+    while (reached := figure(high)) > 1.0:
+        idle = 0 if reached < _WORTH * least else idle + 1
+        if reached < least:
+            best, least = high, reached
         low, high = high, high * _GROWTH
-        if high > _MOST_GROWTH * start:
-            return None
+        if idle == _PATIENCE or high > _MOST_GROWTH * start:
+            return best, False
     while high > low * (1.0 + _COARSE):
         middle = np.sqrt(low * high)
-        if accepted(middle):
+        if figure(middle) <= 1.0:
             high = middle
         else:
             low = middle
-    return high
+    return high, True
 
 
 def last_level(accepted: Callable[[float], bool], start: float) -> float:
@@ -76,5 +84,4 @@ def last_level(accepted: Callable[[float], bool], start: float) -> float:
 
 def level_of_power(power: Callable[[float], float], wanted: float, start: float) -> float:
     """The level at which the record has the `wanted` power, or the highest that still adds to it."""
-    found = first_level(lambda level: power(level) >= wanted * (1.0 - 1e-9), start)
-    return _MOST_GROWTH * start if found is None else found
+    return first_level(lambda level: wanted * (1.0 - 1e-9) / power(level), start)[0]

@@ -66,8 +66,22 @@ def test_last_level():
 
 
 def test_first_level():
-    assert first_level(lambda a: a >= 3.0, 1.0) == pytest.approx(3.0, rel=2e-3)
-    assert first_level(lambda a: False, 1.0) is None
+    assert first_level(lambda a: 3.0 / a, 1.0) == (pytest.approx(3.0, rel=2e-3), True)
+
+
+def test_a_level_that_helps_most():
+    """Raising the level gains nothing beyond 4, and it is found without going to the end."""
+    tried = []
+
+    def figure(a):
+        tried.append(a)
+        return 3.0 / min(a, 4.0) + 0.5
+
+    level, met = first_level(figure, 1.0)
+    assert not met
+    assert figure(level) == pytest.approx(1.25, rel=1e-2)
+    assert max(tried) < 10.0
+    assert first_level(lambda a: np.inf, 1.0) == (1.0, False)
 
 
 def demand():
