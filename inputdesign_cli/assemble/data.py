@@ -101,7 +101,8 @@ def told_of(path: Path) -> Iterator[None]:
 def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:
     """How the channels are called, and how their columns begin: u1, u2, ..; u or u1 for one channel."""
     if channels == 1:
-        return {letter: f"{letter}1" if f"{letter}1" in header else letter}
+        numbered = f"{letter}1"
+        return {letter: numbered if any(name.startswith(numbered) for name in header) else letter}
     return {f"{letter}{i + 1}": f"{letter}{i + 1}" for i in range(channels)}
 
 

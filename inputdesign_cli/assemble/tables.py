@@ -27,25 +27,44 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
     """
     rows = _rows(path, key)
     header = [name.strip().lower() for name in rows[0][1]]
-    columns: dict[str, Array] = {}
-    for role, start in wanted.items():
-        found = [i for i, name in enumerate(header) if name.startswith(start.lower())]
-        if len(found) != 1:
-            raise DataError(
-                Complaint(
-                    "data-missing-column",
-                    f"{path.name} has {'no column' if not found else 'several columns'} for {role} "
-                    f"(its header is: {', '.join(rows[0][1])})",
-                    f"name one column {start}, such as {start}_rad_per_s"
-                    if role == "frequency"
-                    else f"name one column {start}",
-                    key,
-                    Location(str(path), 1, 1, ",".join(rows[0][1])),
-                )
-            )
-        at = found[0]
-        columns[role] = np.array([_number(path, key, line, row, at, header[at]) for line, row in rows[1:]])
-    return columns
+    found = {role: _named(header, start.lower()) for role, start in wanted.items()}
+    wrong = [
+        _unclear(path, key, rows[0][1], what, [wanted[role] for role in roles])
+        for what, roles in (
+            ("no column", [role for role, at in found.items() if not at]),
+            ("several columns", [role for role, at in found.items() if len(at) > 1]),
+        )
+        if roles
+    ]
+    if wrong:
+        raise DataError(wrong)
+    return {
+        role: np.array([_number(path, key, line, row, at, header[at]) for line, row in rows[1:]])
+        for role, (at,) in found.items()
+    }
+
+
+def _named(header: list[str], start: str) -> list[int]:
+    """The columns of this name, otherwise those whose names begin with it: u1 is not u10."""
+    exact = [i for i, name in enumerate(header) if name == start]
+    return exact or [
+        i for i, name in enumerate(header) if name.startswith(start) and not name[len(start)].isdigit()
+    ]
+
+
+def _unclear(path: Path, key: str, header: list[str], what: str, names: list[str]) -> Complaint:
+    hint = f"name one column {' and one '.join(names)}"
+    if names == ["frequency"]:
+        hint += ", such as frequency_rad_per_s"
+    if len(header) == 1 and any(mark in header[0] for mark in ";\t|"):
+        hint = "separate the columns with commas, and write numbers with a decimal point"
+    return Complaint(
+        "data-missing-column",
+        f"{path.name} has {what} for {', '.join(names)} (its header is: {', '.join(header)})",
+        hint,
+        key,
+        Location(str(path), 1, 1, ",".join(header)),
+    )
 
 
 def has_column(path: Path, start: str, *, key: str) -> bool:

@@ -234,7 +234,13 @@ def test_offsets_and_outliers_name_the_channel(tmp_path):
     ("change", "code", "named"),
     [
         (lambda c: {k: v for k, v in c.items() if k != "y2"}, "data-missing-column", "y2"),
-        (lambda c: {k: v for k, v in c.items() if k != "u1"}, "data-missing-column", "u1"),
+        (lambda c: {k: v for k, v in c.items() if k[:2] != "u1"}, "data-missing-column", "u1"),
+        (lambda c: {k: v for k, v in c.items() if k[0] != "y"}, "data-missing-column", "y1, y2"),
+        (
+            lambda c: {k if k != "u1" else "u1_v": v for k, v in c.items()} | {"u1_a": c["u1"]},
+            "data-missing-column",
+            "several columns for u1",
+        ),
         (lambda c: {k: v[:6] for k, v in c.items()}, "too-few-samples", "6 samples"),
         (lambda c: {**c, "u2": np.ones(500)}, "constant-input", "u2"),
         (lambda c: {**c, "y1": np.ones(500)}, "constant-output", "y1"),

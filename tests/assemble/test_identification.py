@@ -100,6 +100,15 @@ def test_offsets_and_outliers_are_told(tmp_path):
     assert "--remove-means" not in " ".join(centred.result["notes"])
 
 
+@pytest.mark.parametrize("names", [("u", "y"), ("U_volt", "y1_bar"), ("u1_V", "y")])
+def test_columns_may_carry_units(names, tmp_path):
+    columns = record(np.random.default_rng(3).standard_normal(300))
+    plain = identify(load_spec(SPEC), write(tmp_path / "d.csv", columns)).result["identification"]
+    renamed = {"time_s": columns["time_s"], names[0]: columns["u1"], names[1]: columns["y1"]}
+    found = identify(load_spec(SPEC), write(tmp_path / "e.csv", renamed)).result["identification"]
+    assert found["theta"] == plain["theta"]
+
+
 def _without(name):
     return lambda c: {k: v for k, v in c.items() if k != name}
 
