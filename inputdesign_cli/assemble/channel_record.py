@@ -217,7 +217,7 @@ def record_sizes(spec: Spec, experiment: ChannelExperiment, samples: Array) -> d
     """Length, powers and peaks by channel of a record (n, r)."""
     step = record_step(spec)
     plant = RecordFilter(experiment, len(samples), step)
-    y, u = plant.outputs(samples), plant.inputs(samples)
+    y, u = plant.signals("output", samples), plant.signals("input", samples)
     peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
     return {
         "samples": len(samples),

@@ -48,7 +48,9 @@ def _named(header: list[str], start: str) -> list[int]:
     """The columns of this name, otherwise those whose names begin with it: u1 is not u10."""
     exact = [i for i, name in enumerate(header) if name == start]
     return exact or [
-        i for i, name in enumerate(header) if name.startswith(start) and not name[len(start)].isdigit()
+        i
+        for i, name in enumerate(header)
+        if name.startswith(start) and not (start[-1].isdigit() and name[len(start)].isdigit())
     ]
 
 

@@ -76,31 +76,28 @@ def limited_responses(
 
 def _watched(plant: RecordFilter, hold: int, bounds: ChannelBounds) -> tuple[Watched, ...]:
     """What the record is no room for: outputs, in closed loop u, and what the search might spoil."""
-    outputs, inputs = bounds.output, range(plant.experiment.inputs)
-    if outputs is None and plant.experiment.loop is None:
+    if bounds.output is None and plant.experiment.loop is None:
         return ()
-    found = [] if outputs is None else [_signal(plant, "output", i, hold, b) for i, b in enumerate(outputs)]
+    found = [] if bounds.output is None else [_signals(plant, "output", hold, bounds.output)]
     if bounds.amplitude is not None:
-        found += [_signal(plant, "input", a, hold, bounds.amplitude[a]) for a in inputs]
+        found.append(_signals(plant, "input", hold, bounds.amplitude))
     if bounds.rate is not None:
-        found += [_moves(_signal(plant, "input", a, hold, bounds.rate[a])) for a in inputs]
+        found.append(_moves(_signals(plant, "input", hold, bounds.rate)))
     return tuple(found)
 
 
-def _signal(plant: RecordFilter, of: PowerKind, channel: int, hold: int, bound: float) -> Watched:
+def _signals(plant: RecordFilter, of: PowerKind, hold: int, bound: Array) -> Watched:
     def adjoint(weights: Array) -> Array:
-        each = plant.adjoint(of, weights, channel)
+        each = plant.adjoint(of, weights)
         return each.reshape(-1, hold, each.shape[1]).sum(axis=1)
 
-    return Watched(
-        lambda values: plant.channel(of, np.repeat(values, hold, axis=0), channel), adjoint, float(bound)
-    )
+    return Watched(lambda values: plant.signals(of, np.repeat(values, hold, axis=0)), adjoint, bound)
 
 
-def _moves(signal: Watched) -> Watched:
-    """From one sample of a signal to the next, the first from rest."""
+def _moves(signals: Watched) -> Watched:
+    """From one sample of each signal to the next, the first from rest."""
     return Watched(
-        lambda values: np.diff(signal.apply(values), prepend=0.0),
-        lambda weights: signal.adjoint(weights - np.append(weights[1:], 0.0)),
-        signal.bound,
+        lambda values: np.diff(signals.apply(values), axis=0, prepend=0.0),
+        lambda weights: signals.adjoint(weights - np.append(weights[1:], 0.0 * weights[:1], axis=0)),
+        signals.bound,
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
 from inputdesign_cli.information import ChannelExperiment, PowerKind
@@ -34,33 +34,25 @@ class RecordFilter:
 
     def information(self, record: Array) -> Array:
         """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of the samples (n, r), M0 scaled to n."""
-        psi = self._answer(record, "gradient")
+        psi = self._prediction_gradient(record)
         flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
         noise = self.samples / self.experiment.samples * self.experiment.noise_information
         return self.experiment.prior_information + noise + flat @ flat.T
 
-    def outputs(self, record: Array) -> Array:
-        """(n, p): what the samples (n, r) alone cause."""
-        return self._answer(record, "output")[:, 0]
-
-    def inputs(self, record: Array) -> Array:
-        """(n, r): what the samples (n, r) alone cause at the inputs; in open loop they are the inputs."""
-        return record if self._is_record("input") else self._answer(record, "input")[:, 0]
-
-    def channel(self, of: PowerKind, record: Array, channel: int) -> Array:
-        """(n,): one of the outputs, or of the inputs."""
+    def signals(self, of: PowerKind, record: Array) -> Array:
+        """(n, channels): what the samples (n, r) alone cause at inputs or outputs."""
         if self._is_record(of):
-            return record[:, channel]
+            return record
         transform = np.fft.rfft(record, self._length, axis=0)
-        answer = np.einsum("nr,nr->n", self._responses(of)[:, channel], transform)
-        return np.asarray(np.fft.irfft(answer, self._length)[: self.samples])
+        answer = np.einsum("ncr,nr->nc", self._responses(of), transform)
+        return np.asarray(np.fft.irfft(answer, self._length, axis=0)[: self.samples])
 
-    def adjoint(self, of: PowerKind, weights: Array, channel: int) -> Array:
-        """(n, r): the transpose of `channel`, applied to weights (n,)."""
+    def adjoint(self, of: PowerKind, weights: Array) -> Array:
+        """(n, r): the transpose of `signals`, applied to weights (n, channels)."""
         if self._is_record(of):
-            return np.outer(weights, np.eye(self.experiment.inputs)[channel])
-        transform = np.fft.rfft(weights, self._length)
-        answer = self._responses(of)[:, channel].conj() * transform[:, None]
+            return weights
+        transform = np.fft.rfft(weights, self._length, axis=0)
+        answer = np.einsum("ncr,nc->nr", self._responses(of).conj(), transform)
         return np.asarray(np.fft.irfft(answer, self._length, axis=0)[: self.samples])
 
     def _is_record(self, of: PowerKind) -> bool:
@@ -74,7 +66,7 @@ class RecordFilter:
             self.step if experiment.model.continuous else 1.0
         )
         memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
-        return int(2 ** np.ceil(np.log2(self.samples + memory)))
+        return int(scipy.fft.next_fast_len(self.samples + memory, real=True))
 
     @cached_property
     def _frequencies(self) -> Array:
@@ -93,26 +85,19 @@ class RecordFilter:
 
     @cached_property
     def _gradient(self) -> ComplexArray:
-        return self._filters("gradient", self._frequencies)
+        return self.experiment.excitation_gradient(self._frequencies)
 
-    def _filters(self, of: PowerKind | Literal["gradient"], w: Array) -> ComplexArray:
-        """(n, k, p, r) those of the prediction gradient, or (n, 1, channels, r)."""
-        if of == "gradient":
-            return self.experiment.excitation_gradient(w)
-        return self.experiment.response(of, w)[:, None]
-
-    def _answer(self, record: Array, of: PowerKind | Literal["gradient"]) -> NDArray[np.float64]:
-        """(n, k, p) the prediction gradient, or (n, 1, channels)."""
+    def _prediction_gradient(self, record: Array) -> NDArray[np.float64]:
+        """(n, k, p)."""
         transform = np.fft.rfft(record, self._length, axis=0)
         model = self.experiment.model
-        size = self.experiment.size * model.outputs * model.inputs * len(transform)
-        if of == "gradient" and size <= _KEPT:
+        if self.experiment.size * model.outputs * model.inputs * len(transform) <= _KEPT:
             answer = np.einsum("nkpr,nr->nkp", self._gradient, transform)
             return np.fft.irfft(answer, self._length, axis=0)[: len(record)]
         parts = []
         for start in range(0, len(transform), _FREQUENCIES_AT_ONCE):
             part = slice(start, start + _FREQUENCIES_AT_ONCE)
-            F = self._filters(of, self._frequencies[part])
+            F = self.experiment.excitation_gradient(self._frequencies[part])
             parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
         return np.fft.irfft(np.concatenate(parts), self._length, axis=0)[: len(record)]
 
@@ -124,9 +109,9 @@ def channel_record_information(experiment: ChannelExperiment, record: Array, ste
 
 def channel_outputs(experiment: ChannelExperiment, record: Array, step: float) -> Array:
     """(n, p): what the samples alone cause at the outputs, from rest."""
-    return RecordFilter(experiment, len(record), step).outputs(record)
+    return RecordFilter(experiment, len(record), step).signals("output", record)
 
 
 def channel_inputs(experiment: ChannelExperiment, record: Array, step: float) -> Array:
     """(n, r): what the samples alone cause at the inputs; in open loop they are the inputs."""
-    return RecordFilter(experiment, len(record), step).inputs(record)
+    return RecordFilter(experiment, len(record), step).signals("input", record)

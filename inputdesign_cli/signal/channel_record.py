@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from inputdesign_cli.information import PowerKind
+from inputdesign_cli.information import POWER_KINDS, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.channel_bounds import ChannelBounds, channel_dresser
 from inputdesign_cli.signal.channel_draw import ChannelDrawer
@@ -34,9 +34,7 @@ def realise_channels(
     bounds = bounds or ChannelBounds()
 
     def powers(record: Array) -> Mapping[PowerKind, Array]:
-        signals = (plant.inputs(record), plant.outputs(record), record)
-        kinds: tuple[PowerKind, ...] = ("input", "output", "excitation")
-        return dict(zip(kinds, (np.mean(signal**2, axis=0) for signal in signals), strict=True))
+        return {kind: np.mean(plant.signals(kind, record) ** 2, axis=0) for kind in POWER_KINDS}
 
     converters = quantisers or [None] * plant.experiment.inputs
     dresser = channel_dresser(plant, drawer.recipe, bounds, converters)

@@ -22,12 +22,13 @@ _STEPS = 60
 class Watched:
     """A signal (n,) that is linear in the record, such as an output, and the largest modulus it may have.
 
-    `adjoint` is the transpose of `apply`: it answers in the shape of the record.
+    Several signals (n, q) have a bound (q,) each. `adjoint` is the transpose of `apply`: it answers in the
+    shape of the record.
     """
 
     apply: LinearMap
     adjoint: LinearMap
-    bound: float
+    bound: float | Array
 
 
 def slow_moves(values: Array, rate: float) -> Array:
@@ -102,7 +103,7 @@ def restrained(values: Array, watched: tuple[Watched, ...]) -> Array:
 
 def peak_ratio(values: Array, watched: tuple[Watched, ...]) -> float:
     """The largest modulus of any watched signal relative to its bound."""
-    return max((float(np.abs(w.apply(values)).max()) / w.bound for w in watched), default=0.0)
+    return max((float((np.abs(w.apply(values)) / w.bound).max()) for w in watched), default=0.0)
 
 
 def _penalised(
@@ -115,6 +116,6 @@ def _penalised(
     for signal in watched:
         ratio = signal.apply(record) / signal.bound
         excess = ratio - np.clip(ratio, -_INSIDE, _INSIDE)
-        value += 0.5 * penalty * float(excess @ excess)
-        slope = slope + penalty * signal.adjoint(excess) / signal.bound * scale
+        value += 0.5 * penalty * float(np.sum(excess**2))
+        slope = slope + penalty * signal.adjoint(excess / signal.bound) * scale
     return value, slope.ravel()

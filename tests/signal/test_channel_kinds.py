@@ -151,12 +151,13 @@ def test_shifted_sequences_are_nearly_uncorrelated():
 
 def test_the_adjoint_of_an_output():
     plant = RecordFilter(ChannelExperiment(arx(), SAMPLES).whitened(1.0), SAMPLES, 1.0)
-    u, weights = rng().normal(size=(SAMPLES, 2)), rng(1).normal(size=SAMPLES)
+    u, weights = rng().normal(size=(SAMPLES, 2)), rng(1).normal(size=(SAMPLES, 2))
     model = arx()
-    for channel in range(2):
-        y = sum(scipy.signal.lfilter(model.B[channel][j], model.A[channel], u[:, j]) for j in range(2))
-        np.testing.assert_allclose(plant.channel("output", u, channel), y, atol=1e-10)
-        assert weights @ y == pytest.approx(np.sum(plant.adjoint("output", weights, channel) * u))
+    y = np.zeros((SAMPLES, 2))
+    for i, j in np.ndindex(2, 2):
+        y[:, i] += scipy.signal.lfilter(model.B[i][j], model.A[i], u[:, j])
+    np.testing.assert_allclose(plant.signals("output", u), y, atol=1e-10)
+    assert np.sum(weights * y) == pytest.approx(np.sum(plant.adjoint("output", weights) * u))
 
 
 BOUNDS = {
@@ -194,7 +195,7 @@ def test_limits_hold_exactly(kind, limited):
     if bounds.rate is not None:
         assert np.all(moves <= bounds.rate * (1 + 1e-15))
     if bounds.output is not None:
-        assert np.all(np.abs(plant.outputs(u)).max(axis=0) <= bounds.output)
+        assert np.all(np.abs(plant.signals("output", u)).max(axis=0) <= bounds.output)
     if converters:
         codes = u / np.array([q.step for q in converters])
         np.testing.assert_allclose(codes, np.rint(codes), atol=1e-9)
