@@ -30,7 +30,6 @@ from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import channel_record_information
 from inputdesign_cli.spec import Spec
-from inputdesign_cli.spec.plant import PolynomialPlant
 from inputdesign_cli.spec.spectrum import FirSpectrum, PolynomialSpectrum
 from inputdesign_cli.spectrum import PolynomialBasis
 
@@ -171,8 +170,6 @@ def check_channels_supported(spec: Spec) -> None:
 
 
 def _check_loop_supported(spec: Spec, refuse: Callable[[str, str, str], Exception]) -> None:
-    if not isinstance(spec.plant, PolynomialPlant):
-        raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
     bound = spec.limits.amplitude
     if bound is not None and bound.input is not None:
         raise refuse("limits.amplitude.input", "limit single samples of u in this loop", "limit input_power")
