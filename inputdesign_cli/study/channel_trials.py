@@ -113,7 +113,7 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
     found = estimated_runs(job.model, u, y, job.step, start)
     theta, information, converged = found.theta, found.information, found.converged.copy()
     for run in np.flatnonzero(~converged):
-        again = estimated(job.model, u[run], y[run], job.step, start)
+        again = estimated(job.model, u[run], y[run], job.step, start, feedback=true.loop is not None)
         theta[run], information[run], converged[run] = again.theta, again.information, again.converged
     if true.prior is not None and system.names == job.model.names:
         theta = with_prior(theta, information, true.prior, system.theta, rng)
