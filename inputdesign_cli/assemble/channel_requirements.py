@@ -28,6 +28,7 @@ from inputdesign_cli.assemble.model_error import model_error_alpha, no_feedback
 from inputdesign_cli.assemble.tables import has_column
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import ChannelModel, Rational
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer
 
@@ -61,7 +62,7 @@ def build_entry_errors(
             if error.region == "first_order"
             else _over_ellipsoid(spec, experiment, admissible, alpha, band, i, j)
         )
-        check_positive(admissible, errors[-1].grid)
+        _check_positive(spec, admissible, errors[-1].grid)
     return tuple(errors)
 
 
@@ -131,8 +132,12 @@ def _of_the_norm(
     if weighted is not None:
         admissible = Weighted(admissible, weighted)
     requirement = NormError(experiment, admissible, alpha, band)
-    check_positive(admissible, requirement.grid)
+    _check_positive(spec, admissible, requirement.grid)
     return requirement
+
+
+def _check_positive(spec: Spec, admissible: AdmissibleError, grid: Array) -> None:
+    check_positive(admissible, grid, unit=frequency_unit(spec), named=f"rad/{spec.time_unit}")
 
 
 def _sensitivity(spec: Spec, model: ChannelModel) -> LoopSensitivity:

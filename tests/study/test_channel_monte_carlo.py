@@ -126,6 +126,21 @@ def test_a_loop_keeps_its_promise():
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
 
 
+def test_a_loop_around_a_held_plant_keeps_its_promise():
+    """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
+    true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
+    overrides = [f"simulation={{runs: 80, {true}}}", "spectrum.order=8"]
+    simulation = simulate(load_spec("specs/motor_loop.yaml", overrides)).result["simulation"]
+    within_wishart(simulation)
+    design = simulation["inputs"]["design"]
+    assert design["within_r_u_limits"][1] > 0.95
+    assert design["on_design_model"]["within_r_adm_limits"][1] > 0.95
+    mean = [design["mean_estimate"][name] for name in ("b0", "a1", "a0")]
+    np.testing.assert_allclose(mean, [2.2, 11, 20], rtol=0.01)
+    for kind, total in design["total_power"].items():
+        assert total[0] > design["power"][kind][0]
+
+
 def test_a_true_system_that_the_controller_does_not_hold_is_refused():
     plant = "{A: [[1, -1.1], [1, -0.6]], B: [[[0, -1.0, -0.4], [0, 0]], [[0, 0], [0, 1.2, -0.5]]]}"
     with pytest.raises(SpecError) as caught:
