@@ -202,6 +202,8 @@ def channel_experiment(spec: Spec) -> ChannelExperiment:
     """
     model, controller = build_channel_model(spec), spec.experiment.controller
     loop = None if controller is None else stable_loop(model, controller)
+    if loop is not None:
+        loop.check_delay()
     return ChannelExperiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
 
 

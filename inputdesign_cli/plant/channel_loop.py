@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.channel_model import ChannelModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.loop import LoopResponse, refuse_unstable
+from inputdesign_cli.plant.loop import LoopResponse, refuse_instantaneous, refuse_unstable
 from inputdesign_cli.plant.matrix_controller import MatrixController
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -86,6 +86,16 @@ class ChannelLoop(ABC):
             hint="check the signs (feedback is negative: u = r - C y), which output each column of the "
             "controller reads, and that entries of a row with the same poles share one denominator",
         )
+
+    def check_delay(self) -> None:
+        """Raise `SpecError` where the direct method would fail, see `refuse_instantaneous`.
+
+        Raises:
+            SpecError: `algebraic-loop`.
+        """
+        acting, p = self.instantaneous != 0.0, self.model.outputs
+        if np.any(acting[:p, p:] @ acting[p:, :p]):
+            refuse_instantaneous()
 
     def responses(self, w: ArrayLike) -> LoopResponse:
         """From r and from e at normalised frequencies `w`: y_x (n, p, r), u_x (n, r, r), y_e (n, p, p), u_e.

@@ -183,6 +183,7 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
     ("override", "code"),
     [
         ("experiment.controller.numerator=[-40, 36.2]", "unstable-loop"),
+        ("plant.continuous={numerator: [1, 9], denominator: [1, 2]}", "algebraic-loop"),
         ("plant.sample=null", "unsuitable-key"),
         ("experiment.controller={numerator: [[[40]]]}", "wrong-shape"),
         ("plant.continuous.denominator=[1, 12, 0]", "unstable-polynomial"),

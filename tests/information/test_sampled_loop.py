@@ -269,6 +269,15 @@ def test_an_algebraic_loop_is_refused():
     assert caught.value.complaints[0].code == "algebraic-loop"
 
 
+def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_no_delay(experiment):
+    experiment.loop.check_delay()  # the one entry that acts at once is driven through a delay
+    one([3.0], [1.0, 1.0], [0.5]).check_delay()
+    one([1.0, 3.0], [1.0, 1.0], [0, 0.5]).check_delay()
+    with pytest.raises(SpecError) as caught:
+        one([1.0, 3.0], [1.0, 1.0], [0.5]).check_delay()
+    assert caught.value.complaints[0].code == "algebraic-loop"
+
+
 def test_fast_sampling_keeps_the_slow_poles():
     """Static feedback so fast that the loop is that of continuous time, to first order in the step."""
     denominator, gain, step = np.poly([-1.0, -1.2, -1.4, -0.8]), 0.5, 1e-4
