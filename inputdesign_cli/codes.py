@@ -331,7 +331,8 @@ CODES: dict[str, Explanation] = {
         "The loop is unstable",
         "With u = r - C y the closed loop has a pole on or outside the unit circle: no stationary "
         "experiment can be run in it.",
-        "Check the sign of the feedback, the delay of the plant, and that all polynomials are in q^-1.",
+        "Check the sign of the feedback, the delay of the plant, and that the controller is in q^-1, also "
+        "where the plant is in s.",
     ),
     "algebraic-loop": Explanation(
         "The loop has no delay",

@@ -205,6 +205,16 @@ def test_what_cannot_be_asked_is_explained(override, code):
     assert code in [complaint.code for complaint in caught.value.complaints]
 
 
+def test_a_loop_to_be_kept_is_of_a_sampled_plant():
+    kept = "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [9], denominator: [1]}}"
+    build_channel_task(load_spec(MOTOR, ["experiment.controller=null", kept]))
+    with pytest.raises(SpecError) as caught:
+        load_spec(MOTOR, ["plant.sample=null", "experiment.controller=null", kept])
+    (complaint,) = [c for c in caught.value.complaints if c.key.startswith("accuracy")]
+    assert complaint.code == "unsuitable-key"
+    assert "sample: zoh" in complaint.hint
+
+
 def test_frequencies_of_complaints_are_in_the_unit_of_the_spec():
     """The nominal loop peaks at 4.35 dB, at 9.54 rad/s."""
     with pytest.raises(SpecError, match=r"9\.54\d* rad/s"):
