@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,7 +62,7 @@ class ChannelLoop(ABC):
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
         """y (.., n, p) and u (.., n, r) for samples r (.., n, r) and e (.., n, p), from rest."""
 
-    @property
+    @cached_property
     def singularities(self) -> ComplexArray:
         """Poles of all that the excitation and the noise cause, as points of the frequency plane."""
         return logarithmic_distance(np.concatenate([self.closed_poles, self.predictor_poles]))

@@ -75,7 +75,7 @@ class SampledChannels(WhiteNoise):
             blocks.append((entry.transition[:n, :n], B, C))
         return StateSpace.of(blocks, direct)
 
-    @property
+    @cached_property
     def singularities(self) -> ComplexArray:
         return logarithmic_distance(self.poles)
 
