@@ -331,12 +331,16 @@ CODES: dict[str, Explanation] = {
         "The loop is unstable",
         "With u = r - C y the closed loop has a pole on or outside the unit circle: no stationary "
         "experiment can be run in it.",
-        "Check the sign of the feedback, the delay of the plant, and that all polynomials are in q^-1.",
+        "Check the sign of the feedback, the delay of the plant, and that the controller is in q^-1, also "
+        "where the plant is in s.",
     ),
     "algebraic-loop": Explanation(
-        "The loop is not well posed",
-        "Plant and controller both act at once and 1 + C G vanishes at infinite frequency.",
-        "Give the plant its delay (a leading 0 in B), or the controller one.",
+        "The loop has no delay",
+        "Plant and controller both act at once. If 1 + C G vanishes at infinite frequency the loop is not "
+        "even well posed; if it does not, u(t) answers the noise of y(t) within the sample, and a model "
+        "estimated from u and y is biased, however long the experiment.",
+        "Give the plant its delay (a leading 0 in B; in s a numerator of lower order than the denominator), "
+        "or the controller one (a leading 0 in its numerator).",
     ),
     "not-identifiable": Explanation(
         "Some parameters cannot be told apart",

@@ -64,8 +64,13 @@ class ModelError(OverFrequency):
         return MatrixCut(rows.T @ rows, frequency)
 
 
-def check_positive(admissible: AdmissibleError, grid: Array) -> None:
-    """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 between the ends of the `grid`."""
+def check_positive(
+    admissible: AdmissibleError, grid: Array, *, unit: float = 1.0, named: str = "rad/sample"
+) -> None:
+    """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 between the ends of the `grid`.
+
+    The complaint tells the frequency divided by `unit`, in the unit `named`.
+    """
     w, negative = local_maxima(lambda w: -admissible.at(w), grid, -admissible.at(grid))
     scale = np.median(np.abs(admissible.at(grid)))
     bad = negative >= -1e-9 * scale
@@ -73,7 +78,7 @@ def check_positive(admissible: AdmissibleError, grid: Array) -> None:
         at = w[bad][int(np.argmax(negative[bad]))]
         raise bad_spec(
             "admissible-not-positive",
-            f"the admissible error is not positive at {at:.6g} rad/sample: no model can be that good",
+            f"the admissible error is not positive at {at / unit:.6g} {named}: no model can be that good",
             hint="restrict `band` to the frequencies that matter, or loosen the requirement there "
             "(a relative bound vanishes where G does; a sensitivity bound where |W S| already reaches 1)",
             key="accuracy.model_error",

@@ -29,18 +29,21 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec.plant import with_paths
 
 
-def estimated(model: ChannelModel, u: Array, y: Array, step: float, start: Array) -> ChannelEstimate:
+def estimated(
+    model: ChannelModel, u: Array, y: Array, step: float, start: Array, *, feedback: bool
+) -> ChannelEstimate:
     """The structure of `model` estimated from u (samples, r), y (samples, p) and a start (k,).
 
-    `step` is the time between samples of a plant in continuous time, see `record_step`.
+    `step` is the time between samples of a plant in continuous time, see `record_step`. With `feedback` u(t)
+    answers y(t).
 
     Raises:
         SpecError: the data do not determine the parameters.
     """
     if isinstance(model, PolynomialChannels):
-        return identify_channels(model, u, y, start=start)
+        return identify_channels(model, u, y, start=start, feedback=feedback)
     plant, interval, hold = _in_s(model, step)
-    return identify_transfer_matrix(plant, u, y, interval, hold=hold, start=start)
+    return identify_transfer_matrix(plant, u, y, interval, hold=hold, start=start, feedback=feedback)
 
 
 def estimated_runs(model: ChannelModel, u: Array, y: Array, step: float, start: Array) -> ChannelBatch:

@@ -122,7 +122,7 @@ def channels_identified(spec: Spec, path: Path, *, remove_means: bool = False) -
     step = record_step(spec)
     data = read_channel_data(spec, path, remove_means=remove_means)
     with told_of(path):
-        estimate = estimated(nominal, data.u, data.y, step, nominal.theta)
+        estimate = estimated(nominal, data.u, data.y, step, nominal.theta, feedback=spec.closed_loop)
     model = moved(nominal, estimate.theta, estimate.noise)
     replaced = parse_spec(
         spec.to_yaml(),

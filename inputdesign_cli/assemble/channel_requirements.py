@@ -22,12 +22,13 @@ from inputdesign_cli.accuracy import (
 )
 from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.assemble.bound_table import read_bound
-from inputdesign_cli.assemble.channels import frequency_unit, matrix_controller
+from inputdesign_cli.assemble.channels import frequency_unit, stable_loop
 from inputdesign_cli.assemble.experiment import rational, weight
 from inputdesign_cli.assemble.model_error import model_error_alpha, no_feedback
 from inputdesign_cli.assemble.tables import has_column
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ChannelLoop, ChannelModel, PolynomialChannels, Rational
+from inputdesign_cli.plant import ChannelModel, Rational
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.transfer import ContinuousTransfer, DiscreteTransfer
 
@@ -61,7 +62,7 @@ def build_entry_errors(
             if error.region == "first_order"
             else _over_ellipsoid(spec, experiment, admissible, alpha, band, i, j)
         )
-        check_positive(admissible, errors[-1].grid)
+        _check_positive(spec, admissible, errors[-1].grid)
     return tuple(errors)
 
 
@@ -131,26 +132,21 @@ def _of_the_norm(
     if weighted is not None:
         admissible = Weighted(admissible, weighted)
     requirement = NormError(experiment, admissible, alpha, band)
-    check_positive(admissible, requirement.grid)
+    _check_positive(spec, admissible, requirement.grid)
     return requirement
+
+
+def _check_positive(spec: Spec, admissible: AdmissibleError, grid: Array) -> None:
+    check_positive(admissible, grid, unit=frequency_unit(spec), named=f"rad/{spec.time_unit}")
 
 
 def _sensitivity(spec: Spec, model: ChannelModel) -> LoopSensitivity:
     assert spec.accuracy.model_error is not None
     asked, key = spec.accuracy.model_error.sensitivity, f"{_ERROR}.sensitivity"
     assert asked is not None
-    if not isinstance(model, PolynomialChannels):
-        raise spec.complain(
-            "not-supported",
-            "model_error.sensitivity is that of a loop around a plant in q^-1; of one in s the bound is "
-            "relative, absolute or a table",
-            hint="write relative: 0.05, absolute: 0.1 or table: r_adm.csv",
-            key=key,
-        )
     given = asked.controller or spec.experiment.controller
     assert given is not None  # the spec has been checked
-    loop = ChannelLoop(model, matrix_controller(given))
-    loop.check_stability()
+    loop = stable_loop(model, given)
     if not np.any(loop.controller.numerator):
         raise no_feedback(spec, key)
     weight = asked.weight

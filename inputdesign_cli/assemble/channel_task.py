@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -30,7 +29,6 @@ from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import channel_record_information
 from inputdesign_cli.spec import Spec
-from inputdesign_cli.spec.plant import PolynomialPlant
 from inputdesign_cli.spec.spectrum import FirSpectrum, PolynomialSpectrum
 from inputdesign_cli.spectrum import PolynomialBasis
 
@@ -161,18 +159,11 @@ def check_channels_supported(spec: Spec) -> None:
             "enforce limits.energy for several channels or in continuous time",
             "limit input_power, its mean a sample",
         )
-    if spec.closed_loop:
-        _check_loop_supported(spec, refuse)
     if spec.solver.method != "exchange":
         raise refuse("solver.method", f"use the {spec.solver.method} method here", "use exchange")
     if not spec.plant.sampled:
         _check_interpolated(spec)
     _check_band(spec)
-
-
-def _check_loop_supported(spec: Spec, refuse: Callable[[str, str, str], Exception]) -> None:
-    if not isinstance(spec.plant, PolynomialPlant):
-        raise refuse("experiment.controller", "close the loop around a plant in s", "write the plant in q^-1")
 
 
 def check_given_signal(spec: Spec) -> None:

@@ -13,7 +13,9 @@ from inputdesign_cli.plant import (
     ContinuousChannels,
     MatrixController,
     PolynomialChannels,
+    PolynomialLoop,
     SampledChannels,
+    SampledLoop,
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spec import Spec
@@ -56,11 +58,22 @@ def has_channels(spec: Spec) -> bool:
 
 
 def build_channel_model(spec: Spec) -> ChannelModel:
-    """The model of `plant` and `noise`, see `has_channels`."""
+    """The model of `plant` and `noise`, see `has_channels`.
+
+    Raises:
+        SpecError: `not-supported` for a plant in s whose noise is not white.
+    """
     plant = spec.plant
     p = plant.outputs
     covariance = np.asarray(spec.noise.covariance(p), dtype=float)
     if isinstance(plant, ContinuousPlant):
+        for name in spec.noise.filters:
+            raise spec.complain(
+                "not-supported",
+                "this version takes the noise of a plant in s as white",
+                hint=f"remove {name}, or write the plant as polynomials A, B, F in q^-1",
+                key=f"noise.{name}",
+            )
         matrix = plant.continuous
         continuous = ContinuousChannels.monic(
             _reversed(matrix.numerator_matrix),
@@ -198,19 +211,31 @@ def channel_experiment(spec: Spec) -> ChannelExperiment:
     Raises:
         SpecError: `needs-band`; an unstable or algebraic loop.
     """
-    model, controller, loop = build_channel_model(spec), spec.experiment.controller, None
-    if controller is not None:
-        assert isinstance(model, PolynomialChannels)  # others have been refused
-        loop = ChannelLoop(model, matrix_controller(controller))
-        loop.check_stability()
+    model, controller = build_channel_model(spec), spec.experiment.controller
+    loop = None if controller is None else stable_loop(model, controller)
+    if loop is not None:
+        loop.check_delay()
     return ChannelExperiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
 
 
-def matrix_controller(controller: DiscreteTransfer | ControllerMatrix) -> MatrixController:
-    """C of the spec as a matrix; a single transfer function is one of one entry."""
+def stable_loop(model: ChannelModel, controller: DiscreteTransfer | ControllerMatrix) -> ChannelLoop:
+    """The loop of a model that is sampled; a single transfer function is a controller of one entry.
+
+    Raises:
+        SpecError: the loop is unstable or algebraic.
+    """
     if isinstance(controller, ControllerMatrix):
-        return MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
-    return MatrixController.build([[controller.numerator]], [[controller.denominator_polynomial]])
+        C = MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
+    else:
+        C = MatrixController.build([[controller.numerator]], [[controller.denominator_polynomial]])
+    loop: ChannelLoop
+    if isinstance(model, SampledChannels):
+        loop = SampledLoop(model, C)
+    else:
+        assert isinstance(model, PolynomialChannels)  # the spec has been checked
+        loop = PolynomialLoop(model, C)
+    loop.check_stability()
+    return loop
 
 
 def frequency_unit(spec: Spec) -> float:

@@ -85,6 +85,7 @@ def build_experiment(spec: Spec) -> Experiment:
     assert not isinstance(controller, ControllerMatrix)  # the spec has been checked
     loop = Loop(model, None if controller is None else rational(controller))
     loop.check_stability()
+    loop.check_delay()
     return Experiment(loop, spec.experiment.samples, _prior(spec, loop))
 
 

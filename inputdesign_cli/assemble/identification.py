@@ -108,7 +108,9 @@ def identified(spec: Spec, path: Path, *, remove_means: bool = False) -> Identif
     data = read_data(spec, path, remove_means=remove_means)
     structure = Structure.of(nominal.model)
     with told_of(path):
-        estimate = identify_record(structure, data.u, data.y, start=nominal.model.theta)
+        estimate = identify_record(
+            structure, data.u, data.y, start=nominal.model.theta, feedback=spec.closed_loop
+        )
     replaced = parse_spec(
         spec.to_yaml(),
         file=f"{path.name} (estimate)",

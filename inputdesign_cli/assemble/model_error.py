@@ -63,7 +63,7 @@ def build_model_error(spec: Spec, experiment: Experiment) -> ModelError | Ellips
             )
         against: Literal["relative", "absolute"] = "absolute" if error.relative is None else "relative"
         requirement = EllipsoidError(experiment, admissible, alpha, against, band)
-    check_positive(admissible, requirement.grid)
+    check_positive(admissible, requirement.grid, unit=spec.sample_time, named=f"rad/{spec.time_unit}")
     return requirement
 
 

@@ -19,7 +19,7 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
     """The wanted columns of a CSV file with a header line: role -> (n,).
 
     Args:
-        wanted: role -> how its header begins; `frequency` also finds `frequency_rad_per_s`.
+        wanted: role -> its header, or how that begins; `frequency` also finds `frequency_rad_per_s`.
         key: the key of the spec that names the file, for complaints.
 
     Raises:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy.signal
 
-from inputdesign_cli.assemble.channels import build_channel_model
+from inputdesign_cli.assemble.channels import build_channel_model, stable_loop
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment, Experiment
-from inputdesign_cli.plant import ChannelLoop, Loop, PolynomialChannels
+from inputdesign_cli.plant import Loop
 from inputdesign_cli.spec import Spec
 from inputdesign_cli.spec.experiment import Noise
-from inputdesign_cli.spec.plant import PolynomialPlant
+from inputdesign_cli.spec.plant import ContinuousPlant, PolynomialPlant
 
 
 def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) -> Experiment:
@@ -24,21 +26,15 @@ def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) 
         result: of the design; noise of a relative size refers to its output power.
 
     Raises:
-        SpecError: another kind of plant, or a loop that is unstable with the true plant.
+        SpecError: a loop that is unstable with the true plant.
     """
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):
         return nominal
     model = nominal.model
     if study.plant is not None:
-        plant = study.plant
-        if not isinstance(plant, PolynomialPlant) or plant.inputs > 1 or plant.outputs > 1:
-            raise spec.complain(
-                "not-supported",
-                "this version simulates polynomial plants with one input and one output only",
-                hint="give simulation.plant as polynomials A, B, F in q^-1",
-                key="simulation.plant",
-            )
+        plant = _polynomials(spec, study.plant)
+        assert isinstance(plant, PolynomialPlant)  # the spec has been checked
         model = replace(
             model,
             A=np.array(plant.A_per_output[0]),
@@ -53,7 +49,8 @@ def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) 
             variance=_variance(spec, result),
         )
     loop = Loop(model, nominal.loop.controller)
-    _check_stability(spec, loop)
+    with _told_of_truth(spec):
+        loop.check_stability()
     return replace(nominal, loop=loop, factor=None)
 
 
@@ -63,21 +60,13 @@ def true_channel_experiment(
     """The same with several channels; noise of a relative size refers to the weakest output.
 
     Raises:
-        SpecError: `not-supported` for a true plant in s of a nominal one in q^-1, or the other way round;
-            a loop that is unstable with the true plant.
+        SpecError: a loop that is unstable with the true plant.
     """
     study = spec.simulation
     if study is None or (study.plant is None and study.noise is None):
         return nominal
     changes: dict[str, Any] = {}
     if study.plant is not None:
-        if type(study.plant) is not type(spec.plant):
-            raise spec.complain(
-                "not-supported",
-                "the true system and the plant are of different kinds: one in s, one in q^-1",
-                hint="describe the true system as the plant is described",
-                key="simulation.plant",
-            )
         changes["plant"] = study.plant
     if study.noise is not None:
         noise = study.noise
@@ -85,17 +74,39 @@ def true_channel_experiment(
         if noise.relative_std is not None:
             variance = noise.relative_std**2 * float(np.min(result["power"]["output"]))
         changes["noise"] = Noise.model_construct(C=noise.C, D=noise.D, variance=variance)
-    model, loop = build_channel_model(spec.model_copy(update=changes)), nominal.loop
-    if loop is not None:
-        assert isinstance(model, PolynomialChannels)  # as the nominal one is
-        loop = replace(loop, model=model)
-        _check_stability(spec, loop)
+    plant, noise = changes.get("plant", spec.plant), changes.get("noise", spec.noise)
+    if isinstance(spec.plant, PolynomialPlant) or noise.filters:
+        changes["plant"] = _polynomials(spec, plant)
+    model, controller = build_channel_model(spec.model_copy(update=changes)), spec.experiment.controller
+    loop = None
+    if controller is not None:
+        with _told_of_truth(spec):
+            loop = stable_loop(model, controller)
     return replace(nominal, model=model, loop=loop, factor=None)
 
 
-def _check_stability(spec: Spec, loop: Loop | ChannelLoop) -> None:
+def _polynomials(spec: Spec, plant: Any) -> Any:
+    """A true plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
+    if not isinstance(plant, ContinuousPlant):
+        return plant
+    above, below = [], []
+    for tops, bottoms in zip(
+        plant.continuous.numerator_matrix, plant.continuous.denominator_matrix, strict=True
+    ):
+        pairs = [
+            scipy.signal.cont2discrete((top, bottom), spec.sample_time, "zoh")
+            for top, bottom in zip(tops, bottoms, strict=True)
+        ]
+        above.append(tuple(tuple(np.ravel(pair[0]).tolist()) for pair in pairs))
+        below.append(tuple(tuple(np.ravel(pair[1]).tolist()) for pair in pairs))
+    return PolynomialPlant.model_construct(A=(1.0,), B=tuple(above), F=tuple(below))
+
+
+@contextmanager
+def _told_of_truth(spec: Spec) -> Iterator[None]:
+    """A loop that the nominal plant leaves stable, and the true one does not, is the fault of the latter."""
     try:
-        loop.check_stability()
+        yield
     except SpecError as error:
         found = error.complaints[0]
         raise spec.complain(

@@ -49,6 +49,7 @@ def concluded(
     errors: Array,
     u: Array,
     *,
+    feedback: bool,
     in_noise: int,
     in_plant: int,
     fit: tuple[float | None, ...],
@@ -61,6 +62,7 @@ def concluded(
     Args:
         information: (k, k) sum over the samples of psi(t) noise^-1 psi(t)^T.
         errors, u: (samples, p), (samples, r).
+        feedback: whether u(t) answers y(t).
         in_noise: number of parameters that make residuals look whiter: those of A, C and D.
         in_plant: number of parameters that take directions of past inputs away: those of B and F.
 
@@ -79,5 +81,5 @@ def concluded(
         starts=starts,
         fit=fit,
         whiteness=joint_whiteness(errors, fitted=in_noise),
-        independence=cross_correlations(errors, u, fitted=in_plant),
+        independence=cross_correlations(errors, u, fitted=in_plant, feedback=feedback),
     )

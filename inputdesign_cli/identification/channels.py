@@ -57,6 +57,7 @@ def identify_channels(
     *,
     start: ArrayLike | None = None,
     noise: ArrayLike | None = None,
+    feedback: bool = False,
 ) -> ChannelEstimate:
     """Prediction-error estimate from one record u (samples, r), y (samples, p).
 
@@ -69,6 +70,7 @@ def identify_channels(
             numbers mean nothing.
         start: (k,).
         noise: the covariance of e (p, p) if it is known; it is then not estimated.
+        feedback: whether u(t) answers y(t), which a test of the residuals heeds.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -106,6 +108,7 @@ def identify_channels(
         covariance,
         errors,
         inputs,
+        feedback=feedback,
         in_noise=structure.in_noise,
         in_plant=structure.in_plant,
         fit=_fits(model.at(theta), inputs, outputs),

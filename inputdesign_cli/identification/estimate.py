@@ -63,11 +63,19 @@ class Estimate:
         return self.structure.model(self.theta, self.variance)
 
 
-def identify(structure: Structure, u: ArrayLike, y: ArrayLike, *, start: ArrayLike | None = None) -> Estimate:
+def identify(
+    structure: Structure,
+    u: ArrayLike,
+    y: ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    feedback: bool = False,
+) -> Estimate:
     """Prediction-error estimate from one record (samples,); in closed loop the direct method.
 
     Several starts are tried, `start` (k,) among them if given, and the least cost wins. A model without
     C, D and F (ARX) is linear in its parameters: every start leads to the least-squares solution.
+    With `feedback` the residuals' test of past inputs leaves out u(t), which answers y(t).
 
     Raises:
         SpecError: `too-few-samples`, `constant-input` or `not-exciting`.
@@ -98,7 +106,9 @@ def identify(structure: Structure, u: ArrayLike, y: ArrayLike, *, start: ArrayLi
         starts=len(points),
         fit=_fit(structure, theta, u, y),
         whiteness=whiteness(errors, fitted=structure.a + structure.c + structure.d),
-        independence=cross_correlation(errors, u, fitted=structure.b + 1 - structure.delay + structure.f),
+        independence=cross_correlation(
+            errors, u, fitted=structure.b + 1 - structure.delay + structure.f, feedback=feedback
+        ),
     )
 
 

@@ -66,21 +66,28 @@ def joint_whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> Residu
     return _test(at, products / np.outer(rms, rms), n, statistic, p * p * at.size - fitted)
 
 
-def cross_correlation(errors: Array, u: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
+def cross_correlation(
+    errors: Array, u: Array, *, lags: int = 25, fitted: int = 0, feedback: bool = False
+) -> ResidualTest:
     """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
 
     Args:
         errors, u: (samples,).
         fitted: number of estimated parameters of the plant, which take as many directions away.
+        feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
     """
-    return _scalar(cross_correlations(errors[:, None], u[:, None], lags=lags, fitted=fitted))
+    return _scalar(
+        cross_correlations(errors[:, None], u[:, None], lags=lags, fitted=fitted, feedback=feedback)
+    )
 
 
-def cross_correlations(errors: Array, u: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
+def cross_correlations(
+    errors: Array, u: Array, *, lags: int = 25, fitted: int = 0, feedback: bool = False
+) -> ResidualTest:
     """The same of all residuals (samples, p) and all inputs (samples, r) at once."""
     n, p = errors.shape
     r = u.shape[1]
-    at = np.arange(_most_lags(n, r, lags, fitted))
+    at = np.arange(_most_lags(n, r, lags, fitted)) + int(feedback)
     past = np.stack([np.concatenate([np.zeros((tau, r)), u[: n - tau]]) for tau in at], axis=1)
     regressors = past.reshape(n, -1)
     left, singular, _ = np.linalg.svd(regressors, full_matrices=False)

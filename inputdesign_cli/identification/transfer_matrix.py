@@ -37,6 +37,7 @@ def identify_transfer_matrix(
     *,
     hold: bool,
     start: ArrayLike | None = None,
+    feedback: bool = False,
 ) -> ChannelEstimate:
     """Maximum-likelihood estimate of a transfer matrix in s from one record, white noise on the outputs.
 
@@ -49,6 +50,7 @@ def identify_transfer_matrix(
         u, y: (N, r), (N, p).
         hold: whether u is held between its samples; otherwise it is their band-limited interpolation.
         start: (k,), tried besides starts made from the data.
+        feedback: whether u(t) answers y(t), which a test of the residuals heeds.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -78,6 +80,7 @@ def identify_transfer_matrix(
         noise,
         point.errors,
         inputs,
+        feedback=feedback,
         in_noise=0,
         in_plant=len(model.names),
         fit=tuple(fit_percent(y_i, y_i - e_i) for y_i, e_i in zip(outputs.T, point.errors.T, strict=True)),

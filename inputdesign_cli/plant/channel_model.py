@@ -77,6 +77,14 @@ class ChannelModel(Protocol):
         """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
         ...
 
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """psi = -d epsilon / d theta (n, k, p, m) of the one-step prediction.
+
+        `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
+        outputs, inputs and prediction errors epsilon.
+        """
+        ...
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -113,3 +121,31 @@ class Parametrised:
     @cached_property
     def theta(self) -> Array:
         return np.array([parameter.value for parameter in self.parameters])
+
+
+class WhiteNoise:
+    """H = I: the prediction is G u, so that e reaches its gradient through u alone."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def outputs(self) -> int: ...
+
+        @property
+        def theta(self) -> Array: ...
+
+        def plant_gradient(self, w: ArrayLike) -> ComplexArray: ...
+
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        return np.ones(self.theta.size, dtype=bool)
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self.plant_gradient(w)
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """dG/dtheta u (n, k, p, m), see `ChannelModel`."""
+        return np.asarray(self.plant_gradient(w) @ u[:, None])

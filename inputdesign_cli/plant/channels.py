@@ -172,11 +172,9 @@ class PolynomialChannels(Parametrised):
         return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """Gradient psi = -d epsilon / d theta of the one-step prediction: (n, k, p, m).
+        """(n, k, p, m), see `ChannelModel`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j).
 
-        `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
-        outputs, inputs and prediction errors epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j). Written
-        with the polynomials of the predictor alone, as `PolynomialModel.prediction_gradient`.
+        Written with the polynomials of the predictor alone, as `PolynomialModel.prediction_gradient`.
         """
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)

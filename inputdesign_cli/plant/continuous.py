@@ -1,4 +1,4 @@
-"""Transfer matrices in s, in continuous time or sampled with a zero-order hold.
+"""Transfer matrices in s.
 
 Spectral design paper, (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
 """
@@ -10,18 +10,17 @@ from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import polynomial as ascending
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_model import Parameter, Parametrised, entry_label
+from inputdesign_cli.plant.channel_model import Parameter, Parametrised, WhiteNoise, entry_label
 from inputdesign_cli.plant.channels import Rows
-from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
+from inputdesign_cli.plant.held import polynomial_roots
 from inputdesign_cli.plant.model import Fraction
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
 @dataclass(frozen=True)
-class ContinuousChannels(Parametrised):
+class ContinuousChannels(Parametrised, WhiteNoise):
     """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
 
     `numerator` and `denominator` hold ascending coefficients, those of s^0 first; denominators are
@@ -104,10 +103,6 @@ class ContinuousChannels(Parametrised):
             self.common,
         )
 
-    @property
-    def in_plant(self) -> NDArray[np.bool_]:
-        return np.ones(len(self.parameters), dtype=bool)
-
     @cached_property
     def poles(self) -> ComplexArray:
         """Poles in s of all entries."""
@@ -158,100 +153,8 @@ class ContinuousChannels(Parametrised):
                 gradient[:, index, i, j] = factor * s**parameter.power
         return gradient
 
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        return self.plant_gradient(w)
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        return np.zeros((np.size(w), len(self.parameters), self.outputs, self.outputs), dtype=complex)
-
     def _below(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
         return np.asarray(ascending.polyval(s, self.denominator[i][j]), dtype=complex)
-
-
-@dataclass(frozen=True)
-class SampledChannels:
-    """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay those of s.
-
-    Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
-    dG/da_k = -s^k b / a^2: each entry needs one state-space model of a^2, exact through one exponential.
-    """
-
-    continuous_plant: ContinuousChannels
-    sample_time: float
-
-    continuous = False
-
-    @property
-    def outputs(self) -> int:
-        return self.continuous_plant.outputs
-
-    @property
-    def inputs(self) -> int:
-        return self.continuous_plant.inputs
-
-    @property
-    def covariance(self) -> Array:
-        return self.continuous_plant.covariance
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.continuous_plant.names
-
-    @property
-    def theta(self) -> Array:
-        return self.continuous_plant.theta
-
-    @property
-    def in_plant(self) -> NDArray[np.bool_]:
-        return self.continuous_plant.in_plant
-
-    @cached_property
-    def _entries(self) -> dict[tuple[int, int], HeldEntry]:
-        plant = self.continuous_plant
-        return {
-            (i, j): HeldEntry.of(plant.numerator[i][j], plant.denominator[i][j], self.sample_time)
-            for i, j in plant.active
-        }
-
-    @cached_property
-    def singularities(self) -> ComplexArray:
-        return logarithmic_distance(np.exp(self.continuous_plant.poles * self.sample_time))
-
-    def entry_singularities(self, output: int, input: int) -> ComplexArray:
-        entry = self._entries.get((output, input))
-        return np.zeros(0, dtype=complex) if entry is None else logarithmic_distance(entry.roots)
-
-    def is_fraction(self, output: int, input: int) -> bool:
-        """Never: sampled coefficients depend on those of s through an exponential."""
-        return False
-
-    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """There is none."""
-        raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
-
-    def plant_at(self, w: ArrayLike) -> ComplexArray:
-        z = np.exp(1j * np.asarray(w, dtype=float))
-        G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
-        for (i, j), entry in self._entries.items():
-            G[:, i, j] = entry.direct + entry.states(z) @ entry.gain
-        return G
-
-    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        z = np.exp(1j * np.asarray(w, dtype=float))
-        parameters = self.continuous_plant.parameters
-        gradient = np.zeros((z.size, len(parameters), self.outputs, self.inputs), dtype=complex)
-        states = {place: entry.states(z) for place, entry in self._entries.items()}
-        for index, parameter in enumerate(parameters):
-            for place in parameter.places:
-                direct, row = self._entries[place].gradient(parameter.letter, parameter.power)
-                gradient[:, index, place[0], place[1]] = direct + states[place] @ row
-        return gradient
-
-    def input_gradient(self, w: ArrayLike) -> ComplexArray:
-        return self.plant_gradient(w)
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        return self.continuous_plant.noise_gradient(w)
 
 
 def _frequency_plane(poles: ComplexArray) -> ComplexArray:

@@ -70,13 +70,19 @@ class HeldEntry:
         """
         if not self.order:
             return np.zeros((z.size, 0), dtype=complex)
-        triangle, basis = scipy.linalg.schur(self.transition, output="complex")
+        triangle, basis = self._schur
         driven = basis.conj().T @ self.entry
         modes = np.zeros((driven.size, z.size), dtype=complex)
         for row in reversed(range(driven.size)):
             above = driven[row] + triangle[row, row + 1 :] @ modes[row + 1 :]
             modes[row] = above / (z - triangle[row, row])
         return np.asarray((basis @ modes).T, dtype=complex)
+
+    @cached_property
+    def _schur(self) -> tuple[ComplexArray, ComplexArray]:
+        """Schur's triangular form of the transition, and its basis."""
+        triangle, basis = scipy.linalg.schur(self.transition, output="complex")
+        return triangle, basis
 
     def interpolated_states(self, w: Array) -> ComplexArray:
         """(n, 2 order): the states at frequencies w of the continuous entry, without a hold."""

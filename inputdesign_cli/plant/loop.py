@@ -84,6 +84,15 @@ class Loop:
             "numerator and denominator of the controller are in q^-1, ascending",
         )
 
+    def check_delay(self) -> None:
+        """Raise `SpecError` where the direct method would fail, see `refuse_instantaneous`.
+
+        Raises:
+            SpecError: `algebraic-loop`.
+        """
+        if self.controller is not None and self.model.B[0] != 0.0 and self.controller.numerator[0] != 0.0:
+            refuse_instantaneous()
+
     def responses(self, w: ArrayLike) -> LoopResponse:
         """Transfer functions at normalised frequencies `w` (n,)."""
         m = self.model
@@ -100,6 +109,22 @@ class Loop:
             y_e=F * C * Dc / (D * closed),
             u_e=-F * C * Nc / (D * closed),
         )
+
+
+def refuse_instantaneous() -> None:
+    """Raise `SpecError` (`algebraic-loop`): both plant and controller act at once.
+
+    Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an estimate
+    from u and y, is biased. Ljung (1999), Chapter 13, asks for a delay in one of them.
+    """
+    raise bad_spec(
+        "algebraic-loop",
+        "plant and controller both act without delay: u(t) answers the noise of y(t) and changes y(t), so "
+        "that estimates from u and y would be biased",
+        hint="give the plant its delay (a leading 0 in B; in s a numerator of lower order than the "
+        "denominator) or the controller one (a leading 0 in its numerator)",
+        key="experiment.controller",
+    )
 
 
 def refuse_unstable(poles: ComplexArray, *, hint: str) -> None:

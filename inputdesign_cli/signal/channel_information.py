@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from inputdesign_cli.information import ChannelExperiment, PowerKind
@@ -66,7 +65,7 @@ class RecordFilter:
             self.step if experiment.model.continuous else 1.0
         )
         memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
-        return int(scipy.fft.next_fast_len(self.samples + memory, real=True))
+        return int(2 ** np.ceil(np.log2(self.samples + memory)))
 
     @cached_property
     def _frequencies(self) -> Array:

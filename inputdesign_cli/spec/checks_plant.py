@@ -46,7 +46,7 @@ def controller_fits(spec: Spec) -> Iterator[Finding]:
 def kept_loop_fits(spec: Spec) -> Iterator[Finding]:
     """So has the controller of a sensitivity that is to be kept."""
     error = spec.accuracy.model_error
-    if error is None or error.sensitivity is None or not isinstance(spec.plant, PolynomialPlant):
+    if error is None or error.sensitivity is None or isinstance(spec.plant, RegressionPlant):
         return
     if error.sensitivity.controller is not None:
         where = ("accuracy", "model_error", "sensitivity", "controller")

@@ -82,6 +82,12 @@ class NoiseShape(Section):
         """One polynomial C for each output."""
         return per_output(self.C, outputs)
 
+    @property
+    def filters(self) -> tuple[str, ...]:
+        """Which of C and D are not 1."""
+        stated = {"C": per_output(self.C, 1), "D": per_output(self.D, 1)}
+        return tuple(name for name, rows in stated.items() if any(any(p[1:]) for p in rows))
+
     def D_per_output(self, outputs: int) -> tuple[Polynomial, ...]:  # noqa: N802
         """One polynomial D for each output."""
         return per_output(self.D, outputs)

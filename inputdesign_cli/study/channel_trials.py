@@ -114,7 +114,7 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
     found = estimated_runs(job.model, u, y, job.step, start)
     theta, converged = settled(
         found,
-        lambda run: estimated(job.model, u[run], y[run], job.step, start),
+        lambda run: estimated(job.model, u[run], y[run], job.step, start, feedback=true.loop is not None),
         prior=true.prior if system.names == job.model.names else None,
         truth=system.theta,
         rng=rng,

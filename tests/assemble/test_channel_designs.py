@@ -254,8 +254,8 @@ BAD = {
     "band beyond the limit": ("limits.band=[0, 1]", "bad-limit", r"leaves limits.band"),
     "sensitivity": (
         "accuracy={model_error: {sensitivity: {max_db: 6, controller: {numerator: [0.1]}}}}",
-        "not-supported",
-        "relative, absolute or a table",
+        "unsuitable-key",
+        "works in discrete time, but the plant is not sampled",
     ),
     "levels in continuous time": ("signal.type=binary", "not-supported", "has no levels"),
     "hold in continuous time": ("signal.hold=2", "not-supported", "holds nothing"),

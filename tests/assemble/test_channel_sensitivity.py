@@ -11,7 +11,13 @@ from inputdesign_cli.accuracy import Absolute, LoopSensitivity, NormError, Sensi
 from inputdesign_cli.assemble.channel_task import build_channel_task
 from inputdesign_cli.assemble.design import by_exchange
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.plant import ChannelLoop, MatrixController, PolynomialChannels, PolynomialModel, Rational
+from inputdesign_cli.plant import (
+    MatrixController,
+    PolynomialChannels,
+    PolynomialLoop,
+    PolynomialModel,
+    Rational,
+)
 from inputdesign_cli.spec import parse_spec
 
 SPEC = """
@@ -106,7 +112,7 @@ def test_one_channel_is_the_siso_bound():
     siso = PolynomialModel(np.array(B), np.array(A, dtype=float))
     one = ((np.ones(1),),)
     plant = PolynomialChannels(((np.array(B),),), (np.array(A),), one, one[0], one[0], np.eye(1))
-    loop = ChannelLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
+    loop = PolynomialLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
     expected = Sensitivity(siso, Rational.build(numerator, denominator), W).at(GRID)
     np.testing.assert_allclose(LoopSensitivity(loop, W).at(GRID), expected, rtol=1e-9)
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import scipy.optimize
+import scipy.signal
 from identification_systems import SYSTEMS, data
 
 from inputdesign_cli.errors import SpecError
@@ -89,6 +90,26 @@ def test_residuals_of_a_right_model_pass_as_often_as_they_should():
     for probabilities in ([e.whiteness.probability for e in p], [e.independence.probability for e in p]):
         assert 0.3 < np.mean(probabilities) < 0.7
         assert np.mean(np.array(probabilities) < 0.05) < 0.2
+
+
+def test_an_input_that_answers_the_noise_is_no_fault_of_the_model():
+    """y = 0.5 u(t-1) + 0.8 y(t-1) - .. + e under u = r - 0.6 y, r slow: u(t) itself tells e(t)."""
+    structure, rng = Structure(b=1, f=1), np.random.default_rng(3)
+    slow = scipy.signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal((40, 400)))
+    e, y, u, x = 0.3 * rng.standard_normal((40, 400)), np.zeros((40, 400)), np.zeros((40, 400)), 0.0
+    for t in range(400):
+        x = 0.8 * x + 0.5 * u[:, t - 1] if t else np.zeros(40)
+        y[:, t] = x + e[:, t]
+        u[:, t] = slow[:, t] - 0.6 * y[:, t]
+    told, untold = (
+        np.array(
+            [identify(structure, u[i], y[i], feedback=feedback).independence.probability for i in range(40)]
+        )
+        for feedback in (True, False)
+    )
+    assert 0.3 < np.mean(told) < 0.7
+    assert np.mean(told < 0.05) < 0.2
+    assert np.mean(untold < 0.05) > 0.3
 
 
 def test_mirrored_polynomials_are_stable():

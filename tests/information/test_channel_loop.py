@@ -10,10 +10,10 @@ from channel_plants import arrays
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment, Experiment
 from inputdesign_cli.plant import (
-    ChannelLoop,
     Loop,
     MatrixController,
     PolynomialChannels,
+    PolynomialLoop,
     PolynomialModel,
     Rational,
 )
@@ -121,7 +121,7 @@ def impulse_gradients(plant, source):
 @pytest.fixture(scope="module")
 def experiment():
     plant = box_jenkins()
-    loop = ChannelLoop(plant, controller())
+    loop = PolynomialLoop(plant, controller())
     loop.check_stability()
     return ChannelExperiment(plant, 7, loop=loop)
 
@@ -181,7 +181,7 @@ def test_one_channel_is_the_siso_loop():
     plant = PolynomialChannels(
         arrays([[B]]), (np.array(A),), arrays([[F]]), (np.array(C),), (np.array(D),), np.array([[0.7]])
     )
-    loop = ChannelLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
+    loop = PolynomialLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
     loop.check_stability()
     several = ChannelExperiment(plant, 50, loop=loop)
     assert several.model.names == one.model.names
@@ -213,7 +213,7 @@ def test_signals_are_those_of_the_equations_sample_by_sample():
     rng = np.random.default_rng(0)
     plant = box_jenkins()
     r, e = rng.standard_normal((2, 150, 3)), rng.standard_normal((2, 150, 2))
-    y, u = ChannelLoop(plant, controller()).signals(r, e)
+    y, u = PolynomialLoop(plant, controller()).signals(r, e)
     for run in range(2):
         expected = simulated(plant, r[run], e[run])
         np.testing.assert_allclose(y[run], expected[0], atol=1e-9)
@@ -223,7 +223,7 @@ def test_signals_are_those_of_the_equations_sample_by_sample():
 def test_unstable_and_algebraic_loops_are_refused():
     plant = box_jenkins()
     with pytest.raises(SpecError) as caught:
-        ChannelLoop(
+        PolynomialLoop(
             plant, MatrixController.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)
         ).check_stability()
     assert caught.value.complaints[0].code == "unstable-loop"
@@ -231,5 +231,5 @@ def test_unstable_and_algebraic_loops_are_refused():
         arrays([[[1.0]]]), (np.ones(1),), arrays([[[1.0]]]), (np.ones(1),), (np.ones(1),), np.eye(1)
     )
     with pytest.raises(SpecError) as caught:
-        ChannelLoop(direct, MatrixController.build([[[-1.0, 0.5]]], [[[1.0]]])).check_stability()
+        PolynomialLoop(direct, MatrixController.build([[[-1.0, 0.5]]], [[[1.0]]])).check_stability()
     assert caught.value.complaints[0].code == "algebraic-loop"

@@ -101,3 +101,13 @@ def test_unstable_and_algebraic_loops_are_refused():
     with pytest.raises(SpecError) as algebraic:
         Loop(direct, Rational.build([-1.0])).check_stability()
     assert algebraic.value.complaints[0].code == "algebraic-loop"
+
+
+def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_no_delay():
+    direct, delayed = (PolynomialModel(B=np.array(B)) for B in ([1.0, 0.5], [0.0, 1.0]))
+    now, later = Rational.build([0.3]), Rational.build([0.0, 0.3])
+    with pytest.raises(SpecError) as caught:
+        Loop(direct, now).check_delay()
+    assert caught.value.complaints[0].code == "algebraic-loop"
+    for plant, controller in ((direct, later), (delayed, now), (direct, None)):
+        Loop(plant, controller).check_delay()

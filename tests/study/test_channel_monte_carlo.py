@@ -12,6 +12,7 @@ from inputdesign_cli.study.channel_excitations import Flat, InPhase, Multisine, 
 from inputdesign_cli.study.executor import Finished
 
 SPEC = "specs/two_by_two_arx.yaml"
+FIRST = "specs/first_order.yaml"
 LOOP = "specs/two_by_two_loop.yaml"
 JENKINS = """
 plant:
@@ -23,7 +24,7 @@ accuracy: {model_error: {relative: 0.1}}
 spectrum: {type: fir, order: 4}
 simulation: {runs: 100, seed: 2}
 """
-IN_S = """
+IN_SECONDS = """
 sample_time: 0.5
 plant: {continuous: {numerator: [[[3.1], [1, 3.2]]], denominator: [1, 1.5, 1.5]}}
 noise: {variance: 0.5}
@@ -132,12 +133,69 @@ def test_a_loop_keeps_its_promise():
     assert sum(white["power"]["excitation"]) == pytest.approx(sum(design["power"]["excitation"]))
 
 
+def test_a_loop_around_a_held_plant_keeps_its_promise():
+    """Also where the true motor is another: noise reaches u and is no harm to the direct method."""
+    true = "plant: {continuous: {numerator: [2.2], denominator: [1, 11, 20]}, sample: zoh}"
+    overrides = [f"simulation={{runs: 80, {true}}}", "spectrum.order=8"]
+    simulation = simulate(load_spec("specs/motor_loop.yaml", overrides)).result["simulation"]
+    within_wishart(simulation)
+    design = simulation["inputs"]["design"]
+    assert design["within_r_u_limits"][1] > 0.95
+    assert design["on_design_model"]["within_r_adm_limits"][1] > 0.95
+    mean = [design["mean_estimate"][name] for name in ("b0", "a1", "a0")]
+    np.testing.assert_allclose(mean, [2.2, 11, 20], rtol=0.01)
+    for kind, total in design["total_power"].items():
+        assert total[0] > design["power"][kind][0]
+
+
 def test_a_true_system_that_the_controller_does_not_hold_is_refused():
     plant = "{A: [[1, -1.1], [1, -0.6]], B: [[[0, -1.0, -0.4], [0, 0]], [[0, 0], [0, 1.2, -0.5]]]}"
     with pytest.raises(SpecError) as caught:
         simulate(load_spec(LOOP, [f"simulation={{runs: 5, plant: {plant}}}"]))
     assert caught.value.complaints[0].code == "unstable-loop"
     assert caught.value.complaints[0].key == "simulation.plant"
+
+
+IN_Q = "B: [[[0, 2], [0, 1]], [[0, 1], [0, 2]]], F: [[[1, -0.5], [1, -0.5]], [[1, -0.5], [1, -0.5]]]"
+IN_S = (
+    "continuous: {numerator: [[[2.77258872], [1.38629436]], [[1.38629436], [2.77258872]]], denominator: [1, "
+)
+IN_S += "0.69314718]}, sample: zoh"
+COLOURED = "noise: {C: [1, 0.8], variance: 0.5}"
+
+
+@pytest.mark.parametrize("nominal", [IN_Q, IN_S])
+@pytest.mark.parametrize("loop", ["", ", controller: {numerator: [[[0.1], [0]], [[0], [0.1]]]}"])
+def test_the_truth_may_be_in_s_or_in_q(nominal, loop):
+    """b/(s + ln 2) behind a hold of one second is b/(2 ln 2) q^-1/(1 - q^-1/2)."""
+    found = []
+    for truth in (IN_Q, IN_S):
+        text = f"plant: {{{nominal}}}\nnoise: {{variance: 0.5}}\nexperiment: {{samples: 200{loop}}}\n"
+        text += "accuracy: {model_error: {relative: 0.5}}\nspectrum: {given: {type: white, power: 4}}\n"
+        text += f"simulation: {{runs: 20, plant: {{{truth}}}, {COLOURED}}}\n"
+        found.append(simulate(parse_spec(text)).result["simulation"]["inputs"]["design"])
+    for key in ("power", "total_power"):
+        for kind in ("input", "output"):
+            np.testing.assert_allclose(found[0][key][kind], found[1][key][kind], rtol=1e-6)
+    for name, value in found[0]["mean_estimate"].items():
+        assert value == pytest.approx(found[1]["mean_estimate"][name], rel=1e-4, abs=1e-5)
+    if not loop:  # y is noise of mean square 0.5 (1 + 0.8^2) about what the input causes
+        added = np.subtract(found[0]["total_power"]["output"], found[0]["power"]["output"])
+        np.testing.assert_allclose(added, 0.82, rtol=0.3)
+
+
+def test_a_true_plant_in_s_of_one_channel():
+    plant = "{continuous: {numerator: [2], denominator: [1, 0.4]}, sample: zoh}"
+    spec = load_spec(FIRST, ["spectrum.order=3", f"simulation={{runs: 5, plant: {plant}}}"])
+    truth = simulate(spec).result["simulation"]["true_parameters"]
+    assert truth["f1"] == pytest.approx(-np.exp(-0.4))
+    assert truth["b1"] == pytest.approx(5.0 * (1.0 - np.exp(-0.4)))
+
+
+def test_filtered_noise_of_a_plant_in_s_is_refused():
+    with pytest.raises(SpecError) as caught:
+        simulate(parse_spec(IN_SECONDS, overrides=["plant.sample=zoh", "noise.C=[1, 0.5]"]))
+    assert [(c.code, c.key) for c in caught.value.complaints] == [("not-supported", "noise.C")]
 
 
 def test_prior_information_narrows_the_estimates():
@@ -204,7 +262,7 @@ def test_the_result_does_not_depend_on_where_it_is_computed():
 @pytest.mark.parametrize("hold", [True, False])
 def test_plants_in_s_keep_their_promise(hold):
     overrides = ["plant.sample=zoh"] if hold else []
-    simulation = simulate(parse_spec(IN_S, overrides=overrides)).result["simulation"]
+    simulation = simulate(parse_spec(IN_SECONDS, overrides=overrides)).result["simulation"]
     within_wishart(simulation)
     design = simulation["inputs"]["design"]
     assert design["within_r_adm_limits"][1] > 0.95

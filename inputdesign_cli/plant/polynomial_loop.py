@@ -1,0 +1,101 @@
+"""The loop around polynomial plants with several channels, as one polynomial equation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.signal
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.plant.channel_loop import ChannelLoop
+from inputdesign_cli.plant.channels import PolynomialChannels
+from inputdesign_cli.plant.polynomial import (
+    Array,
+    ComplexArray,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
+from inputdesign_cli.plant.polynomial_matrix import at, stack
+
+
+@dataclass(frozen=True)
+class PolynomialLoop(ChannelLoop):
+    """`ChannelLoop` with R_i = A_i prod_j F_ij and N = R G, so that R H = prod_j F_ij C_i / D_i.
+
+    The roots of the determinant of the polynomial matrix on the left are all closed-loop poles (every 1/A_i
+    is driven by its own noise e_i).
+    """
+
+    model: PolynomialChannels
+
+    @cached_property
+    def _left(self) -> Array:
+        """(p + r, p + r, l): the matrix of polynomials on the left."""
+        m, C = self.model, self.controller
+        p, r = m.outputs, m.inputs
+        rows: list[list[list[float]]] = []
+        for i, a in enumerate(m.per_output(m.A)):
+            whole = np.convolve(a, self._others(i))
+            left = [whole.tolist() if i == other else [0.0] for other in range(p)]
+            rows.append(left + [(-np.convolve(m.B[i][j], self._others(i, j))).tolist() for j in range(r)])
+        for j, q in enumerate(C.denominator):
+            right = [q.tolist() if j == other else [0.0] for other in range(r)]
+            rows.append([C.numerator[j, i].tolist() for i in range(p)] + right)
+        return stack(rows)
+
+    def _others(self, output: int, left_out: int | None = None) -> Array:
+        """The product of the F of an output, but for one input's."""
+        product = np.ones(1)
+        for j, f in enumerate(self.model.F[output]):
+            product = np.convolve(product, f) if j != left_out else product
+        return product
+
+    @cached_property
+    def closed_poles(self) -> ComplexArray:
+        """Roots in z of the determinant, those at the origin included: eigenvalues of its companion form."""
+        leading, later = self._left[..., 0], self._left[..., 1:]
+        size, lags = leading.shape[0], later.shape[-1]
+        if lags == 0:
+            return np.zeros(0, dtype=complex)
+        companion = np.eye(size * lags, k=-size)
+        blocks = -np.linalg.solve(leading, later.reshape(size, -1)).reshape(size, size, lags)
+        companion[:size] = blocks.transpose(0, 2, 1).reshape(size, -1)
+        return np.asarray(np.linalg.eigvals(companion), dtype=complex)
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        m = self.model
+        return join_roots(roots_in_z(p) for p in [*m.C, *m.D, *(f for row in m.F for f in row)])
+
+    @property
+    def instantaneous(self) -> Array:
+        return self._left[..., 0]
+
+    def left_at(self, w: ArrayLike) -> ComplexArray:
+        return at(self._left, unit_circle(w))
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        m, q = self.model, unit_circle(w)
+        found = np.zeros((q.size, m.outputs, m.outputs), dtype=complex)
+        for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):
+            found[:, i, i] = evaluate(self._others(i), q) * evaluate(c, q) / evaluate(d, q)
+        return found
+
+    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        m, samples = self.model, r.shape[-2]
+        right = np.empty((*r.shape[:-1], m.outputs + m.inputs))
+        for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):
+            right[..., i] = scipy.signal.lfilter(np.convolve(self._others(i), c), d, e[..., i])
+        for j, q in enumerate(self.controller.denominator):
+            right[..., m.outputs + j] = scipy.signal.lfilter(q, [1.0], r[..., j])
+        inverse = np.linalg.inv(self._left[..., 0])
+        back = [(inverse @ self._left[..., lag]).T for lag in range(1, self._left.shape[-1])]
+        found = right @ inverse.T
+        for t in range(1, samples):
+            for lag, block in enumerate(back[:t], start=1):
+                found[..., t, :] -= found[..., t - lag, :] @ block
+        return found[..., : m.outputs], found[..., m.outputs :]

@@ -1,0 +1,78 @@
+"""The loop around plants in s that are sampled behind a zero-order hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.plant.channel_loop import ChannelLoop
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.sampled import SampledChannels
+
+
+@dataclass(frozen=True)
+class SampledLoop(ChannelLoop):
+    """`ChannelLoop` with R = I and N = G, which is stable, and H = I.
+
+    Poles and signals are those of the states of the entries of G and of the rows of C: polynomials in q^-1
+    would lose the digits of poles that crowd at z = 1 when sampling is fast. States of G that feedback does
+    not reach are poles of G, hence stable.
+
+    y(t) is measured before u(t) is applied and held; a controller that needs time to compute has a delay.
+    """
+
+    model: SampledChannels
+
+    @cached_property
+    def _states(self) -> tuple[Array, Array, Array]:
+        """x(t + 1) = A x + B [y; u], `instantaneous` [y; u] = C x + [e; r]."""
+        plant, controller = self.model.realisation, self.controller.realisation
+        from_u = np.concatenate([plant.B, np.zeros((len(controller.A), self.model.inputs))])
+        from_y = np.concatenate([np.zeros((len(plant.A), self.model.outputs)), controller.B])
+        return (
+            scipy.linalg.block_diag(plant.A, controller.A),
+            np.concatenate([from_y, from_u], axis=1),
+            scipy.linalg.block_diag(plant.C, -controller.C),
+        )
+
+    @cached_property
+    def closed_poles(self) -> ComplexArray:
+        A, B, C = self._states
+        return np.linalg.eigvals(A + B @ np.linalg.solve(self.instantaneous, C)).astype(complex)
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        return self.model.poles
+
+    @cached_property
+    def instantaneous(self) -> Array:
+        p, r = self.model.outputs, self.model.inputs
+        G, C = self.model.realisation.D, self.controller.realisation.D
+        return np.block([[np.eye(p), -G], [C, np.eye(r)]])
+
+    def left_at(self, w: ArrayLike) -> ComplexArray:
+        (P, below), G = self.controller.fraction_at(w), self.model.plant_at(w)
+        p, r = self.model.outputs, self.model.inputs
+        left = np.zeros((len(G), p + r, p + r), dtype=complex)
+        left[:, :p, :p], left[:, :p, p:], left[:, p:, :p] = np.eye(p), -G, P
+        left[:, p + np.arange(r), p + np.arange(r)] = below
+        return left
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        p = self.model.outputs
+        return np.broadcast_to(np.eye(p, dtype=complex), (np.size(w), p, p))
+
+    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        A, B, C = self._states
+        at_once = np.linalg.inv(self.instantaneous).T
+        found = np.concatenate([e, r], axis=-1) @ at_once
+        from_states, onward, next_state = C.T @ at_once, B.T, A.T
+        x = np.zeros((*r.shape[:-2], len(A)))
+        for t in range(r.shape[-2]):
+            found[..., t, :] += x @ from_states
+            x = x @ next_state + found[..., t, :] @ onward
+        return found[..., : self.model.outputs], found[..., self.model.outputs :]
