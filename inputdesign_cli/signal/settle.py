@@ -53,7 +53,7 @@ def first_level(figure: Callable[[float], float], start: float) -> tuple[float, 
     low, high = start / _GROWTH, start
     best, least, idle = start, np.inf, 0
     while (reached := figure(high)) > 1.0:
-        idle = 0 if reached < _WORTH * least else idle + 1
+        idle = 0 if reached < _WORTH * least or np.isinf(least) else idle + 1
         if reached < least:
             best, least = high, reached
         low, high = high, high * _GROWTH
@@ -84,4 +84,9 @@ def last_level(accepted: Callable[[float], bool], start: float) -> float:
 
 def level_of_power(power: Callable[[float], float], wanted: float, start: float) -> float:
     """The level at which the record has the `wanted` power, or the highest that still adds to it."""
-    return first_level(lambda level: wanted * (1.0 - 1e-9) / power(level), start)[0]
+
+    def figure(level: float) -> float:
+        reached = power(level)
+        return wanted * (1.0 - 1e-9) / reached if reached > 0.0 else np.inf
+
+    return first_level(figure, start)[0]

@@ -13,7 +13,7 @@ from inputdesign_cli.signal import (
     realise,
     record_information,
 )
-from inputdesign_cli.signal.settle import first_level, last_level, least_level
+from inputdesign_cli.signal.settle import first_level, last_level, least_level, level_of_power
 from inputdesign_cli.signal.within import compressed, slow_moves
 from inputdesign_cli.spectrum import FirBasis
 
@@ -81,7 +81,14 @@ def test_a_level_that_helps_most():
     assert not met
     assert figure(level) == pytest.approx(1.25, rel=1e-2)
     assert max(tried) < 10.0
-    assert first_level(lambda a: np.inf, 1.0) == (1.0, False)
+    assert first_level(lambda a: np.inf, 1.0)[1] is False
+
+
+def test_a_level_of_some_power():
+    assert level_of_power(lambda a: a**2, 4.0, 1.0) == pytest.approx(2.0, rel=2e-3)
+    # Below half a step a converter gives nothing at all.
+    assert level_of_power(lambda a: np.floor(a) ** 2, 4.0, 0.5) == pytest.approx(2.0, rel=2e-3)
+    assert level_of_power(lambda a: min(a, 1.5) ** 2, 4.0, 1.0) >= 1.4
 
 
 def demand():
