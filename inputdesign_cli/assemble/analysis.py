@@ -19,6 +19,7 @@ from inputdesign_cli.assemble.curves import (
 from inputdesign_cli.assemble.ellipses import experiment_ellipses
 from inputdesign_cli.assemble.experiment import read_excitation_record
 from inputdesign_cli.assemble.given import bad_table, read_spectrum_table
+from inputdesign_cli.assemble.given_limits import broken_limits, check_given_limits
 from inputdesign_cli.assemble.record import given_record, signal_entry, worst_ratio
 from inputdesign_cli.assemble.result import information_entry, requirements_entry
 from inputdesign_cli.assemble.signal_files import other_files, signal_curves
@@ -58,6 +59,7 @@ def analyse_given(spec: Spec) -> Outcome:
             parameters undetermined (`not-exciting`).
     """
     started = time.perf_counter()
+    check_given_limits(spec)
     task = build_analysis(spec)
     excitation = read_excitation(spec, task.experiment)
     unit = max(sum(excitation.power["excitation"]), 1e-300)
@@ -92,6 +94,9 @@ def analyse_given(spec: Spec) -> Outcome:
         given = record.method == "given"
         tables["signal"], curves["signal"] = signal_curves(spec, record.samples, given=given)
         files = other_files(spec, record.samples, given=given)
+    notes = broken_limits(spec, experiment.samples, excitation.power, result.get("signal", {}))
+    if notes:
+        result["notes"] = notes
     result["timing_s"] = {"analysis": time.perf_counter() - started}
     return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 

@@ -37,6 +37,7 @@ from inputdesign_cli.assemble.channels import (
     record_step,
 )
 from inputdesign_cli.assemble.ellipses import check_pairs, experiment_ellipses
+from inputdesign_cli.assemble.given_limits import broken_limits, check_given_limits
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.record import applied_entry, worst_ratio
 from inputdesign_cli.assemble.signal_files import other_files, signal_curves
@@ -77,6 +78,7 @@ def analyse_channels(spec: Spec) -> Outcome:
             parameters undetermined (`not-exciting`).
     """
     started = time.perf_counter()
+    check_given_limits(spec)
     task = build_channel_analysis(spec)
     raw: Any = task.experiment
     excitation = read_channel_excitation(spec, raw)
@@ -117,6 +119,9 @@ def analyse_channels(spec: Spec) -> Outcome:
             result["signal"]["worst_ratio"] = _ratio(requirements, reached)
         tables["signal"], curves["signal"] = signal_curves(spec, samples, given=given)
         files = other_files(spec, samples, given=given)
+    notes = broken_limits(spec, experiment.samples, excitation.power, result.get("signal", {}))
+    if notes:
+        result["notes"] = notes
     result["timing_s"] = {"analysis": time.perf_counter() - started}
     return Outcome(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 

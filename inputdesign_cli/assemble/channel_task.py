@@ -180,6 +180,13 @@ def check_given_signal(spec: Spec) -> None:
                 hint="remove it",
                 key=f"signal.{name}",
             )
+    if spec.signal.phases in ("schroeder", "optimised"):
+        raise spec.complain(
+            "not-supported",
+            f"this version does not choose {spec.signal.phases} phases for a given excitation of this plant",
+            hint="use random, or leave the key out",
+            key="signal.phases",
+        )
 
 
 def _check_interpolated(spec: Spec) -> None:
