@@ -70,8 +70,8 @@ class ExchangeResult:
 
     @property
     def gap(self) -> float:
-        """(objective - bound) / objective."""
-        difference = max(self.objective - self.certificate.bound, 0.0)
+        """|objective - bound| / objective: a bound beyond the objective is as wrong as one far below."""
+        difference = abs(self.objective - self.certificate.bound)
         return difference / self.objective if self.objective > 0 else 0.0
 
 
