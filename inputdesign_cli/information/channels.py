@@ -146,8 +146,11 @@ class ChannelExperiment(Coordinates):
         probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
         return ~np.any(probe > 0, axis=(0, 2, 3))
 
-    def whitened(self, power: float) -> ChannelExperiment:
-        """The same experiment in coordinates where M = I by this power, even over band and channels.
+    def whitened(self, power: float | Array) -> ChannelExperiment:
+        """The same experiment in coordinates where M = I by this power, flat over the band.
+
+        Args:
+            power: of all channels together, which share it evenly, or (r,) of each.
 
         Raises:
             SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
@@ -155,8 +158,9 @@ class ChannelExperiment(Coordinates):
         rule = band_quadrature(self.singularities, self.band)
         raw = replace(self, factor=None)
         width = (self.band[1] - self.band[0]) / np.pi
-        level = power * self.samples / (self.inputs * width)
-        rows = [_rows(raw.excitation_gradient(rule.nodes), rule.weights * level)]
+        each = np.broadcast_to(np.asarray(power) / (self.inputs if np.ndim(power) == 0 else 1), self.inputs)
+        excited = raw.excitation_gradient(rule.nodes) * np.sqrt(each * self.samples / width)
+        rows = [_rows(excited, rule.weights)]
         if not self.model.continuous and not np.all(self._silent):
             around = band_quadrature(self.singularities, (0.0, np.pi))
             rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))
