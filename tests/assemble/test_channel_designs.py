@@ -340,3 +340,15 @@ def test_a_spectrum_of_order_zero_is_white_in_time():
         for kind in ("type: fir, order: 1", "type: fir, order: 0", "type: white")
     ]
     assert costs[0] < costs[1] < costs[2]
+
+
+def test_free_spectra_of_unequal_limits_are_proved():
+    """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
+    spec = changed(
+        "plant: {B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]],\n"
+        "  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1, -0.8]]]}\n"
+        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
+        "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
+        "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
+    )
+    assert by_exchange(spec, build_channel_task(spec))[0].result.gap < 1e-6
