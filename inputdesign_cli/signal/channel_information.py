@@ -15,6 +15,8 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 # e^-32 is below rounding; a plant that remembers longer than this many samples is cut there.
 _FORGOTTEN = 32.0
 _LONGEST_MEMORY = 2**20
+# A longer memory than this many records is weighted down instead; rounding grows to e^8 of itself.
+_RECORDS = 4
 _FREQUENCIES_AT_ONCE = 16384
 # Frequency responses of more numbers than this are computed anew for each record.
 _KEPT = 2**22
@@ -24,8 +26,10 @@ _KEPT = 2**22
 class RecordFilter:
     """The plant or its loop, from rest, as it answers records of `samples` samples of the excitation.
 
-    Filtering is by FFT, padded past memory. In continuous time the plant is driven by the band-limited
-    interpolation of the samples, `step` apart, and its outputs are read at the same instants.
+    Filtering is by FFT, padded past memory. In discrete time a long memory is forgotten within a padding of
+    three records: samples are weighted with e^(-rho t), what they cause with e^(rho t). In continuous
+    time the plant is driven by the band-limited interpolation of the samples, `step` apart, and its outputs
+    are read at the same instants.
     """
 
     experiment: ChannelExperiment
@@ -51,18 +55,38 @@ class RecordFilter:
 
     def output(self, record: Array, channel: int) -> Array:
         """(n,): one of the outputs."""
-        transform = np.fft.rfft(record, self._length, axis=0)
-        answer = np.einsum("nr,nr->n", self._plant[:, channel], transform)
-        return np.asarray(np.fft.irfft(answer, self._length)[: self.samples])
+        answer = np.einsum("nr,nr->n", self._plant[:, channel], self._transform(record))
+        return np.fft.irfft(answer, self._length)[: self.samples] / self._weights(self.samples)
 
     def output_adjoint(self, weights: Array, channel: int) -> Array:
         """(n, r): the transpose of `output`, applied to weights (n,)."""
-        transform = np.fft.rfft(weights, self._length)
+        transform = np.fft.rfft(weights / self._weights(len(weights)), self._length)
         answer = self._plant[:, channel].conj() * transform[:, None]
-        return np.asarray(np.fft.irfft(answer, self._length, axis=0)[: self.samples])
+        found = np.fft.irfft(answer, self._length, axis=0)[: self.samples]
+        return found * self._weights(self.samples)[:, None]
+
+    def _transform(self, record: Array) -> ComplexArray:
+        """(frequencies, r): of the samples (n, r), weighted."""
+        return np.fft.rfft(record * self._weights(len(record))[:, None], self._length, axis=0)
+
+    def _weights(self, samples: int) -> Array:
+        """(n,): e^(-rho t)."""
+        return np.exp(-self._decay * np.arange(samples))
+
+    @cached_property
+    def _decay(self) -> float:
+        """rho, zero where the padding outlasts the memory."""
+        return 0.0 if self._padded == self._length else _FORGOTTEN / self._length
 
     @cached_property
     def _length(self) -> int:
+        if self.experiment.model.continuous:
+            return self._padded
+        return min(self._padded, int(2 ** np.ceil(np.log2(_RECORDS * self.samples))))
+
+    @cached_property
+    def _padded(self) -> int:
+        """A length past the memory of the plant, a power of two."""
         experiment = self.experiment
         damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
             self.step if experiment.model.continuous else 1.0
@@ -71,9 +95,11 @@ class RecordFilter:
         return int(2 ** np.ceil(np.log2(self.samples + memory)))
 
     @cached_property
-    def _frequencies(self) -> Array:
+    def _frequencies(self) -> Array | ComplexArray:
         w = 2.0 * np.pi * np.arange(self._length // 2 + 1) / self._length
-        return w / self.step if self.experiment.model.continuous else w
+        if self.experiment.model.continuous:
+            return w / self.step
+        return np.asarray(w - 1j * self._decay, dtype=complex) if self._decay else w
 
     @cached_property
     def _plant(self) -> ComplexArray:
@@ -83,7 +109,7 @@ class RecordFilter:
     def _gradient(self) -> ComplexArray:
         return self._filters("gradient", self._frequencies)
 
-    def _filters(self, of: PowerKind | Literal["gradient"], w: Array) -> ComplexArray:
+    def _filters(self, of: PowerKind | Literal["gradient"], w: Array | ComplexArray) -> ComplexArray:
         """(n, k, p, r) those of the prediction gradient, or (n, 1, channels, r)."""
         if of == "gradient":
             return self.experiment.excitation_gradient(w)
@@ -91,18 +117,19 @@ class RecordFilter:
 
     def _answer(self, record: Array, of: PowerKind | Literal["gradient"]) -> NDArray[np.float64]:
         """(n, k, p) the prediction gradient, or (n, 1, channels)."""
-        transform = np.fft.rfft(record, self._length, axis=0)
+        transform = self._transform(record)
+        back = 1.0 / self._weights(len(record))[:, None, None]
         model = self.experiment.model
         size = self.experiment.size * model.outputs * model.inputs * len(transform)
         if of == "gradient" and size <= _KEPT:
             answer = np.einsum("nkpr,nr->nkp", self._gradient, transform)
-            return np.fft.irfft(answer, self._length, axis=0)[: len(record)]
+            return back * np.fft.irfft(answer, self._length, axis=0)[: len(record)]
         parts = []
         for start in range(0, len(transform), _FREQUENCIES_AT_ONCE):
             part = slice(start, start + _FREQUENCIES_AT_ONCE)
             F = self._filters(of, self._frequencies[part])
             parts.append(np.einsum("nkpr,nr->nkp", F, transform[part]))
-        return np.fft.irfft(np.concatenate(parts), self._length, axis=0)[: len(record)]
+        return back * np.fft.irfft(np.concatenate(parts), self._length, axis=0)[: len(record)]
 
 
 def channel_record_information(experiment: ChannelExperiment, record: Array, step: float) -> Array:
