@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Absolute, EntryError, NormError
 from inputdesign_cli.assemble.channel_estimation import estimated, estimated_runs, moved, simulated
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
@@ -113,7 +114,12 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
     found = estimated_runs(job.model, u, y, job.step, start)
     theta, information, converged = found.theta, found.information, found.converged.copy()
     for run in np.flatnonzero(~converged):
-        again = estimated(job.model, u[run], y[run], job.step, start)
+        try:
+            again = estimated(job.model, u[run], y[run], job.step, start)
+        except (
+            SpecError
+        ):  # the noise of this run leaves some parameter without an estimate: it stays unsettled
+            continue
         theta[run], information[run], converged[run] = again.theta, again.information, again.converged
     if true.prior is not None and system.names == job.model.names:
         theta = with_prior(theta, information, true.prior, system.theta, rng)

@@ -11,6 +11,7 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import error_bound
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import Structure, fit_batch, identify
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
@@ -127,7 +128,12 @@ def run_trials(
     found = fit_batch(structure, u, y, start=start)
     theta, information, converged = found.theta, found.information, found.converged.copy()
     for run in np.flatnonzero(~converged):
-        again = identify(structure, u[run], y[run], start=start)
+        try:
+            again = identify(structure, u[run], y[run], start=start)
+        except (
+            SpecError
+        ):  # the noise of this run leaves some parameter without an estimate: it stays unsettled
+            continue
         theta[run], information[run], converged[run] = again.theta, again.information, again.converged
     if true.prior is not None and true.model.names == structure.names:
         theta = with_prior(theta, information, true.prior, true.model.theta, rng)
