@@ -125,6 +125,8 @@ def balanced_powers(question: Question, power: float) -> float | Array:
         family = free_lines(question.experiment, np.array(question.band))
     price = _stated(replace(question, basis=family), question.experiment).price
     prices = np.array([price.at(family.spread(channel)) for channel in np.eye(r)])  # type: ignore[attr-defined]
+    if np.ptp(prices) <= _KEEPS * prices.max():
+        return power
     return power * prices.mean() / (r * prices)
 
 

@@ -158,9 +158,10 @@ class ChannelExperiment(Coordinates):
         rule = band_quadrature(self.singularities, self.band)
         raw = replace(self, factor=None)
         width = (self.band[1] - self.band[0]) / np.pi
-        each = np.broadcast_to(np.asarray(power) / (self.inputs if np.ndim(power) == 0 else 1), self.inputs)
-        excited = raw.excitation_gradient(rule.nodes) * np.sqrt(each * self.samples / width)
-        rows = [_rows(excited, rule.weights)]
+        total = float(np.sum(power))
+        shares = np.sqrt(np.asarray(power) * self.inputs / total) if np.ndim(power) else 1.0
+        level = total * self.samples / (self.inputs * width)
+        rows = [_rows(raw.excitation_gradient(rule.nodes) * shares, rule.weights * level)]
         if not self.model.continuous and not np.all(self._silent):
             around = band_quadrature(self.singularities, (0.0, np.pi))
             rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))

@@ -26,6 +26,8 @@ _SAME = 1e-12
 # An atom is in use from this share of the cost, and near another within this distance (band and turn).
 _USED = 1e-4
 _NEAR = 0.2
+# What hardly counts among limits that are not all there is to pay keeps a finite unit.
+_FREE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,10 @@ class DirectedLines:
 
     def first_face(self, price: Functional) -> Face:
         """All atoms, in units of their price."""
-        return Face(np.diag(1.0 / price.vector), "nonnegative", self.size, self.frequencies)
+        least = _FREE * price.vector.max()
+        return Face(
+            np.diag(1.0 / np.maximum(price.vector, least)), "nonnegative", self.size, self.frequencies
+        )
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction)."""
