@@ -1,8 +1,10 @@
 """Combinations of inputs that nothing pays for or limits: refused, since their power has no end."""
 
+import warnings
+
 import pytest
 
-from inputdesign_cli import validate
+from inputdesign_cli import solve, validate
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.spec import parse_spec
 
@@ -54,3 +56,17 @@ def test_a_limit_on_the_density_counts_every_direction():
     criterion = TWO_INPUTS + "accuracy: {criterion: D}\nspectrum: {type: fir, order: 4}\n"
     assert codes(criterion, "limits={output_power: 9}") == ["needs-limits"]
     assert codes(criterion, "limits={output_power: 9, spectrum: 4}") == []
+
+
+def test_a_limit_may_leave_combinations_that_the_cost_counts():
+    """The cheapest design puts little into y; a limit on y that it keeps costs a little, without warnings."""
+    free = {"cost": "{input_power: 1}", "spectrum": "{type: fir, order: 3}", "signal": "{candidates: 1}"}
+    overrides = [f"{key}={value}" for key, value in free.items()]
+    least = solve(parse_spec(TWO_INPUTS + ERROR, overrides=overrides)).result
+    most = 0.98 * sum(least["power"]["output"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        held = parse_spec(TWO_INPUTS + ERROR, overrides=[*overrides, f"limits.output_power={most}"])
+        result = solve(held).result
+    assert result["power"]["output"][0] <= most * (1.0 + 1e-9)
+    assert least["cost"] * (1.0 - 1e-7) <= result["cost"] <= 1.01 * least["cost"]
