@@ -226,15 +226,16 @@ CODES: dict[str, Explanation] = {
         "Add one under accuracy, or fix the excitation under spectrum.given and run `idesign analyse`.",
     ),
     "no-cost": Explanation(
-        "All cost weights are zero",
-        "Then every experiment is as good as any other.",
-        "Give a positive weight.",
+        "Something costs nothing",
+        "With weights of zero every experiment is as good as any other. Of several inputs no combination may "
+        "be free either: the power of one output does not show what two inputs do that cancels in it.",
+        "Give a positive weight, with several inputs to input_power.",
     ),
     "needs-limits": Explanation(
         "The best experiment without a limit",
         "More power always means more accuracy: a criterion has no best value, and the shortest "
-        "experiment is one "
-        "sample, unless a power is limited.",
+        "experiment is one sample, unless a power is limited. Limits on fewer outputs than there are inputs "
+        "leave combinations of the inputs without a limit.",
         "Add limits.input_power, limits.output_power or limits.excitation_power.",
     ),
     "needs-controller": Explanation(

@@ -225,12 +225,30 @@ class EllipsoidCut:
         Z = positive_part(smat(multipliers[0]))
         missing = -float(np.sum(Z * self.form))
         if missing > 0.0:
-            # Rounding: a little more of the direction in which the form is largest restores tr(Z Q) >= 0.
+            # Rounding. Less weight on the corner restores tr(Z Q) >= 0, or more of the direction in which the
+            # form is largest; where the first can be had it proves more.
+            shorter = _shortened(Z, self.form)
+            if shorter is not None:
+                return shorter[:-1, :-1] / self.alpha**2, float(shorter[-1, -1])
             values, vectors = np.linalg.eigh(self.form[:-1, :-1])
             if values[-1] <= 0.0:
                 return np.zeros_like(self.form[:-1, :-1]), 0.0
             Z[:-1, :-1] += missing / values[-1] * np.outer(vectors[:, -1], vectors[:, -1])
         return Z[:-1, :-1] / self.alpha**2, float(Z[-1, -1])
+
+
+def _shortened(Z: Array, form: Array) -> Array | None:
+    """Z with its last row and column times the largest c < 1 for which tr(Z Q) >= 0, Q = `form`; or None."""
+    square = Z[-1, -1] * form[-1, -1]
+    linear = 2.0 * float(Z[:-1, -1] @ form[:-1, -1])
+    constant = float(np.sum(Z[:-1, :-1] * form[:-1, :-1]))
+    roots = np.roots([square, linear, constant])
+    inside = roots.real[(np.abs(roots.imag) == 0.0) & (roots.real > 0.5) & (roots.real < 1.0)]
+    if inside.size == 0:
+        return None
+    corner = np.ones(len(Z))
+    corner[-1] = inside.max() * (1.0 - 1e-15)
+    return Z * np.outer(corner, corner)
 
 
 def positive_part(matrix: Array) -> Array:

@@ -78,7 +78,7 @@ def read_channel_excitation(spec: Spec, experiment: ChannelExperiment) -> Channe
         frequencies, amplitudes = given_sinusoids(spec, given)
         constant = (frequencies <= 0.0) | (spec.plant.sampled & (frequencies >= np.pi))
         size = np.linalg.norm(amplitudes, axis=1)
-        lines = DirectedLines(frequencies, amplitudes / size[:, None] + 0j, frequencies)
+        lines = DirectedLines(frequencies, amplitudes / size[:, None] + 0j, frequencies, np.ones(r))
         return spectral("multisine", lines, np.where(constant, 1.0, 0.5) * size**2, experiment)
     return spectral("table", _table(spec, given, r), np.ones(1), experiment)
 

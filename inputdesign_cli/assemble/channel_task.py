@@ -16,6 +16,7 @@ from inputdesign_cli.assemble.channels import (
 )
 from inputdesign_cli.assemble.ellipses import check_pairs
 from inputdesign_cli.assemble.experiment import embedded
+from inputdesign_cli.assemble.free_directions import check_every_direction_counts
 from inputdesign_cli.assemble.limits import build_density_limits, build_power_limits
 from inputdesign_cli.assemble.model_error import model_error_alpha
 from inputdesign_cli.assemble.requirements import build_criterion, build_requirements
@@ -68,6 +69,7 @@ def build_channel_task(spec: Spec) -> Task:
         densities=build_density_limits(spec, experiment),
         band=band,
     )
+    check_every_direction_counts(spec, question)
     return Task(question, experiment, cost, model_error_alpha(spec, experiment), None)  # type: ignore[arg-type]
 
 

@@ -26,8 +26,10 @@ from inputdesign_cli.design.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Functional
 
-# Every upper limit keeps this share of its weight, so that no spectrum is free of charge.
-_LEAST_WEIGHT = 1e-9
+# Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs
+# the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
+# what only it prices would then set the scale: the largest share is tried last.
+_LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,26 @@ def certify(
         sides: for each cut of the proof whether it is a side requirement's; missing means that none is.
         rows: the limits that the weights `proof.rows` belong to.
     """
+    found = _certified(problem, proof, sides, rows, _LEAST_SHARES[0])
+    if problem.goal == "cost":
+        return found
+    for share in _LEAST_SHARES[1:]:
+        other = _certified(problem, proof, sides, rows, share)
+        if other.bound <= found.bound:
+            break
+        found = other
+    return found
+
+
+def _certified(
+    problem: Problem, proof: Proof, sides: Sequence[bool], rows: Sequence[Row], share: float
+) -> Certificate:
     k = problem.experiment.size
     sides = sides or [False] * len(proof.cuts)
     weight = sum((Y for Y, _ in proof.cuts), np.zeros((k, k)))
     required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if not side)
     scaled_required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if side)
-    weights = _kept(problem, rows, proof.rows)
+    weights = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
     price: Functional | None = problem.price if problem.goal == "cost" else None
     value = problem.value(weight)
     upper = lower = fixed_lower = 0.0
@@ -104,13 +120,13 @@ def certify(
     )
 
 
-def _kept(problem: Problem, rows: Sequence[Row], weights: Array) -> Array:
-    """The weights with a tiny share added to upper limits, relative to the largest."""
-    if not len(rows) or problem.goal == "cost":
+def _kept(rows: Sequence[Row], weights: Array, share: float) -> Array:
+    """The weights with a `share` of what all upper limits take added to each limit on a power."""
+    if not len(rows):
         return weights
     powers = np.array([row.upper and row.limit is not None for row in rows])
     bounds = np.array([row.bound for row in rows])
     spent = float(np.sum((weights * bounds)[[row.upper for row in rows]]))
     added = np.zeros(len(rows))
-    added[powers] = _LEAST_WEIGHT * max(spent, 1e-30) / bounds[powers]
+    added[powers] = share * max(spent, 1e-30) / bounds[powers]
     return weights + added

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,15 @@ from inputdesign_cli.design.white import least_white_power
 from inputdesign_cli.errors import Complaint, InfeasibleError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, DirectedLines, FirBasis, LinesBasis, flat_basis, free_lines
+from inputdesign_cli.spectrum import (
+    Basis,
+    DirectedLines,
+    FirBasis,
+    FlatBasis,
+    LinesBasis,
+    flat_basis,
+    free_lines,
+)
 
 _ANY_SPECTRUM_TOLERANCE = 1e-6
 _KEEPS = 1e-9
@@ -54,8 +63,8 @@ class Question:
 class Design:
     """A design and what it is compared with.
 
-    `problem` is stated in coordinates whitened at the white baseline. `white` is flat excitation that
-    meets the same requirements (or exhausts the same limits) and `white_power` its power;
+    `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even
+    over the inputs and meets the same requirements (or exhausts the same limits); `white_power` is its power,
     `white_within` tells whether it keeps to the limits. `any_spectrum` is the same problem over all
     spectra; its certificate bounds every excitation whatever (limits on the density left out).
     """
@@ -77,20 +86,21 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
         UnreachableError: the requirements cannot be met within the limits.
     """
     power = white_power(question)
-    problem = whitened_problem(question, power)
+    powers = balanced_powers(question, power or 1.0)
+    question = replace(question, basis=_in_units(question.basis, powers))
+    problem = whitened_problem(question, powers)
     flat = _on_flat(problem)
     white = _white(question, flat, power)
     white_level = float(white.z[0] / white.s)
-    anywhere = _anywhere(question, problem)
+    anywhere = _anywhere(question, problem, powers)
     if power == 0.0 and not problem.has_floors:
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
     within = excess(flat, white) <= _KEEPS
-    start = (power or 1.0) * _flat(problem.basis)
-    result = _solve(problem, start, tolerance)
+    result = _solve(problem, _flat(problem.basis, powers), tolerance)
     if isinstance(question.basis, LinesBasis | DirectedLines) and question.basis.free:
         return Design(problem, white, white_level, within, result, result)
     loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
-    anything = _solve(anywhere, (power or 1.0) * _flat(anywhere.basis), loose)
+    anything = _solve(anywhere, _flat(anywhere.basis, powers), loose)
     return Design(problem, white, white_level, within, result, anything)
 
 
@@ -102,28 +112,60 @@ def white_power(question: Question) -> float:
     return 1.0 / least_scale(unit, np.ones(1))
 
 
-def whitened_problem(question: Question, power: float) -> Problem:
-    """The problem in coordinates where white excitation of this power (if any) gives M = I."""
-    coordinates = question.experiment.whitened(power or 1.0)
-    densities = tuple(question.densities)
-    implied = [implied_power(d, question.experiment.inputs) for d in densities if d.upper]
-    return Problem(
-        experiment=coordinates,
-        basis=question.basis,
-        cost=question.cost,
+def balanced_powers(question: Question, power: float) -> float | Array:
+    """Of several inputs the powers (r,) that take equal shares of the price of white excitation.
+
+    Where the units of the inputs differ, so do their prices or limits: an excitation even over the
+    inputs would then be a poor start, and its information matrix a poor measure. One input has `power`.
+    """
+    r, family = question.experiment.inputs, question.basis
+    if r == 1:
+        return power
+    if isinstance(family, FlatBasis):
+        family = free_lines(question.experiment, np.array(question.band))
+    price = _stated(replace(question, basis=family), question.experiment).price
+    prices = np.array([price.at(family.spread(channel)) for channel in np.eye(r)])  # type: ignore[attr-defined]
+    if np.ptp(prices) <= _KEEPS * prices.max():
+        return power
+    return power * prices.mean() / (r * prices)
+
+
+def whitened_problem(question: Question, powers: float | Array) -> Problem:
+    """The problem in coordinates where flat excitation of these powers gives M = I."""
+    coordinates = question.experiment.whitened(powers)  # type: ignore[arg-type]
+    return replace(
+        _stated(question, coordinates),
         requirements=tuple(make(coordinates) for make in question.requirements),
-        limits=(*question.limits, *implied),
-        densities=densities,
-        goal=question.goal,
         side=tuple(make(coordinates) for make in question.side),
     )
 
 
-def _anywhere(question: Question, problem: Problem) -> Problem:
+def _stated(question: Question, experiment: Experiment) -> Problem:
+    """The problem but for what it requires."""
+    densities = tuple(question.densities)
+    implied = [implied_power(d, experiment.inputs) for d in densities if d.upper]
+    return Problem(
+        experiment=experiment,
+        basis=question.basis,
+        cost=question.cost,
+        requirements=(),
+        limits=(*question.limits, *implied),
+        densities=densities,
+        goal=question.goal,
+    )
+
+
+def _anywhere(question: Question, problem: Problem, powers: float | Array) -> Problem:
     lo, hi = question.band
     grid = problem.grid[(problem.grid >= lo) & (problem.grid <= hi)]
-    lines = free_lines(question.experiment, np.union1d(grid, [lo, hi]))
+    lines = _in_units(free_lines(question.experiment, np.union1d(grid, [lo, hi])), powers)
     return replace(problem, basis=lines, densities=(), finer=None)
+
+
+def _in_units(basis: Basis, powers: float | Array) -> Basis:
+    """Lines with directions that suit the channels; other families have none."""
+    several = isinstance(basis, DirectedLines) and np.ndim(powers) == 1
+    return basis.in_units(np.sqrt(powers)) if several else basis  # type: ignore[attr-defined]
 
 
 def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
@@ -160,8 +202,11 @@ def _on_flat(problem: Problem) -> Problem:
     return replace(problem, basis=basis, finer=problem if head else None)
 
 
-def _flat(basis: Basis) -> Array:
-    return basis.flat if isinstance(basis, LinesBasis | DirectedLines) else basis.white  # type: ignore[attr-defined]
+def _flat(basis: Basis, powers: float | Array) -> Array:
+    family: Any = basis  # each has one of these
+    if np.ndim(powers) == 1:
+        return np.asarray(family.spread(powers))
+    return powers * (family.flat if isinstance(basis, LinesBasis | DirectedLines) else family.white)
 
 
 def _check_excites(problem: Problem, start: Array) -> None:

@@ -34,8 +34,9 @@ _PROGRESS = 1e-5
 _STAGE_TOLERANCE = 1e-2
 _STAGE_ROUNDS = 10
 _MOST_ROWS = 12
-# Rounds without a tenth of progress after which rounding has the last word.
-_PATIENCE = 6
+# Rounds without a tenth of progress after which rounding has the last word. A basis that still grows may
+# take several to find the sinusoids that pay.
+_PATIENCE, _PATIENCE_GROWING = 6, 16
 
 Enough = Callable[[float, float], bool]
 
@@ -70,8 +71,8 @@ class ExchangeResult:
 
     @property
     def gap(self) -> float:
-        """(objective - bound) / objective."""
-        difference = max(self.objective - self.certificate.bound, 0.0)
+        """|objective - bound| / objective: a bound beyond the objective is as wrong as one far below."""
+        difference = abs(self.objective - self.certificate.bound)
         return difference / self.objective if self.objective > 0 else 0.0
 
 
@@ -108,7 +109,9 @@ def exchange(
             rounds += 1
             solved = state.improve(tolerance)
             gaps.append(state.gap)
-            stalled = len(gaps) > _PATIENCE and gaps[-1] > 0.9 * gaps[-1 - _PATIENCE]
+            grows = state.problem.basis.size > stage.basis.size
+            patience = _PATIENCE_GROWING if grows else _PATIENCE
+            stalled = len(gaps) > patience and gaps[-1] > 0.9 * gaps[-1 - patience]
             if not solved or state.gap <= goal or stalled:
                 break
             if done(state.best.objective, state.certificate.bound):

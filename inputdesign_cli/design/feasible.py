@@ -8,12 +8,14 @@ import numpy as np
 
 from inputdesign_cli.design.candidate import least_scale, missing_floor, scaled_up
 from inputdesign_cli.design.exchange import ExchangeResult, exchange
+from inputdesign_cli.design.limits import PowerLimit
 from inputdesign_cli.design.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
 
 _TOLERANCE = 1e-6
 _ROOM = 0.8
+_PLENTY = 1e4
 
 
 class UnreachableError(Exception):
@@ -62,6 +64,13 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
     if not asked:
         return problem.basis, within if within is not None else start * (0.5 / least_scale(factor, start))
     found = exchange(factor, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
+    if found.objective >= 1.0 > found.certificate.bound and problem.goal == "cost":
+        # Undecided: the limits alone leave some combination of the inputs free. With a cap on all it is not.
+        most = scaled_up(replace(problem, limits=(), densities=()), start, 1.0, []).z
+        total = problem.power("excitation").at(most)
+        capped = replace(factor, limits=(*factor.limits, PowerLimit("excitation", _PLENTY * total)))
+        again = exchange(capped, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
+        found = again if again.objective < 1.0 else found
     if found.objective >= 1.0:
         raise UnreachableError(factor, found, limits_alone=False)
     if within is None:

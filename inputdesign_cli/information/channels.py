@@ -146,8 +146,11 @@ class ChannelExperiment(Coordinates):
         probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
         return ~np.any(probe > 0, axis=(0, 2, 3))
 
-    def whitened(self, power: float) -> ChannelExperiment:
-        """The same experiment in coordinates where M = I by this power, even over band and channels.
+    def whitened(self, power: float | Array) -> ChannelExperiment:
+        """The same experiment in coordinates where M = I by this power, flat over the band.
+
+        Args:
+            power: of all channels together, which share it evenly, or (r,) of each.
 
         Raises:
             SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
@@ -155,8 +158,10 @@ class ChannelExperiment(Coordinates):
         rule = band_quadrature(self.singularities, self.band)
         raw = replace(self, factor=None)
         width = (self.band[1] - self.band[0]) / np.pi
-        level = power * self.samples / (self.inputs * width)
-        rows = [_rows(raw.excitation_gradient(rule.nodes), rule.weights * level)]
+        total = float(np.sum(power))
+        shares = np.sqrt(np.asarray(power) * self.inputs / total) if np.ndim(power) else 1.0
+        level = total * self.samples / (self.inputs * width)
+        rows = [_rows(raw.excitation_gradient(rule.nodes) * shares, rule.weights * level)]
         if not self.model.continuous and not np.all(self._silent):
             around = band_quadrature(self.singularities, (0.0, np.pi))
             rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))

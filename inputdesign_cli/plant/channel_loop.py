@@ -73,8 +73,10 @@ class ChannelLoop(ABC):
         Raises:
             SpecError: `unstable-loop` or `algebraic-loop`.
         """
-        spread = np.linalg.svd(self.instantaneous, compute_uv=False)
-        if spread[-1] < _WELL_POSED * spread[0]:
+        p, leading = self.model.outputs, self.instantaneous
+        # det(I + C G) is the product of 1 + these eigenvalues, which do not depend on the units of u and y.
+        gains = np.linalg.eigvals(-leading[:p, p:] @ np.linalg.solve(leading[p:, p:], leading[p:, :p]))
+        if np.min(np.abs(1.0 + gains) / (1.0 + np.abs(gains))) < _WELL_POSED:
             raise bad_spec(
                 "algebraic-loop",
                 "plant and controller both act without delay and det(I + C G) vanishes at infinite frequency",

@@ -14,8 +14,11 @@ ComplexArray = NDArray[np.complex128]
 
 
 def unit_circle(w: ArrayLike) -> ComplexArray:
-    """q^-1 at normalised frequencies `w` (rad/sample), same shape."""
-    return np.exp(-1j * np.asarray(w, dtype=float))
+    """q^-1 at normalised frequencies `w` (rad/sample), same shape.
+
+    With w - j rho it is on a circle of radius e^-rho: the transform of signals weighted with e^(-rho t).
+    """
+    return np.exp(-1j * np.asarray(w))
 
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:

@@ -92,14 +92,14 @@ class SampledChannels(WhiteNoise):
         raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
-        z = np.exp(1j * np.asarray(w, dtype=float))
+        z = np.exp(1j * np.asarray(w))
         G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
         for (i, j), entry in self._entries.items():
             G[:, i, j] = entry.direct + entry.states(z) @ entry.gain
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        z = np.exp(1j * np.asarray(w, dtype=float))
+        z = np.exp(1j * np.asarray(w))
         parameters = self.continuous_plant.parameters
         gradient = np.zeros((z.size, len(parameters), self.outputs, self.inputs), dtype=complex)
         states = {place: entry.states(z) for place, entry in self._entries.items()}

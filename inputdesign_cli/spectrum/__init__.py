@@ -8,6 +8,7 @@ from inputdesign_cli.spectrum.basis import pointwise_scale as pointwise_scale
 from inputdesign_cli.spectrum.channels import best_directions as best_directions
 from inputdesign_cli.spectrum.channels import directed_scale as directed_scale
 from inputdesign_cli.spectrum.channels import first_directions as first_directions
+from inputdesign_cli.spectrum.channels import matrices as matrices
 from inputdesign_cli.spectrum.directed_lines import DirectedLines as DirectedLines
 from inputdesign_cli.spectrum.fir import FirBasis as FirBasis
 from inputdesign_cli.spectrum.flat import FlatBasis as FlatBasis

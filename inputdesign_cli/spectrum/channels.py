@@ -44,7 +44,7 @@ def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
     """
     P, V = matrices(price), matrices(value)
     r = P.shape[-1]
-    P = P + _SINGULAR * np.trace(P, axis1=1, axis2=2).real.max(initial=0.0) * np.eye(r)
+    P = P + _SINGULAR * np.eye(r) * np.einsum("naa->na", P).real.max(axis=0, initial=0.0)
     inverse = np.linalg.inv(np.linalg.cholesky(P))
     ratios, vectors = np.linalg.eigh(inverse @ V @ inverse.conj().swapaxes(1, 2))
     directions = (inverse.conj().swapaxes(1, 2) @ vectors[..., -1:])[..., 0]
@@ -75,11 +75,15 @@ def directed_scale(
     return (np.inf if top <= 0 else 1.0 / top), peaks, heights, directions
 
 
-def first_directions(inputs: int) -> ComplexArray:
-    """(number, r): along each channel, and along each pair of channels in phase and in counterphase."""
-    axes = np.eye(inputs)
-    both = [(axes[i], sign * axes[j]) for i in range(inputs) for j in range(i) for sign in (1.0, -1.0)]
-    return np.array([*axes, *((one + other) / np.sqrt(2.0) for one, other in both)], dtype=complex)
+def first_directions(units: Array) -> ComplexArray:
+    """(number, r): along each channel, and along each pair of channels in phase and in counterphase.
+
+    Of a pair each takes part in proportion to its unit (r,); directions have length one.
+    """
+    axes = np.diag(units)
+    both = [axes[i] + sign * axes[j] for i in range(len(units)) for j in range(i) for sign in (1.0, -1.0)]
+    found = np.array([*axes, *both], dtype=complex)
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
 def leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:

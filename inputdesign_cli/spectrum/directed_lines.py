@@ -26,13 +26,16 @@ _SAME = 1e-12
 # An atom is in use from this share of the cost, and near another within this distance (band and turn).
 _USED = 1e-4
 _NEAR = 0.2
+# What hardly counts among limits that are not all there is to pay keeps a finite unit.
+_FREE = 1e-12
 
 
 @dataclass(frozen=True)
 class DirectedLines:
     """The unknowns are the powers of atoms: sinusoids at `frequencies` (L,) along `directions` (L, r).
 
-    Directions have length one, so that the power is the total over the channels. The basis grows by
+    Directions have length one, so that the power is the total over the channels; they are told apart in
+    `units` (r,) of the channels. The basis grows by
     the atoms that would pay: anywhere on the grid when `free`, else at `allowed` frequencies with any
     direction. Prices then hold for every spectrum, or for every spectrum on those lines.
     """
@@ -40,6 +43,7 @@ class DirectedLines:
     frequencies: Array
     directions: ComplexArray
     allowed: Array
+    units: Array
     free: bool = False
 
     @classmethod
@@ -52,8 +56,16 @@ class DirectedLines:
     @classmethod
     def at(cls, frequencies: Array, inputs: int) -> DirectedLines:
         """Lines at these frequencies, to begin with along each channel and pair of channels."""
-        start = first_directions(inputs)
-        return cls(np.repeat(frequencies, len(start)), np.tile(start, (frequencies.size, 1)), frequencies)
+        even = np.zeros((frequencies.size, inputs), dtype=complex)
+        return cls(frequencies, even, frequencies, np.ones(inputs)).in_units(np.ones(inputs))
+
+    def in_units(self, units: Array) -> DirectedLines:
+        """The first lines once more, with directions that suit channels of these units (r,)."""
+        start = first_directions(units)
+        w = self.allowed
+        return replace(
+            self, frequencies=np.repeat(w, len(start)), directions=np.tile(start, (w.size, 1)), units=units
+        )
 
     @property
     def size(self) -> int:
@@ -66,8 +78,12 @@ class DirectedLines:
     @property
     def flat(self) -> Array:
         """(L,): power one spread evenly over the lines and channels."""
-        axes = np.max(np.abs(self.directions), axis=1) > 1.0 - _SAME
-        return axes / np.sum(axes)
+        return self.spread(np.full(self.inputs, 1.0 / self.inputs))
+
+    def spread(self, powers: Array) -> Array:
+        """(L,): these powers (r,) of the channels, uncorrelated, each spread evenly over the lines."""
+        axes = np.abs(self.directions) > 1.0 - _SAME
+        return axes @ (powers / np.sum(axes, axis=0))
 
     def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
         """(L, ...): v^* D(w) v, what an atom of power one picks up."""
@@ -82,7 +98,10 @@ class DirectedLines:
 
     def first_face(self, price: Functional) -> Face:
         """All atoms, in units of their price."""
-        return Face(np.diag(1.0 / price.vector), "nonnegative", self.size, self.frequencies)
+        least = _FREE * price.vector.max()
+        return Face(
+            np.diag(1.0 / np.maximum(price.vector, least)), "nonnegative", self.size, self.frequencies
+        )
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction)."""
@@ -125,7 +144,7 @@ class DirectedLines:
         for atom in atoms if used.size else []:
             w, v = float(atom[0].real), atom[1:]
             apart = np.abs(self.frequencies[used] - w) / span
-            turned = 1.0 - np.abs(self.directions[used].conj() @ v) ** 2
+            turned = 1.0 - self._alike(self.directions[used], v)
             distance = np.where(self.free | (apart == 0.0), apart + turned, np.inf)
             nearest = used[int(np.argmin(distance))]
             if distance.min() > _NEAR:
@@ -142,7 +161,13 @@ class DirectedLines:
 
     def _is_new(self, frequency: float, direction: ComplexArray) -> bool:
         near = np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300)
-        return not np.any(np.abs(self.directions[near].conj() @ direction) ** 2 > 1.0 - _SAME)
+        return not np.any(self._alike(self.directions[near], direction) > 1.0 - _SAME)
+
+    def _alike(self, directions: ComplexArray, direction: ComplexArray) -> Array:
+        """(n,): squared cosines between directions, in the units of the channels."""
+        one, other = directions / self.units, direction / self.units
+        size = np.linalg.norm(one, axis=1) * np.linalg.norm(other)
+        return np.abs(one.conj() @ other / size) ** 2
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
         """Frequencies (number,) with power, ascending, and their power matrices (number, r, r)."""

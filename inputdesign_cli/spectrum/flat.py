@@ -31,6 +31,10 @@ class FlatBasis:
         """(1,): power one."""
         return np.ones(1)
 
+    def spread(self, powers: Array) -> Array:
+        """(1,): their sum; what a channel has alone is not of this family."""
+        return np.array([np.sum(powers)])
+
     @property
     def level(self) -> float:
         """Each diagonal entry of Phi at power one."""

@@ -54,6 +54,15 @@ class GramBasis(ABC):
         """G (n, n) with tr(G Q) = vector . x for the x of any Gram matrix Q."""
 
     @abstractmethod
+    def spread(self, powers: Array) -> Array:
+        """(size,): flat excitation with these powers (r,) of the channels, uncorrelated."""
+
+    @property
+    def white(self) -> Array:
+        """(size,): flat excitation of total power one, even over the channels."""
+        return self.spread(np.full(self.inputs, 1.0 / self.inputs))
+
+    @abstractmethod
     def products(self, generators: NDArray) -> Array:
         """(size, q (q + 1) / 2): x of each pair of generators (n, q), as svec orders and scales pairs."""
 
@@ -82,12 +91,14 @@ class GramBasis(ABC):
         over frequency, which is valid too, stands in.
         """
         metric, worth = self.gram(price.vector), self.gram(value.vector)
+        unit = _units(metric)
+        metric, worth = metric / np.outer(unit, unit), worth / np.outer(unit, unit)
         spread = np.linalg.eigvalsh(metric)
         if spread[0] <= _SINGULAR_PRICE * spread[-1]:
             _, vectors = leading_pairs(worth - metric, np.eye(len(metric)), _DIRECTIONS)
-            return Pricing(directed_scale(price, value, grid)[0], vectors)
+            return Pricing(directed_scale(price, value, grid)[0], vectors / unit[:, None])
         ratios, vectors = leading_pairs(worth, metric, _DIRECTIONS)
-        return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors)
+        return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors / unit[:, None])
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[Self, Face]:
         """Keep the generators that the solution uses, add the `directions` (n, number)."""
@@ -98,7 +109,7 @@ class GramBasis(ABC):
         kept = eigenvalues > _KEPT * eigenvalues[-1]
         kept[:-_MOST_KEPT] = False
         used = np.pad(face.generators @ vectors[:, kept], ((0, n - known), (0, 0)))
-        return self, self._face(_independent(np.concatenate([used, directions], axis=1)), price)
+        return self, self._face(np.concatenate([used, directions], axis=1), price)
 
     def factor(self, face: Face, y: Array) -> NDArray:
         """H (n, q) with Q = H H^*."""
@@ -108,9 +119,18 @@ class GramBasis(ABC):
     def _face(self, spanning: NDArray, price: Functional) -> Face:
         """Generators orthonormal in the metric of the price, so that the cost is tr Y."""
         gram = self.gram(price.vector)[: len(spanning), : len(spanning)]
-        values, vectors = np.linalg.eigh((spanning.conj().T @ gram @ spanning).real)
-        generators = spanning @ (vectors / np.sqrt(np.maximum(values, _SINGULAR_PRICE * values[-1])))
+        unit = _units(gram)
+        basis = _independent(unit[:, None] * spanning)
+        values, vectors = np.linalg.eigh((basis.conj().T @ (gram / np.outer(unit, unit)) @ basis).real)
+        scaled = basis @ (vectors / np.sqrt(np.maximum(values, _SINGULAR_PRICE * values[-1])))
+        generators = scaled / unit[:, None]
         return Face(self.products(generators), "psd", generators.shape[1], generators)
+
+
+def _units(metric: NDArray) -> Array:
+    """(n,): roots of the diagonal, so that nothing depends on the units of the channels."""
+    diagonal = np.diag(metric).real
+    return np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
 
 
 def _independent(vectors: NDArray) -> NDArray:

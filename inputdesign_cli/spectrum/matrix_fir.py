@@ -28,13 +28,12 @@ class MatrixFirBasis(GramBasis):
     def size(self) -> int:
         return svec_length(self.inputs) + self.order * self.inputs**2
 
-    @property
-    def white(self) -> Array:
-        """(size,): white excitation of total power one, even over the channels."""
+    def spread(self, powers: Array) -> Array:
+        """(size,): white excitation with these powers (r,) of the channels, uncorrelated."""
         rows, columns, _ = svec_layout(self.inputs)
-        unit = np.zeros(self.size)
-        unit[: rows.size] = (rows == columns) / self.inputs
-        return unit
+        flat = np.zeros(self.size)
+        flat[: rows.size] = np.where(rows == columns, powers[rows], 0.0)
+        return flat
 
     def of_order(self, order: int) -> MatrixFirBasis:
         return MatrixFirBasis(self.inputs, order)
@@ -105,7 +104,7 @@ class MatrixFirBasis(GramBasis):
         rows, columns, _ = svec_layout(r)
         lags = np.arange(self.order + 1)
         out = np.zeros((self.size, left.size))
-        tail = out[rows.size :].reshape(self.order, r, r, -1)
+        tail = out[rows.size :].reshape(self.order, r, r, left.size)
         for i in range(r):
             for j in range(r):
                 product = transform[:, i][:, left] * transform[:, j][:, right].conj()

@@ -44,11 +44,10 @@ class PolynomialBasis(GramBasis):
         n = self.gram_order
         return n * n if self.hermitian else svec_length(n)
 
-    @property
-    def white(self) -> Array:
-        """(size,): the spectrum of total power one, flat over band and channels."""
+    def spread(self, powers: Array) -> Array:
+        """(size,): the spectrum with these powers (r,) of the channels, uncorrelated, flat over the band."""
         flat = np.zeros((self.gram_order, self.gram_order))
-        flat[: self.inputs, : self.inputs] = 2.0 / self.inputs * np.eye(self.inputs)
+        flat[: self.inputs, : self.inputs] = 2.0 * np.diag(powers)
         return hvec(flat.astype(complex)) if self.hermitian else svec(flat)
 
     def of_order(self, order: int) -> PolynomialBasis:

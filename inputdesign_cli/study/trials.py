@@ -12,6 +12,7 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import error_bound
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import (
     BatchEstimate,
     ChannelBatch,
@@ -174,7 +175,10 @@ def settled(
     """
     theta, information, converged = found.theta, found.information, found.converged.copy()
     for run in np.flatnonzero(~converged):
-        other = again(int(run))
+        try:
+            other = again(int(run))
+        except SpecError:  # the noise of this run leaves some parameter without an estimate
+            continue
         theta[run], information[run], converged[run] = other.theta, other.information, other.converged
     if prior is not None:
         theta = _with_prior(theta, information, prior, truth, rng)

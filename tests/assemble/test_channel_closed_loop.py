@@ -122,3 +122,12 @@ def test_a_matrix_around_one_channel_is_refused():
             "experiment: {controller: {numerator: [[[0.1]]]}}\n"
         )
     assert [complaint.code for complaint in caught.value.complaints] == ["wrong-shape"]
+
+
+def test_the_units_of_the_loop_do_not_make_it_algebraic():
+    """u1 in millionths, u2 in millions: the gains differ by 1e12, the loop is the same and has its delay."""
+    scaled = changed(
+        "plant.B=[[[0, 1.0e+6, 0.4e+6], [0, -0.3e-6]], [[0, 0.4e+6], [0, 1.2e-6, -0.5e-6]]]",
+        "experiment.controller.numerator=[[[0.3e-6, -0.25e-6], [0]], [[0], [0.3e+6, -0.2e+6]]]",
+    )
+    build_channel_task(scaled)

@@ -283,3 +283,18 @@ def test_free_power_near_dc_is_noted(flexible):
     assert "notes" not in capped
     assert capped["power"]["excitation"][0] <= 20 * (1 + 1e-9)
     assert capped["cost"] == pytest.approx(6.556636, rel=2e-2)
+
+
+def test_what_only_noise_tells_is_out_of_reach_of_any_power():
+    """Of y = G u + (1 - 0.5 q^-1) e the variance of c1 is (1 - 0.5^2) / N, whatever u is."""
+    spec = parse_spec(
+        "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.5], variance: 1.0}\n"
+        "experiment: {samples: 500}\naccuracy: {standard_deviation: {c1: 0.01}}\n"
+        "spectrum: {type: fir, order: 3}\n"
+    )
+    with pytest.raises(InfeasibleError) as caught:
+        solve(spec)
+    (complaint,) = caught.value.complaints
+    ratio = np.sqrt((1 - 0.25) / 500) / 0.01
+    assert f"{ratio:.6g} times what is asked" in complaint.message
+    assert f"{ratio**2:.4g} times as many samples" in complaint.hint

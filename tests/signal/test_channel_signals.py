@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arx, paper_experiment
+from channel_plants import arrays, arx, paper_experiment
 
 from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.plant import MatrixController, PolynomialChannels, PolynomialLoop
 from inputdesign_cli.signal import (
     Lines,
+    RecordFilter,
     channel_outputs,
     channel_record_information,
     grid_lines,
@@ -115,3 +117,41 @@ def test_a_long_record_in_continuous_time_has_the_information_of_its_spectrum():
     expected = np.einsum("nklab,nba->kl", densities, lines.powers).real
     ours = channel_record_information(experiment, record, step) / len(record)
     np.testing.assert_allclose(ours, expected, atol=0.02 * np.abs(expected).max())
+
+
+SLOW = PolynomialChannels(
+    arrays([[[0, 1.0, 0.4], [0, 0.3]], [[0, 0.5], [0, 1.2]]]),
+    (np.array([1.0, -0.99999]), np.array([1.0, -0.5])),
+    arrays([[[1.0], [1.0]], [[1.0], [1.0, -1.9, 0.9995]]]),
+    (np.ones(1),),
+    (np.ones(1),),
+    np.eye(2),
+)
+
+
+def test_a_plant_that_remembers_longer_than_the_record_is_filtered_exactly():
+    """An almost integrating and a lightly damped entry, against the difference equations."""
+    u = np.random.default_rng(0).standard_normal((300, 2))
+    plant = RecordFilter(ChannelExperiment(SLOW, 300), 300, 1.0)
+    wanted = np.zeros((300, 2))
+    for i in range(2):
+        right = sum(scipy.signal.lfilter(SLOW.B[i][j], SLOW.F[i][j], u[:, j]) for j in range(2))
+        wanted[:, i] = scipy.signal.lfilter([1.0], SLOW.A[i], right)
+    np.testing.assert_allclose(plant.signals("output", u), wanted, atol=1e-11 * np.abs(wanted).max())
+    v = np.random.default_rng(1).standard_normal((300, 2))
+    assert np.sum(plant.adjoint("output", v) * u) == pytest.approx(np.sum(wanted * v), rel=1e-10)
+
+
+def test_a_slow_loop_is_filtered_exactly_and_at_once():
+    """Integrators of gain 1e-5 settle in a million samples; the record has 200."""
+    model = arx()
+    gains = 1e-5 * np.linalg.inv(model.plant_at(np.zeros(1))[0].real)
+    controller = MatrixController.build([[[g] for g in row] for row in gains], [[[1, -1]] * 2] * 2)
+    loop = PolynomialLoop(model, controller)
+    loop.check_stability()
+    r = np.random.default_rng(1).standard_normal((200, 2))
+    plant = RecordFilter(ChannelExperiment(model, 200, loop=loop), 200, 1.0)
+    y, u = loop.signals(r, np.zeros((200, 2)))
+    np.testing.assert_allclose(plant.signals("output", r), y, atol=1e-10)
+    np.testing.assert_allclose(plant.signals("input", r), u, atol=1e-10)
+    assert plant._length <= 2048

@@ -305,3 +305,17 @@ def test_the_design_reaches_the_cramer_rao_bound():
     ratios = np.array(list(simulation["inputs"]["design"]["rms_over_theory"].values()))
     # The error of one ratio of 500 runs is 3.2 %; the rms over ten parameters is within 5 %.
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_run_that_tells_too_little_is_counted_not_fatal():
+    """Poles so fast, and noise so strong, that some runs see a plant that answers at once."""
+    spec = parse_spec(
+        "plant:\n"
+        "  continuous: {numerator: [[[1.3]], [[1.6]]], denominator: [[[1, 1.8]], [[1, 1.9]]]}\n"
+        "  sample: zoh\n"
+        "noise: {variance: [[16000, 10000], [10000, 17000]]}\nexperiment: {samples: 200}\n"
+        "accuracy: {criterion: E}\nlimits: {input_power: 2}\nspectrum: {type: fir, order: 4}\n"
+        "signal: {type: multisine, candidates: 1}\nsimulation: {runs: 10, seed: 1}\n"
+    )
+    entry = simulate(spec).result["simulation"]["inputs"]["design"]
+    assert 0 < entry["not_converged"] <= 10
