@@ -24,7 +24,7 @@ run: $(READY)  ## solve specs/first_order.yaml into runs/first_order
 	$(PY) -m inputdesign_cli solve specs/first_order.yaml -o runs/first_order
 
 test: $(READY)  ## the tests, but for the slow ones
-	$(PY) -m pytest
+	$(PY) -m pytest -n auto --maxprocesses 4
 
 slow: $(READY)  ## the slow tests: random plants, Monte Carlo
 	$(PY) -m pytest -m slow
