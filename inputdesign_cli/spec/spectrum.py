@@ -121,13 +121,16 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
 
     @model_validator(mode="after")
     def _sizes(self) -> GivenMultisine:
-        rows = self.amplitudes if depth(self.amplitudes) == 2 else (self.amplitudes,)
+        several = depth(self.amplitudes) == 2
+        rows = self.amplitudes if several else (self.amplitudes,)
         for row in rows:
             if isinstance(row, tuple) and len(row) != len(self.frequencies):
                 raise fail(
                     "wrong-shape",
                     f"{{key}} holds {len(row)} amplitudes for {len(self.frequencies)} frequencies",
-                    "write one amplitude per frequency",
+                    "write one list per input, with one amplitude per frequency"
+                    if several
+                    else "write one amplitude per frequency",
                     "amplitudes",
                 )
         return self
