@@ -248,6 +248,11 @@ def _notes(spec: Spec, design: Design) -> list[str]:
     """What a user should know before trusting a number."""
     found, problem = design.result, design.problem
     notes = []
+    if not found.x.any():
+        sources = ["the noise in normal operation"] if spec.closed_loop else []
+        sources += ["experiment.prior"] if spec.experiment.prior is not None else []
+        known = " and ".join(sources) or "the noise"
+        notes.append(f"no excitation is needed: what {known} tells of the parameters meets the accuracy")
     if spec.closed_loop and isinstance(found.basis, LinesBasis | DirectedLines) and found.x.any():
         frequencies, power = found.basis.frequencies, found.x
         price = found.basis.integrals(problem.price.density, problem.experiment.singularities)

@@ -129,6 +129,8 @@ def _saving(result: Result) -> str:
         return f"   (white noise of the same power: {white['value']:.7g}, {white['ratio']:.3g} times as much)"
     if "cost" not in white or "ratio" not in white:
         return ""
+    if not white["cost"]:
+        return ""
     return f"   (white excitation: {white['cost']:.7g}, {white['ratio']:.3g} times as much)"
 
 

@@ -112,7 +112,7 @@ def _answer(result: Result) -> str:
     else:
         said = sentence.format(f"{value:.6g}")
     white = result.get("baseline", {}).get("white", {})
-    if kind == "least_cost" and {"ratio", "cost"} <= set(white):
+    if kind == "least_cost" and {"ratio", "cost"} <= set(white) and white["cost"]:
         said += f"; white excitation of the same accuracy costs {white['cost']:.6g}, "
         said += f"{white['ratio']:.3g} times as much"
     elif kind == "shortest_experiment" and "samples" in white:

@@ -1,9 +1,12 @@
 """Specs with limits, criteria and further requirements: results, messages, and what they promise."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve, validate
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError, InfeasibleError, SpecError
 
 PLANT = """
@@ -298,3 +301,21 @@ def test_what_only_noise_tells_is_out_of_reach_of_any_power():
     ratio = np.sqrt((1 - 0.25) / 500) / 0.01
     assert f"{ratio:.6g} times what is asked" in complaint.message
     assert f"{ratio**2:.4g} times as many samples" in complaint.hint
+
+
+@pytest.mark.parametrize(
+    ("spec", "overrides", "said"),
+    [
+        (
+            "first_order",
+            ["experiment.prior={information: [[1e9,0,0],[0,1e9,0],[0,0,1e9]]}"],
+            "experiment.prior",
+        ),
+        ("flexible_transmission", ["accuracy={model_error: {relative: 1000}}"], "noise in normal operation"),
+    ],
+)
+def test_what_is_known_already_may_be_enough(spec, overrides, said):
+    result = solve(load_spec(f"specs/{spec}.yaml", [*overrides, "spectrum.order=3"])).result
+    assert (result["status"], result["cost"]) == ("nothing_needed", 0.0)
+    assert said in result["notes"][0]
+    assert "times as much" not in summary(result, "s", [Path("spec.yaml")])
