@@ -12,7 +12,6 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from inputdesign_cli.spectrum import Functional
 from inputdesign_cli.spectrum.svec import svec_layout
 
 
@@ -37,18 +36,19 @@ class Spectral:
         """(x, weight): the optimum, and for E the multiplier of the smallest eigenvalue."""
         L = self.experiment.factor
         k = len(L)
-        face = self.basis.first_face(Functional(self.limits[0] + self.limits[1], None))
-        Y = cp.Variable((face.order, face.order), PSD=True)
-        rows, columns, scale = svec_layout(face.order)
-        picked = cp.multiply(scale, cp.vec(Y, order="C")[rows * face.order + columns])
+        products = self.basis.products(self._generators())
+        order = self._generators().shape[1]
+        Y = cp.Variable((order, order), PSD=True)
+        rows, columns, scale = svec_layout(order)
+        picked = cp.multiply(scale, cp.vec(Y, order="C")[rows * order + columns])
         M = cp.Variable((k, k), symmetric=True)
         upper = np.triu_indices(k)
         flat = upper[0] * k + upper[1]
-        gains = self.maps.reshape(len(self.maps), -1).T[flat] @ face.columns
+        gains = self.maps.reshape(len(self.maps), -1).T[flat] @ products
         link = cp.vec(M, order="C")[flat] == gains @ picked
         gauge = np.linalg.inv(L.T @ L)
         unit = gauge / np.linalg.norm(gauge, 2)
-        constraints = [link, *((limit @ face.columns) @ picked <= 1 for limit in self.limits)]
+        constraints = [link, *((limit @ products) @ picked <= 1 for limit in self.limits)]
         if criterion == "D":
             objective = cp.log_det(M)
         elif criterion == "A":
@@ -62,7 +62,7 @@ class Spectral:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL)
-        x = face.columns @ picked.value
+        x = products @ picked.value
         x = x / max(limit @ x for limit in self.limits)
         weight = None
         if criterion == "E":
@@ -72,6 +72,15 @@ class Spectral:
             weight = (vectors * np.maximum(values, 0)) @ vectors.T
             weight /= np.trace(weight)
         return x, weight
+
+    def _generators(self):
+        """(n, order): all of them, orthonormal in the metric of the limits."""
+        whole = np.eye(self.basis.gram_order)
+        if self.basis.hermitian:
+            whole = np.concatenate([whole, 1j * whole], axis=1)
+        metric = self.basis.gram(self.limits[0] + self.limits[1])
+        values, vectors = np.linalg.eigh((whole.conj().T @ metric @ whole).real)
+        return whole @ (vectors / np.sqrt(values))
 
     def value(self, x, criterion):
         values = np.linalg.eigvalsh(self.information(x))
