@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -92,7 +92,7 @@ def channel_drawer(spec: Spec, design: Design, samples: int) -> ChannelDrawer:
     step = record_step(spec)
     lo, hi = excitation_band(spec)
     return ChannelDrawer(
-        lambda period, hold: design_lines(design, period, hold * step),
+        DesignLines(design.result.basis, design.result.x, step),
         build_channel_recipe(spec),
         samples,
         band=(lo * step, hi * step),
@@ -158,18 +158,27 @@ def _angles(
     return lowered
 
 
-def design_lines(design: Design, period: int, step: float) -> Lines:
-    """The sinusoids that stand for the design in a period of values `step` apart."""
-    basis, x = design.result.basis, design.result.x
-    if isinstance(basis, LinesBasis):
-        order = np.argsort(basis.frequencies)
-        order = order[x[order] > 0]
-        return merged(Lines(basis.frequencies[order] * step, x[order, None, None].astype(complex)), period)
-    if isinstance(basis, DirectedLines):
-        frequencies, found = basis.lines(x)
-        return merged(Lines(frequencies * step, found), period)
-    w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
-    return grid_lines(basis.density(x, w), period, step)  # type: ignore[attr-defined]
+@dataclass(frozen=True)
+class DesignLines:
+    """The sinusoids that stand for a spectrum of values `step` apart; other processes can have it."""
+
+    basis: Any
+    x: Array
+    step: float
+
+    def __call__(self, period: int, hold: int = 1) -> Lines:
+        """Those of a period of so many values, each held for `hold` samples; in rad per value."""
+        basis, x, step = self.basis, self.x, hold * self.step
+        if isinstance(basis, LinesBasis):
+            order = np.argsort(basis.frequencies)
+            order = order[x[order] > 0]
+            powers = x[order, None, None].astype(complex)
+            return merged(Lines(basis.frequencies[order] * step, powers), period)
+        if isinstance(basis, DirectedLines):
+            frequencies, found = basis.lines(x)
+            return merged(Lines(frequencies * step, found), period)
+        w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
+        return grid_lines(basis.density(x, w), period, step)
 
 
 def channel_signal_entry(
@@ -193,7 +202,9 @@ def channel_signal_entry(
     elif np.isfinite(record.worst_ratio):
         entry["worst_ratio"] = record.worst_ratio
     entry["extra_power"] = record.extra_power
-    entry["spectrum_error"] = channel_spectrum_error(design_lines(design, len(samples), step), samples)
+    entry["spectrum_error"] = channel_spectrum_error(
+        DesignLines(design.result.basis, design.result.x, step)(len(samples)), samples
+    )
     return entry | applied_entry(spec, samples)
 
 

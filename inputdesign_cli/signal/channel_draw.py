@@ -24,6 +24,11 @@ from inputdesign_cli.signal.sinusoids import select
 Angles = Callable[[Lines, int, np.random.Generator], Array | None]
 
 
+def uniform(lines: Lines, values: int, rng: np.random.Generator) -> Array | None:
+    """Phases are drawn uniformly: no angles are set."""
+    return None
+
+
 @dataclass(frozen=True)
 class ChannelDrawer:
     """Draws records of `samples` samples.
@@ -41,7 +46,7 @@ class ChannelDrawer:
     samples: int
     band: tuple[float, float] = (0.0, np.pi)
     phases: ChannelPhases = "orthogonal"
-    angles: Angles = lambda lines, values, rng: None
+    angles: Angles = uniform
 
     @property
     def period(self) -> int:

@@ -252,10 +252,20 @@ class Elsewhere:
             yield Finished(task, pickle.loads(pickle.dumps(there(task))))
 
 
-def test_the_result_does_not_depend_on_where_it_is_computed():
-    overrides = [GIVEN, "simulation={runs: 60, seed: 5}"]
-    here = simulate(load_spec(SPEC, overrides)).result["simulation"]
-    there = simulate(load_spec(SPEC, overrides), executor=Elsewhere()).result["simulation"]
+@pytest.mark.parametrize(
+    ("spec", "overrides"),
+    [
+        (SPEC, [GIVEN]),
+        (SPEC, ["spectrum.order=2"]),
+        (SPEC, ["spectrum.order=2", "signal.type=binary"]),
+        (SPEC, ["spectrum={type: multisine, lines: 8}"]),
+        ("specs/motor_loop.yaml", ["spectrum.order=3"]),
+    ],
+)
+def test_the_result_does_not_depend_on_where_it_is_computed(spec, overrides):
+    overrides = [*overrides, "simulation={runs: 30, seed: 5}"]
+    here = simulate(load_spec(spec, overrides)).result["simulation"]
+    there = simulate(load_spec(spec, overrides), executor=Elsewhere()).result["simulation"]
     assert here["inputs"]["design"]["mean_estimate"] == there["inputs"]["design"]["mean_estimate"]
 
 
