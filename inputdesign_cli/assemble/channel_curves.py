@@ -32,6 +32,7 @@ from inputdesign_cli.spectrum import (
     MatrixFirBasis,
     PolynomialBasis,
     best_directions,
+    matrices,
 )
 
 _POINTS = 1000
@@ -183,7 +184,11 @@ def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | 
         return None
     basis, x = anything.basis, anything.x
     assert isinstance(basis, LinesBasis | DirectedLines)
-    support = np.unique(basis.frequencies[x > _SUPPORT * x.sum()])
+    directions = basis.directions if isinstance(basis, DirectedLines) else np.ones((x.size, 1))
+    unit_price = matrices(price.density(basis.frequencies))
+    # By what is paid, not by power: power is almost free near DC in a loop with integral action.
+    paid = x * np.einsum("na,nab,nb->n", directions.conj(), unit_price, directions).real
+    support = np.unique(basis.frequencies[paid > _SUPPORT * paid.sum()])
     lo, hi = design.problem.experiment.band
     start = max(lo, 1e-3 * hi)
     w = np.union1d(np.geomspace(start, hi, _POINTS), support[support >= start])
