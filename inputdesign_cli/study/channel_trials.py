@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Absolute, EntryError, NormError
 from inputdesign_cli.assemble.channel_estimation import estimated, estimated_runs, moved, simulated
@@ -14,41 +13,18 @@ from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.study.channel_excitations import ChannelExcitation
 from inputdesign_cli.study.trials import settled
-from inputdesign_cli.study.verdict import Promise
+from inputdesign_cli.study.verdict import Promise, Trials
 
 
 @dataclass(frozen=True)
-class ChannelTrials:
-    """What the runs gave.
+class ChannelTrials(Trials):
+    """Runs with several channels or in s; the structure of `model` was estimated."""
 
-    Attributes:
-        model: of which the structure was estimated.
-        theta: (runs, k) estimates; `converged` (runs,).
-        power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
-        total_power: mean squares of inputs and outputs, noise included.
-        first: (samples, r) the excitation of the first run.
-    """
-
-    true: ChannelExperiment
     model: ChannelModel
-    theta: Array
-    converged: NDArray[np.bool_]
-    power: dict[str, list[float]]
-    total_power: dict[str, list[float]]
-    first: Array
 
     @property
     def names(self) -> tuple[str, ...]:
         return self.model.names
-
-    @property
-    def truth(self) -> Array:
-        return self.true.model.theta
-
-    @property
-    def same_structure(self) -> bool:
-        """Whether the true system has the parameters of the model."""
-        return self.true.model.names == self.model.names
 
     def errors(self, promise: Promise) -> Array:
         """|G_hat - G_0| (runs, n) at the frequencies and entries of the promise, or its Frobenius norm."""
@@ -122,7 +98,7 @@ def run_channel_job(job: ChannelTrialJob, runs: int, rng: np.random.Generator) -
     caused = {"input": u_r, "output": y_r, "excitation": r}
     power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
     total = {"input": _mean_squares(u), "output": _mean_squares(y)}
-    return ChannelTrials(true, job.model, theta, converged, power, total, np.array(r[0]))
+    return ChannelTrials(true, theta, converged, power, total, first=np.array(r[0]), model=job.model)
 
 
 def _mean_squares(x: Array) -> list[float]:

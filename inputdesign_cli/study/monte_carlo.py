@@ -32,7 +32,7 @@ from inputdesign_cli.study.comparison import Comparison, compared
 from inputdesign_cli.study.disturbance import Response
 from inputdesign_cli.study.excitations import Excitation
 from inputdesign_cli.study.executor import Executor
-from inputdesign_cli.study.trials import TrialJob, Trials, joined, run_job
+from inputdesign_cli.study.trials import PolynomialTrials, TrialJob, joined, run_job
 from inputdesign_cli.study.verdict import Promise
 
 # Inputs to compare with have a flat spectrum; white noise is Gaussian.
@@ -66,7 +66,7 @@ def simulate_polynomial(spec: Spec, *, executor: Executor | None = None) -> Outc
     true = true_experiment(spec, nominal, result)
     structure = Structure.of(nominal.model)
 
-    def tried(experiment: Experiment, excitation: Excitation) -> Trials:
+    def tried(experiment: Experiment, excitation: Excitation) -> PolynomialTrials:
         job = TrialJob(experiment, structure, nominal.model.theta, excitation)
         # The same seed for every input: they meet the same noise.
         parts = run_batches(run_job, job, runs=study.runs, size=_BATCH, seed=study.seed, executor=executor)

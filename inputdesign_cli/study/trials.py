@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import scipy.signal
@@ -26,39 +25,22 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import input_and_output
 from inputdesign_cli.study.excitations import Excitation
-from inputdesign_cli.study.verdict import Promise
+from inputdesign_cli.study.verdict import Promise, Trials
 
-AnyTrials = TypeVar("AnyTrials", bound=Any)
+AnyTrials = TypeVar("AnyTrials", bound=Trials)
 # Complex numbers of frequency responses held at a time.
 _CHUNK = 2_000_000
 
 
 @dataclass(frozen=True)
-class Trials:
-    """What the runs gave.
+class PolynomialTrials(Trials):
+    """Runs with one input and one output; `structure` is what was estimated."""
 
-    Attributes:
-        theta: (runs, k) estimates; `converged` (runs,).
-        power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
-        total_power: mean squares of input and output, noise included.
-        first: (samples,) the excitation of the first run.
-    """
-
-    true: Experiment
     structure: Structure
-    theta: Array
-    converged: NDArray[np.bool_]
-    power: dict[str, list[float]]
-    total_power: dict[str, list[float]]
-    first: Array
 
     @property
     def names(self) -> tuple[str, ...]:
         return self.structure.names
-
-    @property
-    def truth(self) -> Array:
-        return self.true.model.theta
 
     def errors(self, promise: Promise) -> Array:
         """|G_hat - G_0| (runs, n) at the frequencies of the promise (n,)."""
@@ -74,11 +56,6 @@ class Trials:
     def bound(self, promise: Promise, information: Array) -> Array:
         """r_u (n,) on the true system."""
         return error_bound(self.true, information, promise.alpha, promise.w)
-
-    @cached_property
-    def same_structure(self) -> bool:
-        """Whether the true system has the parameters of the model."""
-        return self.true.model.names == self.structure.names
 
 
 @dataclass(frozen=True)
@@ -116,7 +93,7 @@ def joined(parts: Sequence[AnyTrials]) -> AnyTrials:
     )
 
 
-def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
+def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> PolynomialTrials:
     """Simulate a batch of experiments from rest on the true system and identify each of them.
 
     Runs where the search does not settle are repeated from several starts. Prior information of the true
@@ -141,7 +118,9 @@ def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
         "excitation": [float(np.mean(r**2))],
     }
     total = {"input": [float(np.mean(u**2))], "output": [float(np.mean(y**2))]}
-    return Trials(true, structure, theta, converged, mean_squares, total, np.array(r[0]))
+    return PolynomialTrials(
+        true, theta, converged, mean_squares, total, first=np.array(r[0]), structure=structure
+    )
 
 
 def _noise(true: Experiment, runs: int, rng: np.random.Generator) -> tuple[Array, Array]:

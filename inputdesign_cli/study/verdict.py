@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,46 +38,47 @@ class Promise:
     entries: NDArray[np.int64] | None = None
 
 
-class Trials(Protocol):
-    """What many runs of one input gave: theta (runs, k), converged (runs,), mean squares by signal."""
+@dataclass(frozen=True)
+class Trials(ABC):
+    """What many runs of one input gave.
+
+    Attributes:
+        true: the experiment on the true system.
+        theta: (runs, k) estimates; `converged` (runs,).
+        power: mean squares of what the excitation causes, channel by channel: input, output, excitation.
+        total_power: mean squares of inputs and outputs, noise included.
+        first: (samples,) or (samples, r), the excitation of the first run.
+    """
+
+    true: Any
+    theta: Array
+    converged: NDArray[np.bool_]
+    power: dict[str, list[float]]
+    total_power: dict[str, list[float]]
+    first: Array
 
     @property
-    def names(self) -> tuple[str, ...]: ...
-
-    @property
-    def theta(self) -> Array: ...
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """The estimated parameters."""
 
     @property
     def truth(self) -> Array:
         """theta (k,) of the true system, which may have other parameters."""
-        ...
+        return np.asarray(self.true.model.theta)
 
     @property
     def same_structure(self) -> bool:
         """Whether the true system has the parameters of the model."""
-        ...
+        return bool(self.true.model.names == self.names)
 
-    @property
-    def converged(self) -> NDArray[np.bool_]: ...
-
-    @property
-    def power(self) -> dict[str, Any]: ...
-
-    @property
-    def total_power(self) -> dict[str, Any]: ...
-
-    @property
-    def first(self) -> Array:
-        """The excitation of the first run."""
-        ...
-
+    @abstractmethod
     def errors(self, promise: Promise) -> Array:
         """|G_hat - G_0| (runs, n) where the promise is made."""
-        ...
 
+    @abstractmethod
     def bound(self, promise: Promise, information: Array) -> Array:
         """r_u (n,) on the true system where the promise is made."""
-        ...
 
 
 def judged(
