@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from channel_plants import arrays
+from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment, Experiment
@@ -127,26 +128,7 @@ def experiment():
 
 
 def test_information_is_that_of_simulated_impulses(experiment):
-    """Sums over time of finite differences of the prediction error, whatever excites."""
-    plant = experiment.model
-    inverse = np.linalg.inv(plant.covariance)
-    from_r, from_e = impulse_gradients(plant, "r"), impulse_gradients(plant, "e")
-    noise = 7 * np.einsum("tkpm,mn,pq,tlqn->kl", from_e, plant.covariance, inverse, from_e, optimize=True)
-    np.testing.assert_allclose(
-        experiment.noise_information, noise, rtol=1e-6, atol=1e-6 * np.abs(noise).max()
-    )
-    basis = MatrixFirBasis(3, 1)
-    maps = basis.integrals(experiment.information_density, experiment.singularities)
-    rng = np.random.default_rng(0)
-    x = rng.standard_normal(basis.size)
-    c = basis.autocovariances(x)
-    # M sums E psi psi^T with E r(t + 1) r(t)^T = c_1: psi(t) = sum_s g(s) r(t - s).
-    M = np.einsum("tkpm,mn,pq,tlqn->kl", from_r, c[0], inverse, from_r, optimize=True)
-    cross = np.einsum("tkpm,nm,pq,tlqn->kl", from_r[1:], c[1], inverse, from_r[:-1], optimize=True)
-    expected = 7 * (M + cross + cross.T)
-    np.testing.assert_allclose(
-        np.tensordot(x, maps, axes=1), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()
-    )
+    check_information(experiment, *(impulse_gradients(experiment.model, source) for source in "re"))
 
 
 def test_powers_are_those_of_simulated_impulses(experiment):
@@ -209,15 +191,8 @@ def test_responses_are_those_of_matrix_algebra(experiment):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
 
 
-def test_signals_are_those_of_the_equations_sample_by_sample():
-    rng = np.random.default_rng(0)
-    plant = box_jenkins()
-    r, e = rng.standard_normal((2, 150, 3)), rng.standard_normal((2, 150, 2))
-    y, u = PolynomialLoop(plant, controller()).signals(r, e)
-    for run in range(2):
-        expected = simulated(plant, r[run], e[run])
-        np.testing.assert_allclose(y[run], expected[0], atol=1e-9)
-        np.testing.assert_allclose(u[run], expected[1], atol=1e-9)
+def test_signals_are_those_of_the_equations_sample_by_sample(experiment):
+    check_signals(experiment.loop, simulated)
 
 
 def test_unstable_and_algebraic_loops_are_refused():

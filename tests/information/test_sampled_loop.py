@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from channel_plants import arrays, descending
+from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment
@@ -186,33 +187,11 @@ def experiment():
 
 
 def test_information_is_that_of_simulated_impulses(experiment):
-    """Sums over time of finite differences of the predicted output, whatever excites."""
-    inverse = np.linalg.inv(COVARIANCE)
-    from_r, from_e = (impulse_gradients(experiment.model, source) for source in "re")
-    noise = 7 * np.einsum("tkpm,mn,pq,tlqn->kl", from_e, COVARIANCE, inverse, from_e, optimize=True)
-    np.testing.assert_allclose(
-        experiment.noise_information, noise, rtol=1e-6, atol=1e-6 * np.abs(noise).max()
-    )
-    basis = MatrixFirBasis(3, 1)
-    maps = basis.integrals(experiment.information_density, experiment.singularities)
-    x = np.random.default_rng(0).standard_normal(basis.size)
-    c = basis.autocovariances(x)
-    M = np.einsum("tkpm,mn,pq,tlqn->kl", from_r, c[0], inverse, from_r, optimize=True)
-    cross = np.einsum("tkpm,nm,pq,tlqn->kl", from_r[1:], c[1], inverse, from_r[:-1], optimize=True)
-    expected = 7 * (M + cross + cross.T)
-    np.testing.assert_allclose(
-        np.tensordot(x, maps, axes=1), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()
-    )
+    check_information(experiment, *(impulse_gradients(experiment.model, source) for source in "re"))
 
 
 def test_signals_are_those_of_the_equations_sample_by_sample(experiment):
-    rng = np.random.default_rng(0)
-    r, e = rng.standard_normal((2, 150, 3)), rng.standard_normal((2, 150, 2))
-    y, u = experiment.loop.signals(r, e)
-    for run in range(2):
-        expected = simulated(experiment.model, r[run], e[run])
-        np.testing.assert_allclose(y[run], expected[0], atol=1e-9)
-        np.testing.assert_allclose(u[run], expected[1], atol=1e-9)
+    check_signals(experiment.loop, simulated)
 
 
 def test_responses_are_those_of_matrix_algebra(experiment):

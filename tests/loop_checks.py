@@ -1,0 +1,36 @@
+"""What a loop with three inputs and two outputs must agree with: brute force in time."""
+
+import numpy as np
+
+from inputdesign_cli.spectrum import MatrixFirBasis
+
+
+def check_information(experiment, from_r, from_e):
+    """Sums over time of the gradients (t, k, p, ..) that impulses of r and e cause, whatever excites."""
+    covariance, samples = experiment.model.covariance, experiment.samples
+    inverse = np.linalg.inv(covariance)
+    noise = np.einsum("tkpm,mn,pq,tlqn->kl", from_e, covariance, inverse, from_e, optimize=True)
+    close(experiment.noise_information, samples * noise)
+    basis = MatrixFirBasis(3, 1)
+    maps = basis.integrals(experiment.information_density, experiment.singularities)
+    x = np.random.default_rng(0).standard_normal(basis.size)
+    c = basis.autocovariances(x)
+    # M sums E psi psi^T with E r(t + 1) r(t)^T = c_1: psi(t) = sum_s g(s) r(t - s).
+    M = np.einsum("tkpm,mn,pq,tlqn->kl", from_r, c[0], inverse, from_r, optimize=True)
+    cross = np.einsum("tkpm,nm,pq,tlqn->kl", from_r[1:], c[1], inverse, from_r[:-1], optimize=True)
+    close(np.tensordot(x, maps, axes=1), samples * (M + cross + cross.T))
+
+
+def check_signals(loop, simulated):
+    """The recursion over many runs against `simulated(model, r, e)`, sample by sample."""
+    rng = np.random.default_rng(0)
+    r, e = rng.standard_normal((2, 150, 3)), rng.standard_normal((2, 150, 2))
+    y, u = loop.signals(r, e)
+    for run in range(2):
+        expected = simulated(loop.model, r[run], e[run])
+        np.testing.assert_allclose(y[run], expected[0], atol=1e-9)
+        np.testing.assert_allclose(u[run], expected[1], atol=1e-9)
+
+
+def close(found, expected):
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
