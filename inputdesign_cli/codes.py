@@ -106,6 +106,13 @@ CODES: dict[str, Explanation] = {
         "YAML; null removes the key.",
         "Compare with --set noise.variance=0.5 and --set 'plant.F=[1, -0.7]'.",
     ),
+    "bad-include": Explanation(
+        "A file that cannot be included",
+        "include: model.yaml (or a list) takes blocks from other files, relative to the folder of the spec. "
+        "What they hold stands where the spec has none: plant and noise as a whole, other blocks key by key. "
+        "The same key in both is a contradiction.",
+        "Remove the key from one of the files; an included file includes no others.",
+    ),
     # Keys and kinds of values
     "unknown-key": Explanation(
         "A key that does not exist here",

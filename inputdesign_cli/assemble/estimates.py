@@ -117,7 +117,7 @@ def model_notes(estimate: AnyEstimate, predictor: Mapping[str, Sequence[Array]])
 def model_text(blocks: Blocks, estimate: AnyEstimate) -> str:
     """The blocks to paste, with the covariance and, as a comment, the same as prior information."""
     lines = [
-        f"# Estimated from {len(estimate.errors)} samples; paste in place of the blocks of the same names."
+        f"# Estimated from {len(estimate.errors)} samples; paste in place of these blocks, or write include: and this file's name."
     ]
     for key, block in blocks.items():
         lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]

@@ -15,7 +15,7 @@ from inputdesign_cli.errors import Complaint, SpecError
 from inputdesign_cli.spec.files import read_text
 from inputdesign_cli.spec.loading import parse_spec
 from inputdesign_cli.spec.model import Spec
-from inputdesign_cli.spec.overrides import apply_overrides
+from inputdesign_cli.spec.overrides import apply_overrides, compose
 from inputdesign_cli.spec.places import Places, format_key
 from inputdesign_cli.spec.reader import Tree, read
 from inputdesign_cli.spec.section import Section
@@ -91,13 +91,14 @@ def read_draft(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> D
 
     Raises
     ------
-    SpecError : the file cannot be read, is not a mapping in YAML, or an override cannot be applied.
+    SpecError : the file cannot be read, is not a mapping in YAML, or an override cannot be applied, or a
+        file cannot be included.
     """
     text, file = read_text(path), os.fspath(path)
     tree = read(text, file)
     if not isinstance(tree.data, dict):
         parse_spec(text, file, overrides)  # says what is wrong with it
-    apply_overrides(tree, list(overrides))
+    compose(tree, FilePath(path).parent, overrides)
     if tree.complaints:
         raise SpecError(tree.complaints)
     return Draft(text, file, FilePath(path).parent, tuple(overrides), tree.data)

@@ -16,7 +16,7 @@ from inputdesign_cli.spec.experiment import Cost
 from inputdesign_cli.spec.files import read_text
 from inputdesign_cli.spec.findings import Finding
 from inputdesign_cli.spec.model import Spec
-from inputdesign_cli.spec.overrides import apply_overrides
+from inputdesign_cli.spec.overrides import compose
 from inputdesign_cli.spec.places import Path, Places, format_key
 from inputdesign_cli.spec.reader import Tree, read
 from inputdesign_cli.spec.section import Section
@@ -70,7 +70,7 @@ def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> 
                 location=tree.places.location(tree.places.mark(())) or Location(file, 1, 1),
             )
         )
-    apply_overrides(tree, list(overrides))
+    compose(tree, folder, overrides)
     spec, findings = _validate(tree)
     complaints = [*tree.complaints, *(_complaint(f, tree.places) for f in findings)]
     if complaints or spec is None:

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path as FilePath
 from typing import Any
 
 from inputdesign_cli.errors import Complaint, Location, SpecError
+from inputdesign_cli.spec.include import KEY, apply_includes
 from inputdesign_cli.spec.places import Mark, Path, format_key, parse_key
 from inputdesign_cli.spec.reader import MAX_DEPTH, Tree, read
+
+
+def compose(tree: Tree, folder: FilePath, overrides: Sequence[str]) -> None:
+    """The spec with the files that it includes, then the overrides; `--set include=..` comes first."""
+    first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
+    apply_overrides(tree, first)
+    apply_includes(tree, folder)
+    apply_overrides(tree, [override for override in overrides if override not in first])
 
 
 def apply_overrides(tree: Tree, overrides: list[str]) -> None:

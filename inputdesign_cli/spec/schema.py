@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from inputdesign_cli.spec.include import KEY
 from inputdesign_cli.spec.model import Spec
 
 
@@ -13,6 +14,12 @@ def json_schema() -> dict[str, Any]:
     What spans several keys (shapes, stability, contradictions) is left to `idesign validate`.
     """
     schema = _tidy(Spec.model_json_schema())
+    names = {"type": "string", "minLength": 1}
+    schema["properties"][KEY] = {
+        "description": "Files whose blocks stand where the spec has none, such as model.yaml of `identify`.",
+        "anyOf": [names, {"type": "array", "items": names, "minItems": 1}],
+    }
+    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": [KEY]}]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "idesign experiment design",

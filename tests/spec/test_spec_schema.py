@@ -30,7 +30,7 @@ def schema():
 def test_it_is_json_and_closed(schema):
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
-    assert schema["required"] == ["plant", "noise"]
+    assert schema["anyOf"] == [{"required": ["plant", "noise"]}, {"required": ["include"]}]
     assert schema["additionalProperties"] is False
     for definition in schema["$defs"].values():
         assert definition["additionalProperties"] is False
