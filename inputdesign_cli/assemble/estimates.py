@@ -117,7 +117,8 @@ def model_notes(estimate: AnyEstimate, predictor: Mapping[str, Sequence[Array]])
 def model_text(blocks: Blocks, estimate: AnyEstimate) -> str:
     """The blocks to paste, with the covariance and, as a comment, the same as prior information."""
     lines = [
-        f"# Estimated from {len(estimate.errors)} samples; paste in place of these blocks, or write include: and this file's name."
+        f"# Estimated from {len(estimate.errors)} samples: paste in place of the blocks of the same names,",
+        "# or write include: and the name of this file in a spec without them.",
     ]
     for key, block in blocks.items():
         lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]
