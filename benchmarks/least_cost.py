@@ -28,7 +28,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from inputdesign_cli.threads import use_one_thread
+from inputdesign_cli.compute.threads import use_one_thread
 
 use_one_thread()  # as the command line does, before numpy is imported
 
@@ -36,11 +36,11 @@ import cvxpy as cp  # noqa: E402
 import numpy as np  # noqa: E402
 
 from inputdesign_cli import load_spec  # noqa: E402
-from inputdesign_cli.assemble.task import build_task  # noqa: E402
-from inputdesign_cli.design.designs import white_power, whitened_problem  # noqa: E402
-from inputdesign_cli.design.exchange import ExchangeResult, exchange  # noqa: E402
-from inputdesign_cli.design.problem import Problem  # noqa: E402
+from inputdesign_cli.design.convex.designs import white_power, whitened_problem  # noqa: E402
+from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange  # noqa: E402
+from inputdesign_cli.design.convex.problem import Problem  # noqa: E402
 from inputdesign_cli.spectrum import LinesBasis  # noqa: E402
+from inputdesign_cli.tasks.build.task import build_task  # noqa: E402
 
 T = TypeVar("T")
 GRID = np.geomspace(1e-3, np.pi, 1000)

@@ -18,11 +18,11 @@ import scipy.linalg
 import scipy.optimize
 
 from inputdesign_cli.design.conic import solve_conic
-from inputdesign_cli.design.mse import OutOfReachError, Regression, design_toeplitz
-from inputdesign_cli.design.mse.branch import Search
-from inputdesign_cli.design.mse.limits import reach
-from inputdesign_cli.design.mse.structured import Units
-from inputdesign_cli.design.mse.toeplitz import ToeplitzProblem
+from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz
+from inputdesign_cli.design.regression.branch import Search
+from inputdesign_cli.design.regression.limits import reach
+from inputdesign_cli.design.regression.structured import Units
+from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
 CASES = {(2, 4): 15, (2, 5): 15, (3, 6): 5, (3, 7): 5, (4, 8): 5}
 STARTS = 20

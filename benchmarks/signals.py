@@ -27,7 +27,7 @@ import numpy as np
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.signal import Sinusoids, crest_factor, line_powers, optimise_phases
-from inputdesign_cli.signal.within import compressed
+from inputdesign_cli.signal.constraints import compressed
 from inputdesign_cli.spectrum import FirBasis
 
 ROOT = Path(__file__).parent.parent

@@ -25,20 +25,20 @@ import time
 import warnings
 from pathlib import Path
 
-from inputdesign_cli.study.processes import ONE_THREAD, Processes
+from inputdesign_cli.compute.processes import ONE_THREAD, Processes
 
 os.environ.update(ONE_THREAD)
 
 import cvxpy as cp
 import numpy as np
-from inputdesign_cli.assemble.least_cost import build_task
 from inputdesign_cli.design.least_cost import whitened_problem
+from inputdesign_cli.tasks.least_cost import build_task
 
 from inputdesign_cli import load_spec
-from inputdesign_cli.design.white import least_white_power
-from inputdesign_cli.report.sweep_table import read_sweep
-from inputdesign_cli.study.executor import Here
-from inputdesign_cli.study.sweep import sweep
+from inputdesign_cli.compute.executor import InProcess
+from inputdesign_cli.design.convex.white import least_white_power
+from inputdesign_cli.figures.sweep_table import read_sweep
+from inputdesign_cli.sweep.running import sweep
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "first_order.yaml"
@@ -74,7 +74,7 @@ def against_textbook(folder: Path, *, timed: int) -> dict[str, float]:
     for i, part in enumerate(parts):
         started = time.perf_counter()
         out = folder / f"part{i}"
-        sweep(SPEC, [f"experiment.samples={','.join(map(str, part))}"], directory=out, executor=Here())
+        sweep(SPEC, [f"experiment.samples={','.join(map(str, part))}"], directory=out, executor=InProcess())
         ours += time.perf_counter() - started
         started = time.perf_counter()
         on_grid = textbook(int(part[0]))

@@ -14,9 +14,9 @@ from itertools import zip_longest
 from pathlib import Path
 
 import inputdesign_cli
-from inputdesign_cli.golden import Row, compare, load_golden
-from inputdesign_cli.golden_file import Golden
-from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.runs.golden import Row, compare, load_golden
+from inputdesign_cli.runs.golden_file import Golden
+from inputdesign_cli.runs.results import Results
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "papers.md"
@@ -51,7 +51,7 @@ def golden_file(name: str) -> Path:
     return DOCS.parent / "golden" / f"{name}.yaml"
 
 
-def outcomes_of(golden: Golden) -> dict[str, Outcome]:
+def outcomes_of(golden: Golden) -> dict[str, Results]:
     """Every run of a golden file."""
     found = {}
     for run in golden.runs:
@@ -130,9 +130,9 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.strip().lower()).strip("-")
 
 
-def draw_figure(outcome: Outcome, stem: str, file: Path) -> None:
+def draw_figure(outcome: Results, stem: str, file: Path) -> None:
     """A figure of a run."""
-    from inputdesign_cli.report.plots import draw
+    from inputdesign_cli.figures.plots import draw
 
     draw(outcome.curves[stem], file, outcome.time_unit)
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import scipy.signal
 
-from inputdesign_cli.outcome import Table
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.textformats import csv_text, read_csv
+from inputdesign_cli.runs.results import Table
+from inputdesign_cli.runs.text_formats import csv_text, read_csv
 
 ROOT = Path(__file__).parent.parent
 IMAGES = ROOT / "docs" / "images"

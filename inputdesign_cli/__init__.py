@@ -12,10 +12,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inputdesign_cli.assemble import analyse, assess, identify, solve, validate
-    from inputdesign_cli.spec import load_spec, parse_spec
-    from inputdesign_cli.study.simulation import simulate
-    from inputdesign_cli.study.sweep import sweep
+    from inputdesign_cli.monte_carlo.simulation import simulate
+    from inputdesign_cli.specification import load_spec, parse_spec
+    from inputdesign_cli.sweep.running import sweep
+    from inputdesign_cli.tasks import analyse, assess, identify, solve, validate
 
 __version__ = "0.1.0"
 
@@ -33,15 +33,15 @@ __all__ = [
 ]
 
 _HOME = {
-    "load_spec": "inputdesign_cli.spec",
-    "parse_spec": "inputdesign_cli.spec",
-    "solve": "inputdesign_cli.assemble",
-    "simulate": "inputdesign_cli.study.simulation",
-    "analyse": "inputdesign_cli.assemble",
-    "assess": "inputdesign_cli.assemble",
-    "identify": "inputdesign_cli.assemble",
-    "validate": "inputdesign_cli.assemble",
-    "sweep": "inputdesign_cli.study.sweep",
+    "load_spec": "inputdesign_cli.specification",
+    "parse_spec": "inputdesign_cli.specification",
+    "solve": "inputdesign_cli.tasks",
+    "simulate": "inputdesign_cli.monte_carlo.simulation",
+    "analyse": "inputdesign_cli.tasks",
+    "assess": "inputdesign_cli.tasks",
+    "identify": "inputdesign_cli.tasks",
+    "validate": "inputdesign_cli.tasks",
+    "sweep": "inputdesign_cli.sweep.running",
 }
 
 

@@ -1,6 +1,6 @@
 """The few error types of the house.
 
-Every error that a user can cause is a `Complaint`: a stable code (which `idesign explain CODE`
+Every error that a user can cause is a `Diagnostic`: a stable code (which `idesign explain CODE`
 documents, see `codes.py`), one sentence that says what is wrong, and a hint that says how to mend it.
 The mathematics knows nothing of files: it names the key (`plant.F`), and the spec adds file, line and
 column where it is at hand.
@@ -30,7 +30,7 @@ class Location:
 
 
 @dataclass(frozen=True)
-class Complaint:
+class Diagnostic:
     """One thing that is wrong: a code to look up, what is wrong, how to mend it, and where it stands."""
 
     code: str
@@ -41,16 +41,16 @@ class Complaint:
 
 
 class IdesignError(Exception):
-    """An error that the user can understand and mend; carries one or more complaints.
+    """An error that the user can understand and mend; carries one or more diagnostics.
 
     `exit_code` is what the command line returns for it.
     """
 
     exit_code = EXIT_BAD_INPUT
 
-    def __init__(self, complaints: Complaint | Sequence[Complaint]) -> None:
-        self.complaints = (complaints,) if isinstance(complaints, Complaint) else tuple(complaints)
-        super().__init__("; ".join(c.message for c in self.complaints))
+    def __init__(self, diagnostics: Diagnostic | Sequence[Diagnostic]) -> None:
+        self.diagnostics = (diagnostics,) if isinstance(diagnostics, Diagnostic) else tuple(diagnostics)
+        super().__init__("; ".join(c.message for c in self.diagnostics))
 
 
 class SpecError(IdesignError):
@@ -78,5 +78,5 @@ class InaccurateError(IdesignError):
 
 
 def bad_spec(code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
-    """A `SpecError` with a single complaint."""
-    return SpecError(Complaint(code, message, hint, key))
+    """A `SpecError` with a single diagnostic."""
+    return SpecError(Diagnostic(code, message, hint, key))

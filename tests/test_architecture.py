@@ -11,20 +11,22 @@ ROOT = Path(inputdesign_cli.__file__).parent
 
 # From the foundation to the roof. A room may import what stands in an earlier line, and in its own.
 ORDER = [
-    {"errors", "codes", "threads"},
-    {"complaints", "provenance"},
-    {"spec", "plant"},
+    {"errors", "error_codes", "compute"},
+    {"diagnostics"},
+    {"specification", "plant"},
     {"spectrum", "information", "accuracy"},
     {"design", "signal", "identification"},
-    {"outcome"},
-    {"assemble"},
-    {"study", "report", "record", "textformats", "golden", "golden_file"},
-    {"document"},
+    {"runs"},
+    {"tasks"},
+    {"monte_carlo", "sweep", "figures"},
+    {"report"},
     {"cli", "__main__"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}
 MATHEMATICS = {"plant", "spectrum", "information", "accuracy", "design", "signal", "identification"}
-FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("spec", "outcome")} | {("spec", "plant")}
+FORBIDDEN = {(room, other) for room in MATHEMATICS for other in ("specification", "runs")} | {
+    ("specification", "plant")
+}
 
 FILES = sorted(path for path in ROOT.rglob("*.py") if path != ROOT / "__init__.py")
 
@@ -71,8 +73,8 @@ def test_no_two_rooms_import_each_other():
     assert both_ways == set()
 
 
-def test_outcome_is_plain_data():
-    assert imported_rooms(ROOT / "outcome.py") == set()
+def test_results_are_plain_data():
+    assert imported_rooms(ROOT / "runs" / "results.py") == set()
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))

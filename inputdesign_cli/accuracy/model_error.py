@@ -69,7 +69,7 @@ def check_positive(
 ) -> None:
     """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 between the ends of the `grid`.
 
-    The complaint tells the frequency divided by `unit`, in the unit `named`.
+    The diagnostic tells the frequency divided by `unit`, in the unit `named`.
     """
     w, negative = local_maxima(lambda w: -admissible.at(w), grid, -admissible.at(grid))
     scale = np.median(np.abs(admissible.at(grid)))

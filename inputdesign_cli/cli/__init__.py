@@ -23,7 +23,7 @@ from inputdesign_cli.cli.solve import solve
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
-from inputdesign_cli.threads import use_one_thread
+from inputdesign_cli.compute.threads import use_one_thread
 
 app = typer.Typer(
     name="idesign",

@@ -33,7 +33,7 @@ def assess(
         known = inputdesign_cli.load_spec(spec, overrides or [])
         assessment = inputdesign_cli.assess(known, data, remove_means=remove_means)
     with status(f"{data}: writing ...", quiet=quiet):
-        from inputdesign_cli.record import write_run
+        from inputdesign_cli.runs.run_directory import write_run
 
         directory = output or Path("runs") / f"{data.stem}_assessed"
         files = write_run(assessment.outcome, directory, figures=figures)

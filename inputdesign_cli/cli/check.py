@@ -11,10 +11,10 @@ import typer
 
 from inputdesign_cli.cli.options import Json, Quiet
 from inputdesign_cli.cli.terminal import aligned, status
-from inputdesign_cli.errors import EXIT_MISSED, Complaint, DataError
+from inputdesign_cli.errors import EXIT_MISSED, DataError, Diagnostic
 
 if TYPE_CHECKING:
-    from inputdesign_cli.golden import Row
+    from inputdesign_cli.runs.golden import Row
 
 HEADER = ("", "run", "quantity", "computed", "expected", "deviation", "tolerance", "source")
 
@@ -35,7 +35,7 @@ def check(
     Runs the specs that the golden files name. Prints computed and expected values with their deviation,
     tolerance and source; exits with 1 if a value lies outside its tolerance.
     """
-    from inputdesign_cli.golden import compare, execute, load_golden
+    from inputdesign_cli.runs.golden import compare, execute, load_golden
 
     rows: list[Row] = []
     for golden in [load_golden(path) for path in files or _default_files()]:
@@ -46,7 +46,7 @@ def check(
         rows += compare(golden, results)
     if junit is not None:
         from inputdesign_cli.cli.junit import junit_text
-        from inputdesign_cli.record import write_text
+        from inputdesign_cli.runs.run_directory import write_text
 
         write_text(junit, junit_text(rows))
     failed = sum(not row.passed for row in rows)
@@ -64,7 +64,7 @@ def _default_files() -> list[Path]:
     found = sorted(Path("golden").glob("*.yaml"))
     if not found:
         raise DataError(
-            Complaint(
+            Diagnostic(
                 "golden-missing",
                 "there is no golden/*.yaml in the current folder, and idesign installs none",
                 hint="name golden files, or run this in a checkout of the project",

@@ -8,7 +8,7 @@ from typing import Any
 
 def error_codes(incomplete: str) -> list[tuple[str, str]]:
     """The codes that `idesign explain` knows, with their titles."""
-    from inputdesign_cli.codes import CODES
+    from inputdesign_cli.error_codes import CODES
 
     return [(code, known.title) for code, known in sorted(CODES.items()) if code.startswith(incomplete)]
 
@@ -17,7 +17,7 @@ def spec_keys(incomplete: str) -> list[str]:
     """The keys of a spec as `--set` takes them, up to the equals sign."""
     if "=" in incomplete:
         return []
-    from inputdesign_cli.spec import json_schema
+    from inputdesign_cli.specification import json_schema
 
     schema = json_schema()
     keys = dict.fromkeys(_keys(schema, schema, ""))

@@ -24,7 +24,7 @@ def explain(
 
     Says what it means and what to do about it.
     """
-    from inputdesign_cli.codes import CODES, explanation
+    from inputdesign_cli.error_codes import CODES, explanation
 
     if code is None:
         typer.echo("\n".join(aligned([(name, known.title) for name, known in sorted(CODES.items())])))

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.errors import Complaint, OutputError
+from inputdesign_cli.errors import Diagnostic, OutputError
 
 
 class Kind(StrEnum):
@@ -40,7 +40,7 @@ def init(
         return
     if file.exists() and not force:
         hint = "choose another name, or overwrite it with --force"
-        raise OutputError(Complaint("output-exists", f"{file} exists already", hint))
-    from inputdesign_cli.record import write_text
+        raise OutputError(Diagnostic("output-exists", f"{file} exists already", hint))
+    from inputdesign_cli.runs.run_directory import write_text
 
     write_text(file, text)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 if TYPE_CHECKING:
-    from inputdesign_cli.golden import Row
+    from inputdesign_cli.runs.golden import Row
 
 
 def junit_text(rows: Sequence[Row]) -> str:

@@ -27,8 +27,8 @@ def report(
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.document.render import PAGE, report_text
-        from inputdesign_cli.record import replace_text
+        from inputdesign_cli.report.render import PAGE, report_text
+        from inputdesign_cli.runs.run_directory import replace_text
 
         file = output or directory / PAGE
         replace_text(file, report_text(directory))

@@ -11,8 +11,8 @@ import inputdesign_cli
 from inputdesign_cli.cli.terminal import status
 
 if TYPE_CHECKING:
-    from inputdesign_cli.outcome import Outcome
-    from inputdesign_cli.study.executor import Executor
+    from inputdesign_cli.compute.executor import Executor
+    from inputdesign_cli.runs.results import Results
 
 
 def produce(
@@ -35,14 +35,14 @@ def produce(
         spec = inputdesign_cli.load_spec(spec_file, overrides or [])
         outcome = getattr(inputdesign_cli, verb)(spec, **where)
     with status(f"{spec_file}: writing ...", quiet=quiet):
-        from inputdesign_cli.record import write_run
+        from inputdesign_cli.runs.run_directory import write_run
 
         directory = output or Path("runs") / spec_file.stem
         files = write_run(outcome, directory, figures=figures)
     show(outcome, files, json_output=json_output, quiet=quiet)
 
 
-def show(outcome: Outcome, files: list[Path], *, json_output: bool, quiet: bool) -> None:
+def show(outcome: Results, files: list[Path], *, json_output: bool, quiet: bool) -> None:
     """Print the result, or its summary."""
     if json_output:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)

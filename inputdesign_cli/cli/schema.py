@@ -12,6 +12,6 @@ def schema() -> None:
 
     Editors use it for completion and for checks while you type.
     """
-    from inputdesign_cli.spec import json_schema
+    from inputdesign_cli.specification import json_schema
 
     typer.echo(json.dumps(json_schema(), indent=1, ensure_ascii=False))

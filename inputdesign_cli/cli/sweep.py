@@ -15,7 +15,7 @@ from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
 
 if TYPE_CHECKING:
-    from inputdesign_cli.study.sweep import SweepSummary
+    from inputdesign_cli.sweep.running import SweepSummary
 
 
 class SweepVerb(StrEnum):
@@ -78,7 +78,7 @@ def sweep(
     the same command goes on where it was and computes nothing twice. A point that is infeasible or fails is
     a row with its reason.
     """
-    from inputdesign_cli.study import sweep as batch
+    from inputdesign_cli.sweep import running as batch
 
     directory = output or Path("runs") / f"{spec.stem}-sweep"
     common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb.value}
@@ -135,7 +135,7 @@ def _summary(done: SweepSummary) -> str:
     before = done.total - done.computed
     lines = [("points", f"{done.total}: {statuses}{f' ({before} done before)' if before else ''}")]
     if done.first_failure is not None:
-        complaint = done.first_failure.complaints[0]
-        lines.append(("first failure", f"[{complaint.code}] {complaint.message}"))
+        diagnostic = done.first_failure.diagnostics[0]
+        lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
     lines.append(("files", f"{done.directory}: {', '.join(path.name for path in done.files)}"))
     return "\n".join(aligned(lines, gap="   "))

@@ -23,7 +23,7 @@ CLEAR_LINE = "\r\x1b[K"
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
     """`command` with every error turned into words on stderr and an exit code.
 
-    With `--json` the complaints also appear on stdout, as {"errors": [..]}. IDESIGN_DEBUG=1 adds the
+    With `--json` the diagnostics also appear on stdout, as {"errors": [..]}. IDESIGN_DEBUG=1 adds the
     traceback to an internal error.
     """
 
@@ -47,7 +47,7 @@ def _run(command: Callable[..., None], *args: Any, **kwargs: Any) -> None:
     except (typer.Exit, typer.Abort, typer.BadParameter, BrokenPipeError):
         raise
     except IdesignError as error:
-        from inputdesign_cli.complaints import as_json, render
+        from inputdesign_cli.diagnostics import as_json, render
 
         if kwargs.get("json_output"):
             typer.echo(json.dumps({"errors": as_json(error)}, indent=1, ensure_ascii=False))

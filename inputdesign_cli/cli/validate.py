@@ -34,6 +34,6 @@ def validate(
                 typer.echo(f"{path}: valid")
     if errors:
         worst = max(errors, key=lambda error: error.exit_code)
-        raise type(worst)([complaint for error in errors for complaint in error.complaints])
+        raise type(worst)([diagnostic for error in errors for diagnostic in error.diagnostics])
     if json_output:
         typer.echo(json.dumps({"valid": [str(path) for path in specs]}, indent=1, ensure_ascii=False))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from inputdesign_cli.study.executor import Executor
+    from inputdesign_cli.compute.executor import Executor
 
 Jobs = Annotated[
     int,
@@ -26,11 +26,11 @@ ClusterAddress = Annotated[
 
 def executor(jobs: int, cluster: str | None) -> Executor:
     """What the two options ask for; an address comes first."""
-    from inputdesign_cli.study.cluster import Cluster
-    from inputdesign_cli.study.executor import Here
-    from inputdesign_cli.study.processes import Processes
+    from inputdesign_cli.compute.cluster import Cluster
+    from inputdesign_cli.compute.executor import InProcess
+    from inputdesign_cli.compute.processes import Processes
 
     if cluster is not None:
         return Cluster(cluster)
     count = jobs or len(os.sched_getaffinity(0))
-    return Processes(count) if count > 1 else Here()
+    return Processes(count) if count > 1 else InProcess()

@@ -44,7 +44,7 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
     """No channel of u (samples, r) and y (samples, p) keeps one value throughout.
 
     Args:
-        names: of the parameters, for the complaint.
+        names: of the parameters, for the diagnostic.
 
     Raises:
         SpecError: `constant-input`, `constant-output`.

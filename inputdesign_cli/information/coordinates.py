@@ -99,7 +99,7 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
     The matrix itself is never formed: that halves the digits lost to an ill-conditioned parametrisation.
 
     Args:
-        excitation: what excites, for the complaint ("excitation", "excitation within [0, 2]").
+        excitation: what excites, for the diagnostic ("excitation", "excitation within [0, 2]").
 
     Raises:
         SpecError: `not-identifiable`, with the names of parameters that cannot be told apart.

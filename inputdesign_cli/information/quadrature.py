@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from inputdesign_cli.errors import Complaint, InaccurateError
+from inputdesign_cli.errors import Diagnostic, InaccurateError
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 NODES = 20
@@ -119,7 +119,7 @@ def integrate(
             return fine
         coarse, earlier = fine, change
     raise InaccurateError(
-        Complaint(
+        Diagnostic(
             "integral-inaccurate",
             "an integral of the information matrix did not settle: the integrand has a pole on, "
             "or within rounding of, the unit circle",

@@ -1,1 +1,1 @@
-"""What a reader looks at: figures of a run."""
+"""A run or a sweep as one HTML page: words, charts and templates."""

@@ -10,10 +10,10 @@ import numpy as np
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.achieved import input_and_output
-from inputdesign_cli.signal.dress import Dresser
-from inputdesign_cli.signal.recipe import Recipe
-from inputdesign_cli.signal.room import Room
-from inputdesign_cli.signal.within import Watched
+from inputdesign_cli.signal.constraints import SignalConstraint
+from inputdesign_cli.signal.input_limits import InputLimits
+from inputdesign_cli.signal.limiter import Limiter
+from inputdesign_cli.signal.settings import SignalSettings
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Bounds:
         return any(bound is not None for bound in (self.amplitude, self.rate, self.output))
 
 
-def dresser_of(experiment: Experiment, recipe: Recipe, bounds: Bounds) -> Dresser:
+def limiter_of(experiment: Experiment, recipe: SignalSettings, bounds: Bounds) -> Limiter:
     """What enforces the bounds: limits on u are those of the record itself in open loop only."""
     open_loop = experiment.loop.controller is None
     amplitude, rate = (bounds.amplitude, bounds.rate) if open_loop else (None, None)
-    return Dresser(
-        recipe, (Room(amplitude, rate, recipe.quantiser),), _watched(experiment, recipe.hold, bounds)
+    return Limiter(
+        recipe, (InputLimits(amplitude, rate, recipe.quantiser),), _watched(experiment, recipe.hold, bounds)
     )
 
 
@@ -56,7 +56,7 @@ def limited_gains(experiment: Experiment, bounds: Bounds, frequencies: Array) ->
     return tuple(gain / bound for bound, gain in found if bound is not None)
 
 
-def _watched(experiment: Experiment, hold: int, bounds: Bounds) -> tuple[Watched, ...]:
+def _watched(experiment: Experiment, hold: int, bounds: Bounds) -> tuple[SignalConstraint, ...]:
     closed = experiment.loop.controller is not None
     found = []
     if bounds.output is not None:
@@ -70,7 +70,7 @@ def _watched(experiment: Experiment, hold: int, bounds: Bounds) -> tuple[Watched
     return tuple(found)
 
 
-def _watch(apply: Callable[[Array], Array], bound: float, hold: int) -> Watched:
+def _watch(apply: Callable[[Array], Array], bound: float, hold: int) -> SignalConstraint:
     """The map from the values, each held; a filter run backwards in time is its own transpose."""
 
     def forwards(values: Array) -> Array:
@@ -80,4 +80,4 @@ def _watch(apply: Callable[[Array], Array], bound: float, hold: int) -> Watched:
         reversed_time = apply(weights[::-1])[::-1]
         return reversed_time.reshape(-1, hold).sum(axis=1)
 
-    return Watched(forwards, backwards, bound)
+    return SignalConstraint(forwards, backwards, bound)

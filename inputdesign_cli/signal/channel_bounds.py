@@ -10,10 +10,10 @@ import numpy as np
 from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.channel_information import RecordFilter
-from inputdesign_cli.signal.dress import Dresser
-from inputdesign_cli.signal.recipe import Quantiser, Recipe
-from inputdesign_cli.signal.room import Room
-from inputdesign_cli.signal.within import Watched
+from inputdesign_cli.signal.constraints import SignalConstraint
+from inputdesign_cli.signal.input_limits import InputLimits
+from inputdesign_cli.signal.limiter import Limiter
+from inputdesign_cli.signal.settings import Quantiser, SignalSettings
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class ChannelBounds:
         return any(bound is not None for bound in (self.amplitude, self.rate, self.output))
 
 
-def channel_dresser(
-    plant: RecordFilter, recipe: Recipe, bounds: ChannelBounds, quantisers: Sequence[Quantiser | None]
-) -> Dresser:
+def channel_limiter(
+    plant: RecordFilter, recipe: SignalSettings, bounds: ChannelBounds, quantisers: Sequence[Quantiser | None]
+) -> Limiter:
     """What enforces the bounds on records of the length of the `plant`'s, with a converter an input.
 
     Limits on u are those of the record itself in open loop only.
@@ -44,14 +44,14 @@ def channel_dresser(
     open_loop = plant.experiment.loop is None
     amplitude, rate = (bounds.amplitude, bounds.rate) if open_loop else (None, None)
     rooms = tuple(
-        Room(
+        InputLimits(
             None if amplitude is None else float(amplitude[a]),
             None if rate is None else float(rate[a]),
             quantiser,
         )
         for a, quantiser in enumerate(quantisers)
     )
-    return Dresser(recipe, rooms, _watched(plant, recipe.hold, bounds))
+    return Limiter(recipe, rooms, _watched(plant, recipe.hold, bounds))
 
 
 def limited_responses(
@@ -74,7 +74,7 @@ def limited_responses(
     return found
 
 
-def _watched(plant: RecordFilter, hold: int, bounds: ChannelBounds) -> tuple[Watched, ...]:
+def _watched(plant: RecordFilter, hold: int, bounds: ChannelBounds) -> tuple[SignalConstraint, ...]:
     """What the record is no room for: outputs, in closed loop u, and what the search might spoil."""
     if bounds.output is None and plant.experiment.loop is None:
         return ()
@@ -86,17 +86,17 @@ def _watched(plant: RecordFilter, hold: int, bounds: ChannelBounds) -> tuple[Wat
     return tuple(found)
 
 
-def _signals(plant: RecordFilter, of: PowerKind, hold: int, bound: Array) -> Watched:
+def _signals(plant: RecordFilter, of: PowerKind, hold: int, bound: Array) -> SignalConstraint:
     def adjoint(weights: Array) -> Array:
         each = plant.adjoint(of, weights)
         return each.reshape(-1, hold, each.shape[1]).sum(axis=1)
 
-    return Watched(lambda values: plant.signals(of, np.repeat(values, hold, axis=0)), adjoint, bound)
+    return SignalConstraint(lambda values: plant.signals(of, np.repeat(values, hold, axis=0)), adjoint, bound)
 
 
-def _moves(signals: Watched) -> Watched:
+def _moves(signals: SignalConstraint) -> SignalConstraint:
     """From one sample of each signal to the next, the first from rest."""
-    return Watched(
+    return SignalConstraint(
         lambda values: np.diff(signals.apply(values), axis=0, prepend=0.0),
         lambda weights: signals.adjoint(weights - np.append(weights[1:], 0.0 * weights[:1], axis=0)),
         signals.bound,

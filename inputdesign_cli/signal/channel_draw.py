@@ -18,7 +18,7 @@ from inputdesign_cli.signal.channels import (
     multisine_record,
 )
 from inputdesign_cli.signal.levels import pseudo_random, register_length
-from inputdesign_cli.signal.recipe import Recipe
+from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.signal.sinusoids import select
 
 Angles = Callable[[Lines, int, np.random.Generator], Array | None]
@@ -30,7 +30,7 @@ def uniform(lines: Lines, values: int, rng: np.random.Generator) -> Array | None
 
 
 @dataclass(frozen=True)
-class ChannelDrawer:
+class ChannelSignalGenerator:
     """Draws records of `samples` samples.
 
     Args:
@@ -42,7 +42,7 @@ class ChannelDrawer:
     """
 
     design: Callable[[int, int], Lines]
-    recipe: Recipe
+    recipe: SignalSettings
     samples: int
     band: tuple[float, float] = (0.0, np.pi)
     phases: ChannelPhases = "orthogonal"

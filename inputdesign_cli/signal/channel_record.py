@@ -8,17 +8,17 @@ import numpy as np
 
 from inputdesign_cli.information import POWER_KINDS, PowerKind
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.channel_bounds import ChannelBounds, channel_dresser
-from inputdesign_cli.signal.channel_draw import ChannelDrawer
+from inputdesign_cli.signal.channel_bounds import ChannelBounds, channel_limiter
+from inputdesign_cli.signal.channel_draw import ChannelSignalGenerator
 from inputdesign_cli.signal.channel_information import RecordFilter
-from inputdesign_cli.signal.choose import Bench, Demand, Record, Shape, best_record
-from inputdesign_cli.signal.recipe import Quantiser
+from inputdesign_cli.signal.selection import Candidates, Evaluator, Record, Target, best_record
+from inputdesign_cli.signal.settings import Quantiser
 
 
 def realise_channels(
     plant: RecordFilter,
-    drawer: ChannelDrawer,
-    demand: Demand,
+    drawer: ChannelSignalGenerator,
+    demand: Target,
     *,
     total: float,
     bounds: ChannelBounds | None = None,
@@ -37,6 +37,6 @@ def realise_channels(
         return {kind: np.mean(plant.signals(kind, record) ** 2, axis=0) for kind in POWER_KINDS}
 
     converters = quantisers or [None] * plant.experiment.inputs
-    dresser = channel_dresser(plant, drawer.recipe, bounds, converters)
-    shape = Shape(drawer.values, drawer.recipe.method, total)
-    return best_record(shape, dresser, Bench(plant.information, powers, bounds.powers), demand)
+    limiter = channel_limiter(plant, drawer.recipe, bounds, converters)
+    shape = Candidates(drawer.values, drawer.recipe.method, total)
+    return best_record(shape, limiter, Evaluator(plant.information, powers, bounds.powers), demand)

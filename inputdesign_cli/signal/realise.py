@@ -9,10 +9,10 @@ import numpy as np
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.achieved import input_and_output, record_information
-from inputdesign_cli.signal.bounds import Bounds, dresser_of, limited_gains
-from inputdesign_cli.signal.choose import Bench, Demand, Record, Shape, best_record
-from inputdesign_cli.signal.draw import Drawer
-from inputdesign_cli.signal.recipe import Recipe
+from inputdesign_cli.signal.bounds import Bounds, limited_gains, limiter_of
+from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal.selection import Candidates, Evaluator, Record, Target, best_record
+from inputdesign_cli.signal.settings import SignalSettings
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 
@@ -20,8 +20,8 @@ def realise(
     experiment: Experiment,
     basis: FirBasis | LinesBasis,
     x: Array,
-    demand: Demand,
-    recipe: Recipe,
+    demand: Target,
+    recipe: SignalSettings,
     *,
     samples: int,
     bounds: Bounds | None = None,
@@ -32,10 +32,10 @@ def realise(
     zeros) a multisine is made instead, which needs none; `Record.method` says so.
     """
     bounds = bounds or Bounds()
-    drawer = Drawer(basis, x, recipe, samples)
+    drawer = SignalGenerator(basis, x, recipe, samples)
     wanted = recipe.phases == "optimised" and drawer.method == "multisine" and recipe.hold == 1
     gains = limited_gains(experiment, bounds, drawer.lines.frequencies) if wanted else ()
-    shape = Shape(
+    shape = Candidates(
         lambda rng: drawer.values(rng, gains),
         drawer.method,
         drawer.total,
@@ -48,9 +48,9 @@ def realise(
         kinds: tuple[PowerKind, ...] = ("input", "output", "excitation")
         return dict(zip(kinds, means, strict=True))
 
-    bench = Bench(
+    bench = Evaluator(
         lambda record: record_information(experiment, record),
         powers,
         tuple((kind, None, most) for kind, most in bounds.powers),
     )
-    return best_record(shape, dresser_of(experiment, recipe, bounds), bench, demand)
+    return best_record(shape, limiter_of(experiment, recipe, bounds), bench, demand)

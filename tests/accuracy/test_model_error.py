@@ -90,5 +90,5 @@ def test_vanishing_admissible_error_is_refused():
     requirement = ModelError(Experiment(Loop(model), 100), Relative(model, 0.1), 2.0)
     with pytest.raises(SpecError) as error:
         requirement.check_positive()
-    assert error.value.complaints[0].code == "admissible-not-positive"
+    assert error.value.diagnostics[0].code == "admissible-not-positive"
     dataclasses.replace(requirement, band=(0.0, 3.0)).check_positive()

@@ -16,15 +16,15 @@ from inputdesign_cli.cli import app, main
 from inputdesign_cli.cli.init import Kind
 from inputdesign_cli.cli.terminal import aligned, colourful, status
 from inputdesign_cli.errors import (
-    Complaint,
     DataError,
+    Diagnostic,
     InaccurateError,
     InfeasibleError,
     Location,
     OutputError,
     SpecError,
 )
-from inputdesign_cli.outcome import Outcome, Table
+from inputdesign_cli.runs.results import Results, Table
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
 GROUP = typer.main.get_command(app)
@@ -80,7 +80,7 @@ def verbs(monkeypatch):
         return path
 
     def outcome(spec):
-        return Outcome(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
+        return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
     monkeypatch.setitem(vars(inputdesign_cli), "load_spec", load_spec)
     for verb in ("solve", "analyse"):
@@ -100,9 +100,9 @@ def failing(monkeypatch, verbs):
     return install
 
 
-def complaint(code="some-code"):
+def diagnostic(code="some-code"):
     place = Location("a.yaml", 3, 7, "plant: {F: [1, -1.7]}")
-    return Complaint(code, "the plant is unstable", "move its pole", "plant.F", place)
+    return Diagnostic(code, "the plant is unstable", "move its pole", "plant.F", place)
 
 
 # What is printed, and where ----------------------------------------------------------------------
@@ -138,7 +138,7 @@ def test_quiet_prints_nothing(run, verbs):
 
 
 def test_the_summary_of_a_result_with_nothing_in_it(run, verbs, monkeypatch):
-    bare = Outcome({"format": 1, "objective": {"kind": "D", "value": 59.2, "upper_bound": 59.3}}, "")
+    bare = Results({"format": 1, "objective": {"kind": "D", "value": 59.2, "upper_bound": 59.3}}, "")
     monkeypatch.setitem(vars(inputdesign_cli), "solve", lambda spec: bare)
     code, out, err = run("solve", "a.yaml")
     assert (code, err) == (0, "")
@@ -154,7 +154,7 @@ def test_the_summary_of_a_result_with_nothing_in_it(run, verbs, monkeypatch):
     [(SpecError, 2), (DataError, 2), (OutputError, 2), (InfeasibleError, 3), (InaccurateError, 4)],
 )
 def test_errors_have_their_exit_codes(run, failing, error, code):
-    failing(error(complaint()))
+    failing(error(diagnostic()))
     ended, out, err = run("solve", "a.yaml")
     assert ended == code
     assert out == ""
@@ -164,7 +164,7 @@ def test_errors_have_their_exit_codes(run, failing, error, code):
 
 
 def test_with_json_errors_are_data_too(run, failing):
-    failing(InfeasibleError([complaint("one"), complaint("two")]))
+    failing(InfeasibleError([diagnostic("one"), diagnostic("two")]))
     code, out, err = run("solve", "a.yaml", "--json")
     assert code == 3
     errors = json.loads(out)["errors"]
@@ -173,7 +173,7 @@ def test_with_json_errors_are_data_too(run, failing):
 
 
 def test_nothing_is_written_when_a_design_fails(run, failing, tmp_path):
-    failing(InfeasibleError(complaint()))
+    failing(InfeasibleError(diagnostic()))
     run("solve", "a.yaml")
     assert list(tmp_path.iterdir()) == []
 
@@ -286,7 +286,7 @@ def test_columns_are_aligned():
 def test_validate_reports_all_files_at_once(run, verbs, monkeypatch):
     def validate(spec):
         if spec.stem != "good":
-            raise SpecError(complaint(spec.stem))
+            raise SpecError(diagnostic(spec.stem))
 
     monkeypatch.setitem(vars(inputdesign_cli), "validate", validate)
     code, out, err = run("validate", "bad.yaml", "good.yaml", "worse.yaml")
@@ -340,7 +340,7 @@ def test_check_fails_with_1(run, verbs, tmp_path):
 
 def test_check_of_an_infeasible_run_says_why(run, failing, tmp_path):
     (tmp_path / "g.yaml").write_text(GOLDEN % "0.2585")
-    failing(InfeasibleError(complaint()))
+    failing(InfeasibleError(diagnostic()))
     code, out, _ = run("check", "g.yaml")
     assert code == 1
     assert out.count("the plant is unstable") == 2

@@ -8,7 +8,7 @@ import pytest
 from inputdesign_cli.cli import main
 from inputdesign_cli.cli.completion import error_codes, spec_keys
 from inputdesign_cli.cli.progress import ProgressLine, duration, progress_text
-from inputdesign_cli.study.sweep import Progress
+from inputdesign_cli.sweep.running import Progress
 
 SPEC = """\
 title: A small design

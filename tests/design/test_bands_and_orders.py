@@ -5,9 +5,9 @@ import pytest
 from channel_plants import arrays, two_by_two
 
 from inputdesign_cli.accuracy import Criterion
-from inputdesign_cli.design.designs import Question, white_power, whitened_problem
-from inputdesign_cli.design.exchange import exchange
-from inputdesign_cli.design.limits import PowerLimit
+from inputdesign_cli.design.convex.designs import Question, white_power, whitened_problem
+from inputdesign_cli.design.convex.exchange import exchange
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import ContinuousChannels
 from inputdesign_cli.spectrum import PolynomialBasis

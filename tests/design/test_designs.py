@@ -15,10 +15,10 @@ from inputdesign_cli.accuracy import (
     Relative,
     WeightedVariance,
 )
-from inputdesign_cli.design.designs import Question, solve_design
-from inputdesign_cli.design.exchange import exchange
-from inputdesign_cli.design.feasible import UnreachableError
-from inputdesign_cli.design.limits import DensityLimit, PowerLimit, implied_power
+from inputdesign_cli.design.convex.designs import Question, solve_design
+from inputdesign_cli.design.convex.exchange import exchange
+from inputdesign_cli.design.convex.feasible import UnreachableError
+from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Loop, PolynomialModel, zero_order_hold
@@ -272,7 +272,7 @@ def test_too_few_lines_are_refused():
     oe = Experiment(Loop(dataclasses.replace(model, A=np.ones(1), F=model.A)), 100)
     with pytest.raises(SpecError) as caught:
         solve(oe, requirements=relative(0.1), basis=LinesBasis(np.array([0.4])))
-    assert caught.value.complaints[0].code == "too-few-lines"
+    assert caught.value.diagnostics[0].code == "too-few-lines"
     # ARX learns from the noise as well, so that a modest accuracy is within reach of a single line.
     line = LinesBasis(np.array([0.4]))
     assert solve(experiment, requirements=relative(0.3), basis=line).result.gap <= 1e-6

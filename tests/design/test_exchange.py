@@ -7,9 +7,9 @@ import pytest
 from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError, Relative
-from inputdesign_cli.design.designs import Question, solve_design
-from inputdesign_cli.design.exchange import exchange
-from inputdesign_cli.design.textbook import solve_on_grid
+from inputdesign_cli.design.convex.designs import Question, solve_design
+from inputdesign_cli.design.convex.exchange import exchange
+from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import FirBasis
 

@@ -5,7 +5,7 @@ import pytest
 from channel_plants import paper_experiment
 from spectral_oracle import Spectral
 
-from inputdesign_cli.design.hillclimb import QuadraticDesign, criterion_value, hill_climb
+from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, criterion_value, hill_climb
 from inputdesign_cli.spectrum import PolynomialBasis
 
 

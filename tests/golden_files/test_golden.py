@@ -7,8 +7,8 @@ import pytest
 
 import inputdesign_cli
 from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
-from inputdesign_cli.golden import compare, execute, load_golden
-from inputdesign_cli.outcome import Outcome
+from inputdesign_cli.runs.golden import compare, execute, load_golden
+from inputdesign_cli.runs.results import Results
 
 SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
 
@@ -40,10 +40,10 @@ def written(tmp_path, text):
     return path
 
 
-def complaints(tmp_path, text):
+def diagnostics(tmp_path, text):
     with pytest.raises(SpecError) as caught:
         load_golden(written(tmp_path, text))
-    return caught.value.complaints
+    return caught.value.diagnostics
 
 
 def test_a_golden_file_is_read(tmp_path):
@@ -94,7 +94,7 @@ def test_what_is_not_there_does_not_agree(tmp_path, results, notes):
 
 def test_execute_runs_the_verb_with_the_overrides(tmp_path, monkeypatch):
     monkeypatch.setitem(vars(inputdesign_cli), "load_spec", lambda *a: a)
-    verb = lambda spec: Outcome(result={"spec": spec}, resolved_spec="")  # noqa: E731
+    verb = lambda spec: Results(result={"spec": spec}, resolved_spec="")  # noqa: E731
     monkeypatch.setitem(vars(inputdesign_cli), "analyse", verb)
     golden = load_golden(written(tmp_path, GOOD))
     expected = (tmp_path / "sub" / "b.yaml", ["experiment.samples=10", "spectrum={type: white}"])
@@ -137,27 +137,27 @@ def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch):
 )
 def test_complaints_name_the_line_and_the_key(tmp_path, old, new, line, key):
     assert old in GOOD
-    (complaint,) = complaints(tmp_path, GOOD.replace(old, new))
-    assert complaint.key == key
-    assert complaint.location.file == str(tmp_path / "g.yaml")
-    assert complaint.location.line == line
-    assert complaint.location.text == GOOD.replace(old, new).splitlines()[line - 1]
+    (diagnostic,) = diagnostics(tmp_path, GOOD.replace(old, new))
+    assert diagnostic.key == key
+    assert diagnostic.location.file == str(tmp_path / "g.yaml")
+    assert diagnostic.location.line == line
+    assert diagnostic.location.text == GOOD.replace(old, new).splitlines()[line - 1]
 
 
 def test_a_missing_key_is_named(tmp_path):
-    (complaint,) = complaints(tmp_path, GOOD.replace("why: rounding, ", ""))
-    assert '"why"' in complaint.message
-    assert complaint.location.line == 6
+    (diagnostic,) = diagnostics(tmp_path, GOOD.replace("why: rounding, ", ""))
+    assert '"why"' in diagnostic.message
+    assert diagnostic.location.line == 6
 
 
 def test_all_problems_are_reported_at_once(tmp_path):
     text = GOOD.replace("expected: 2,", "expected: two,").replace("command: analyse", "command: divine")
-    assert len(complaints(tmp_path, text)) == 2
+    assert len(diagnostics(tmp_path, text)) == 2
 
 
 @pytest.mark.parametrize("text", ["", "- a", "runs: 5", "runs: [", "runs:\n\t- x", "runs: [5]"])
 def test_what_is_no_golden_file(tmp_path, text):
-    assert complaints(tmp_path, text)
+    assert diagnostics(tmp_path, text)
 
 
 def test_a_missing_golden_file(tmp_path):

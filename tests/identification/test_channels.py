@@ -9,9 +9,9 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import Structure, fit_channel_batch, identify, identify_channels
 from inputdesign_cli.identification.channel_structure import ChannelStructure
 from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import PolynomialChannels, PolynomialModel
 from inputdesign_cli.spectrum import MatrixFirBasis
-from inputdesign_cli.study.statistics import whitened_eigenvalues, wishart_range
 
 
 def theory(model, samples):
@@ -244,8 +244,8 @@ def test_bad_data_is_refused_and_the_channel_named(change, code, named):
     u, y = (x[0] for x in simulated(arx(), 300, np.random.default_rng(14)))
     with pytest.raises(SpecError) as caught:
         identify_channels(arx(), *change(u, y))
-    assert caught.value.complaints[0].code == code
-    assert named in caught.value.complaints[0].message
+    assert caught.value.diagnostics[0].code == code
+    assert named in caught.value.diagnostics[0].message
 
 
 def test_outputs_of_the_same_noise_are_refused():

@@ -8,9 +8,9 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import Structure, fit_batch, identify, prediction_errors
 from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.information import Experiment
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import Loop
 from inputdesign_cli.spectrum import FirBasis
-from inputdesign_cli.study.statistics import whitened_eigenvalues, wishart_range
 
 
 def theory(name, samples):
@@ -134,7 +134,7 @@ def test_bad_data_is_refused(change, code):
     u, y = data("oe", 300, np.random.default_rng(10))
     with pytest.raises(SpecError) as caught:
         identify(Structure(a=2, b=1), *change(u[0], y[0]))
-    assert caught.value.complaints[0].code == code
+    assert caught.value.diagnostics[0].code == code
 
 
 @pytest.mark.slow

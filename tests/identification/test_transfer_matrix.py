@@ -19,9 +19,9 @@ from inputdesign_cli.identification.transfer_matrix import (
 from inputdesign_cli.identification.transfer_problem import evaluate
 from inputdesign_cli.identification.transfer_record import Intersample, TransferRecord
 from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import ContinuousChannels, SampledChannels
 from inputdesign_cli.signal import channel_outputs, channel_record_information
-from inputdesign_cli.study.statistics import whitened_eigenvalues, wishart_range
 
 STEP = 0.4
 SPECS = Path(__file__).parents[2] / "specs"
@@ -291,8 +291,8 @@ def test_bad_data_is_refused(change, code, word):
     y, _ = noisy(model, u, rng, hold=True, level=0.2)
     with pytest.raises(SpecError) as caught:
         identify_transfer_matrix(model, *change(u, y), STEP, hold=True)
-    assert caught.value.complaints[0].code == code
-    assert word in caught.value.complaints[0].message
+    assert caught.value.diagnostics[0].code == code
+    assert word in caught.value.diagnostics[0].message
 
 
 def test_data_without_noise_have_no_covariance():
@@ -301,7 +301,7 @@ def test_data_without_noise_have_no_covariance():
     y = simulate_transfer_matrix(model, u, STEP, hold=True)
     with pytest.raises(SpecError) as caught:
         identify_transfer_matrix(model, u, y, STEP, hold=True)
-    assert caught.value.complaints[0].code == "noise-free-data"
+    assert caught.value.diagnostics[0].code == "noise-free-data"
 
 
 def efficiency(u, runs, *, hold, level, covariance=None, seed=16):

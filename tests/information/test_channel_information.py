@@ -105,4 +105,4 @@ def test_parameters_that_the_band_cannot_tell_apart_are_named():
         SpecError, match=r"within the band can tell.* b0\[1,1\], a0\[1,1\], a1\[1,1\]$"
     ) as caught:
         ChannelExperiment(model, 1, (0.0, 1.0)).whitened(1.0)
-    assert caught.value.complaints[0].code == "not-identifiable"
+    assert caught.value.diagnostics[0].code == "not-identifiable"

@@ -201,10 +201,10 @@ def test_unstable_and_algebraic_loops_are_refused():
         PolynomialLoop(
             plant, MatrixController.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)
         ).check_stability()
-    assert caught.value.complaints[0].code == "unstable-loop"
+    assert caught.value.diagnostics[0].code == "unstable-loop"
     direct = PolynomialChannels(
         arrays([[[1.0]]]), (np.ones(1),), arrays([[[1.0]]]), (np.ones(1),), (np.ones(1),), np.eye(1)
     )
     with pytest.raises(SpecError) as caught:
         PolynomialLoop(direct, MatrixController.build([[[-1.0, 0.5]]], [[[1.0]]])).check_stability()
-    assert caught.value.complaints[0].code == "algebraic-loop"
+    assert caught.value.diagnostics[0].code == "algebraic-loop"

@@ -55,7 +55,7 @@ def test_pole_on_the_circle_is_refused():
 
     with pytest.raises(InaccurateError) as error:
         integrate(moments, logarithmic_distance([1.0]))
-    assert error.value.complaints[0].code == "integral-inaccurate"
+    assert error.value.diagnostics[0].code == "integral-inaccurate"
 
 
 def test_noise_only_information_of_an_autoregression():
@@ -121,6 +121,6 @@ def test_parameters_that_cannot_be_told_apart_are_named():
     model = PolynomialModel(B=np.convolve([0.0, 1.0], [1, -0.5]), F=np.convolve([1, -0.5], [1, 0.3]))
     with pytest.raises(SpecError) as error:
         Experiment(Loop(model), 100).whitened(1.0)
-    complaint = error.value.complaints[0]
-    assert complaint.code == "not-identifiable"
-    assert "b2, f1, f2" in complaint.message  # moving the common root changes just these
+    diagnostic = error.value.diagnostics[0]
+    assert diagnostic.code == "not-identifiable"
+    assert "b2, f1, f2" in diagnostic.message  # moving the common root changes just these

@@ -238,14 +238,14 @@ def test_stability_ends_at_the_largest_gain(gain):
         return
     with pytest.raises(SpecError) as caught:
         loop.check_stability()
-    assert caught.value.complaints[0].code == "unstable-loop"
+    assert caught.value.diagnostics[0].code == "unstable-loop"
 
 
 def test_an_algebraic_loop_is_refused():
     """(s + 3) / (s + 1) acts at once with gain 1, the controller with -1."""
     with pytest.raises(SpecError) as caught:
         one([1.0, 3.0], [1.0, 1.0], [-1.0, 0.5]).check_stability()
-    assert caught.value.complaints[0].code == "algebraic-loop"
+    assert caught.value.diagnostics[0].code == "algebraic-loop"
 
 
 def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_no_delay(experiment):
@@ -254,7 +254,7 @@ def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_
     one([1.0, 3.0], [1.0, 1.0], [0, 0.5]).check_delay()
     with pytest.raises(SpecError) as caught:
         one([1.0, 3.0], [1.0, 1.0], [0.5]).check_delay()
-    assert caught.value.complaints[0].code == "algebraic-loop"
+    assert caught.value.diagnostics[0].code == "algebraic-loop"
 
 
 def test_fast_sampling_keeps_the_slow_poles():

@@ -96,11 +96,11 @@ def test_unstable_and_algebraic_loops_are_refused():
     model = PolynomialModel(A=np.array([1.0, -0.9]), B=np.array([0.0, 1.0]))
     with pytest.raises(SpecError) as unstable:
         Loop(model, Rational.build([-0.5])).check_stability()
-    assert unstable.value.complaints[0].code == "unstable-loop"
+    assert unstable.value.diagnostics[0].code == "unstable-loop"
     direct = PolynomialModel(B=np.array([1.0, 0.5]))
     with pytest.raises(SpecError) as algebraic:
         Loop(direct, Rational.build([-1.0])).check_stability()
-    assert algebraic.value.complaints[0].code == "algebraic-loop"
+    assert algebraic.value.diagnostics[0].code == "algebraic-loop"
 
 
 def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_no_delay():
@@ -108,6 +108,6 @@ def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_
     now, later = Rational.build([0.3]), Rational.build([0.0, 0.3])
     with pytest.raises(SpecError) as caught:
         Loop(direct, now).check_delay()
-    assert caught.value.complaints[0].code == "algebraic-loop"
+    assert caught.value.diagnostics[0].code == "algebraic-loop"
     for plant, controller in ((direct, later), (delayed, now), (direct, None)):
         Loop(plant, controller).check_delay()

@@ -8,12 +8,12 @@ from channel_plants import arx
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.signal import (
     ChannelBounds,
-    ChannelDrawer,
-    Demand,
+    ChannelSignalGenerator,
     Lines,
     Quantiser,
-    Recipe,
     RecordFilter,
+    SignalSettings,
+    Target,
     grid_lines,
     realise_channels,
 )
@@ -44,7 +44,7 @@ def design(period, hold):
 
 
 def drawer(samples=SAMPLES, **recipe):
-    return ChannelDrawer(design, Recipe(**recipe), samples)
+    return ChannelSignalGenerator(design, SignalSettings(**recipe), samples)
 
 
 def block_spectrum(record, blocks):
@@ -181,7 +181,7 @@ RECIPES = {
 def test_limits_hold_exactly(kind, limited):
     experiment = ChannelExperiment(arx(), SAMPLES).whitened(1.0)
     plant, bounds = RecordFilter(experiment, SAMPLES, 1.0), BOUNDS[limited]
-    demand = Demand(lambda M: float(np.sqrt(0.4 / np.linalg.eigvalsh(M)[0])), meets=True)
+    demand = Target(lambda M: float(np.sqrt(0.4 / np.linalg.eigvalsh(M)[0])), meets=True)
     converters = [Quantiser(8, 4.0), Quantiser(7, 10.0)] if kind == "converter" else None
     recipe = {**RECIPES[kind], "candidates": 1, "most_candidates": 1}
     record = realise_channels(
@@ -206,7 +206,7 @@ def test_limits_hold_exactly(kind, limited):
 
 def test_powers_of_each_channel_are_kept_below_their_limits():
     plant = RecordFilter(ChannelExperiment(arx(), SAMPLES).whitened(1.0), SAMPLES, 1.0)
-    demand = Demand(lambda M: float(np.sqrt(0.5 / np.linalg.eigvalsh(M)[0])), meets=True)
+    demand = Target(lambda M: float(np.sqrt(0.5 / np.linalg.eigvalsh(M)[0])), meets=True)
     bounds = ChannelBounds(powers=(("input", 1, 0.02), ("output", None, 50.0)))
     recipe = {"method": "multisine", "candidates": 1, "most_candidates": 1}
     record = realise_channels(plant, drawer(**recipe), demand, total=10.0, bounds=bounds)

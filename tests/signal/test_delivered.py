@@ -5,11 +5,11 @@ import pytest
 from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError
-from inputdesign_cli.assemble.record import worst_ratio
-from inputdesign_cli.design.designs import Question, solve_design
+from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.signal import Demand, Recipe, input_and_output, realise, record_information
+from inputdesign_cli.signal import SignalSettings, Target, input_and_output, realise, record_information
 from inputdesign_cli.spectrum import FirBasis
+from inputdesign_cli.tasks.record import worst_ratio
 
 EXTRA = {500: 0.10, 5000: 0.03}
 
@@ -27,8 +27,10 @@ def delivered(seed, samples, **recipe):
     design = solve_design(question, tolerance=1e-6)
     problem, x = design.problem, design.result.x
     designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
-    demand = Demand(worst_ratio(problem.requirements), True, case.cost, designed)
-    record = realise(problem.experiment, FirBasis(x.size - 1), x, demand, Recipe(**recipe), samples=samples)
+    demand = Target(worst_ratio(problem.requirements), True, case.cost, designed)
+    record = realise(
+        problem.experiment, FirBasis(x.size - 1), x, demand, SignalSettings(**recipe), samples=samples
+    )
     u, y = input_and_output(problem.experiment, record.samples)
     means = {"input": np.mean(u**2), "output": np.mean(y**2), "excitation": np.mean(record.samples**2)}
     cost = sum(weight * means[kind] for kind, weight in case.cost.items())

@@ -5,17 +5,17 @@ import pytest
 
 from inputdesign_cli.signal import (
     Quantiser,
-    Recipe,
+    SignalSettings,
     Sinusoids,
     crest_factor,
     line_powers,
     optimise_phases,
     select,
 )
-from inputdesign_cli.signal.draw import Drawer
+from inputdesign_cli.signal.constraints import compressed
+from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.levels import pseudo_random, register_length, three_level, two_level
 from inputdesign_cli.signal.spectral_factor import autocorrelation
-from inputdesign_cli.signal.within import compressed
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
@@ -158,9 +158,9 @@ KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
 @pytest.mark.parametrize("basis", ["fir", "lines"])
 def test_periods_and_hold(method, basis):
     """Three equal periods of 20 values, each held four times."""
-    recipe = Recipe(method=method, periods=3, hold=4, phases="random")
+    recipe = SignalSettings(method=method, periods=3, hold=4, phases="random")
     spectrum = (FirBasis(3), COLOURED) if basis == "fir" else (LinesBasis(np.array([0.2, 0.9])), np.ones(2))
-    values = Drawer(*spectrum, recipe, 240).values(rng())
+    values = SignalGenerator(*spectrum, recipe, 240).values(rng())
     assert values.shape == (60,)
     np.testing.assert_array_equal(values[:20], values[20:40])
     np.testing.assert_array_equal(values[:20], values[40:])
@@ -169,8 +169,8 @@ def test_periods_and_hold(method, basis):
 
 def test_the_hold_is_compensated():
     """Up to pi / hold the held record has the designed density."""
-    recipe = Recipe(method="multisine", hold=4)
-    held = np.repeat(Drawer(FirBasis(3), COLOURED, recipe, 4000).values(rng()), 4)
+    recipe = SignalSettings(method="multisine", hold=4)
+    held = np.repeat(SignalGenerator(FirBasis(3), COLOURED, recipe, 4000).values(rng()), 4)
     w = 2 * np.pi * np.arange(2001) / 4000
     low = slice(1, 450)
     wanted = FirBasis(3).density(COLOURED, w)
@@ -178,9 +178,9 @@ def test_the_hold_is_compensated():
 
 
 def test_the_ramp_fades_in_and_out():
-    recipe = Recipe(ramp=10, method="white")
-    values = Drawer(FirBasis(0), np.ones(1), recipe, 100).values(rng())
-    plain = Drawer(FirBasis(0), np.ones(1), Recipe(method="white"), 100).values(rng())
+    recipe = SignalSettings(ramp=10, method="white")
+    values = SignalGenerator(FirBasis(0), np.ones(1), recipe, 100).values(rng())
+    plain = SignalGenerator(FirBasis(0), np.ones(1), SignalSettings(method="white"), 100).values(rng())
     share = values / plain
     np.testing.assert_array_equal(share[10:90], 1.0)
     assert np.all(np.diff(share[:11]) > 0)

@@ -5,16 +5,16 @@ import pytest
 
 from inputdesign_cli.signal import (
     Bounds,
-    Demand,
     Quantiser,
-    Recipe,
+    SignalSettings,
+    Target,
     input_and_output,
     largest_move,
     realise,
     record_information,
 )
-from inputdesign_cli.signal.settle import first_level, last_level, least_level, level_of_power
-from inputdesign_cli.signal.within import compressed, slow_moves
+from inputdesign_cli.signal.constraints import compressed, slow_moves
+from inputdesign_cli.signal.level_search import first_level, last_level, least_level, level_of_power
 from inputdesign_cli.spectrum import FirBasis
 
 COLOURED = np.array([1.0, 0.7, 0.3])
@@ -93,23 +93,23 @@ def test_a_level_of_some_power():
 
 def demand():
     """A condition on the information in white coordinates: its least eigenvalue is at least one half."""
-    return Demand(lambda M: float(np.sqrt(0.5 / np.linalg.eigvalsh(M)[0])), meets=True)
+    return Target(lambda M: float(np.sqrt(0.5 / np.linalg.eigvalsh(M)[0])), meets=True)
 
 
 RECIPES = {
-    "noise": Recipe(candidates=3),
-    "random": Recipe(method="multisine", candidates=3),
-    "optimised": Recipe(method="multisine", phases="optimised", candidates=2),
-    "binary": Recipe(method="binary", candidates=3),
-    "ternary": Recipe(method="ternary", candidates=3),
-    "prbs": Recipe(method="prbs", candidates=3),
-    "white": Recipe(method="white", candidates=3),
-    "held": Recipe(hold=4, candidates=3),
-    "periods": Recipe(periods=2, candidates=3),
-    "ramp": Recipe(ramp=20, candidates=3),
-    "converter": Recipe(candidates=3, quantiser=Quantiser(8, 4.0)),
-    "binary converter": Recipe(method="binary", candidates=3, quantiser=Quantiser(8, 4.0)),
-    "held converter": Recipe(candidates=3, hold=2, quantiser=Quantiser(7, 4.0)),
+    "noise": SignalSettings(candidates=3),
+    "random": SignalSettings(method="multisine", candidates=3),
+    "optimised": SignalSettings(method="multisine", phases="optimised", candidates=2),
+    "binary": SignalSettings(method="binary", candidates=3),
+    "ternary": SignalSettings(method="ternary", candidates=3),
+    "prbs": SignalSettings(method="prbs", candidates=3),
+    "white": SignalSettings(method="white", candidates=3),
+    "held": SignalSettings(hold=4, candidates=3),
+    "periods": SignalSettings(periods=2, candidates=3),
+    "ramp": SignalSettings(ramp=20, candidates=3),
+    "converter": SignalSettings(candidates=3, quantiser=Quantiser(8, 4.0)),
+    "binary converter": SignalSettings(method="binary", candidates=3, quantiser=Quantiser(8, 4.0)),
+    "held converter": SignalSettings(candidates=3, hold=2, quantiser=Quantiser(7, 4.0)),
 }
 BOUNDS = {
     "amplitude": Bounds(amplitude=1.3),
@@ -165,7 +165,7 @@ def test_a_looser_limit_never_costs_more(first_order):
             FirBasis(2),
             COLOURED,
             demand(),
-            Recipe(candidates=5),
+            SignalSettings(candidates=5),
             samples=500,
             bounds=Bounds(amplitude=amplitude),
         )
@@ -180,7 +180,7 @@ def test_powers_are_kept_below_their_limits(first_order):
     experiment = first_order.whitened(1.0)
     short = Bounds(powers=(("input", 0.1),))
     record = realise(
-        experiment, FirBasis(2), COLOURED, demand(), Recipe(candidates=3), samples=500, bounds=short
+        experiment, FirBasis(2), COLOURED, demand(), SignalSettings(candidates=3), samples=500, bounds=short
     )
     assert not record.met
     assert np.mean(record.samples**2) == pytest.approx(0.1)

@@ -9,9 +9,9 @@ from plants import random_case
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.signal import (
-    Demand,
-    Recipe,
+    SignalSettings,
     Sinusoids,
+    Target,
     autocorrelation,
     filtered_noise,
     line_powers,
@@ -116,8 +116,8 @@ def test_free_lines_that_a_record_cannot_tell_apart_do_not_cancel(first_order):
     basis = LinesBasis(np.array([1e-5, 2.0, 1.1e-5, 3e-4, 2.0 + 1e-6, 4e-4]), free=True)
     x = np.array([1.0, 0.5, 1.0, 1.0, 0.5, 1.0])
     for seed in range(6):
-        recipe = Recipe("multisine", candidates=1, seed=seed)
-        record = realise(first_order, basis, x, Demand(lambda _: 0.0), recipe, samples=500)
+        recipe = SignalSettings("multisine", candidates=1, seed=seed)
+        record = realise(first_order, basis, x, Target(lambda _: 0.0), recipe, samples=500)
         assert abs(np.mean(record.samples)) == pytest.approx(2.0, rel=0.01)
         line = 2 * np.abs(np.mean(record.samples * np.exp(-2.0j * np.arange(500)))) ** 2
         assert line == pytest.approx(1.0, rel=0.05)
@@ -125,8 +125,8 @@ def test_free_lines_that_a_record_cannot_tell_apart_do_not_cancel(first_order):
 
 def test_given_lines_are_made_as_they_are_given(first_order):
     basis = LinesBasis(np.array([1.0, 1.001]))
-    recipe = Recipe("multisine", candidates=1)
-    record = realise(first_order, basis, np.ones(2), Demand(lambda _: 0.0), recipe, samples=500)
+    recipe = SignalSettings("multisine", candidates=1)
+    record = realise(first_order, basis, np.ones(2), Target(lambda _: 0.0), recipe, samples=500)
     rows = np.exp(1j * np.outer([1.0, 1.001], np.arange(500)))
     regressors = np.concatenate([rows.real, rows.imag]).T
     fit = np.linalg.lstsq(regressors, record.samples, rcond=None)

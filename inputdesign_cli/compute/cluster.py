@@ -1,0 +1,143 @@
+"""A Dask cluster that is running already, by its address (needs the extra `cluster`)."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from inputdesign_cli import __version__
+from inputdesign_cli.compute.executor import Answer, Finished, Task, WorkerLostError
+from inputdesign_cli.errors import DataError, Diagnostic
+
+_AHEAD = 2  # tasks on their way for each thread of the cluster
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """The workers behind the scheduler at `address`.
+
+    A task whose worker is lost is given to another one (the scheduler sees to it, three times at most).
+    Workers that join while tasks are running are used.
+    """
+
+    address: str
+    patience: float = 10.0  # seconds to find the scheduler, and a first worker
+    shares_files: bool = field(default=False, init=False)
+
+    def run(
+        self, function: Callable[[Task], Answer], tasks: Iterable[Task]
+    ) -> Iterator[Finished[Task, Answer]]:
+        """Yield every task with its answer, in the order in which they are finished.
+
+        Raises
+        ------
+        DataError : `cluster-extra`, `cluster-unreachable`, `cluster-version`.
+        """
+        with self._client() as client:
+            from distributed import as_completed
+            from distributed.scheduler import KilledWorker
+
+            source = iter(tasks)
+            known: dict[str, Task] = {}
+            running = as_completed(loop=client.loop)
+            while True:
+                with _reaching(self.address):
+                    room = _AHEAD * _threads(client) - len(known)
+                for task in _take(source, room):
+                    with _reaching(self.address):
+                        future = client.submit(function, task, pure=False)
+                        known[future.key] = task
+                        running.add(future)
+                if not known:
+                    return
+                with _reaching(self.address):
+                    future = next(running)
+                    if future.cancelled():
+                        raise CancelledError
+                    error = future.exception()
+                task = known.pop(future.key)
+                if isinstance(error, KilledWorker):
+                    error = WorkerLostError(
+                        f"the workers that were given it ended in the middle of it: {error}"
+                    )
+                yield Finished(task, None if error else future.result(), error)
+                future.release()
+
+    @contextmanager
+    def _client(self) -> Iterator[Any]:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise DataError(
+                Diagnostic(
+                    "cluster-extra",
+                    "Dask is not installed",
+                    hint="pip install 'inputdesign-cli[cluster]'",
+                )
+            ) from None
+        # Its diagnostics about lost connections are no news: what they lead to is an error of ours.
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        try:
+            client = Client(self.address, timeout=self.patience, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise _unreachable(self.address, str(error).splitlines()[0] if str(error) else "") from None
+        try:
+            client.wait_for_workers(1, timeout=self.patience)
+            self._check_versions(client)
+            yield client
+        except TimeoutError:
+            raise _unreachable(self.address, "it has no workers") from None
+        finally:
+            client.close()
+
+    def _check_versions(self, client: Any) -> None:
+        for worker, version in client.run(_version, on_error="return").items():
+            if version != __version__:
+                found = version if isinstance(version, str) else "no inputdesign-cli that can be imported"
+                raise DataError(
+                    Diagnostic(
+                        "cluster-version",
+                        f"the worker {worker} has {found}, and this is {__version__}",
+                        hint="install the same version everywhere, so that every point is computed alike",
+                    )
+                )
+
+
+def _version() -> str:
+    import inputdesign_cli
+
+    return inputdesign_cli.__version__
+
+
+def _threads(client: Any) -> int:
+    return max(1, sum(client.nthreads().values()))
+
+
+def _take(source: Iterator[Task], count: int) -> Iterator[Task]:
+    for _ in range(count):
+        try:
+            yield next(source)
+        except StopIteration:
+            return
+
+
+@contextmanager
+def _reaching(address: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, TimeoutError, CancelledError) as lost:
+        raise _unreachable(address, "the scheduler has ended") from lost
+
+
+def _unreachable(address: str, why: str) -> DataError:
+    return DataError(
+        Diagnostic(
+            "cluster-unreachable",
+            f"there is no Dask cluster to compute on at {address}{f': {why}' if why else ''}",
+            hint="start one (`dask scheduler`, `dask worker ADDRESS --nthreads 1`) or leave out --cluster",
+        )
+    )

@@ -1,0 +1,173 @@
+"""Processes of this machine: each imports the libraries once and computes on one thread.
+
+The standard pools end when one of their processes is killed, and leave processes behind when they are
+killed themselves. Here each process has a pipe of its own: when the process ends, its task is given to
+another one; when the caller ends, the pipe closes and the process ends too.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from inputdesign_cli.compute.executor import Answer, Finished, Task, WorkerLostError
+from inputdesign_cli.compute.threads import ONE_THREAD
+
+_ATTEMPTS = 2
+
+
+@dataclass
+class _Worker:
+    process: Any
+    pipe: Connection
+    work: Any = None  # (task, attempts so far) while it is at work
+
+
+@dataclass(frozen=True)
+class Processes:
+    """`jobs` processes; a task whose process is killed is tried once more, then it has failed."""
+
+    jobs: int
+    shares_files: bool = field(default=True, init=False)
+
+    def run(
+        self, function: Callable[[Task], Answer], tasks: Iterable[Task]
+    ) -> Iterator[Finished[Task, Answer]]:
+        """Yield every task with its answer, in the order in which they are finished."""
+        workers: list[_Worker] = []
+        again: list[tuple[Task, int]] = []
+        source = iter(tasks)
+        try:
+            while True:
+                self._feed(workers, function, again, source)
+                busy = [worker for worker in workers if worker.work is not None]
+                if not busy:
+                    return
+                ready = wait([worker.pipe for worker in busy])
+                for worker in [w for w in busy if w.pipe in ready]:
+                    task, attempts = worker.work
+                    worker.work = None
+                    try:
+                        answer, error = worker.pipe.recv()
+                    except (EOFError, OSError):
+                        workers.remove(worker)
+                        _end(worker)
+                        if attempts < _ATTEMPTS:
+                            again.append((task, attempts))
+                            continue
+                        answer, error = (
+                            None,
+                            WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"),
+                        )
+                    yield Finished(task, answer, error)
+        finally:
+            for worker in workers:
+                _end(worker)
+
+    def _feed(
+        self, workers: list[_Worker], function: Any, again: list[tuple[Any, int]], source: Iterator[Any]
+    ) -> None:
+        """Give every free process a task, and start processes while there are tasks for them."""
+        while True:
+            free = next((worker for worker in workers if worker.work is None), None)
+            if free is None and len(workers) >= self.jobs:
+                return
+            if again:
+                task, attempts = again.pop()
+            else:
+                try:
+                    task, attempts = next(source), 0
+                except StopIteration:
+                    return
+            if free is None:
+                free = _start()
+                workers.append(free)
+            free.work = (task, attempts + 1)
+            # A process that has just ended tells so by its pipe, where its answer is awaited.
+            with suppress(BrokenPipeError, ConnectionResetError):
+                free.pipe.send((function, task))
+
+
+def _start() -> _Worker:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs,), daemon=True)
+    with _environment(ONE_THREAD), _deaf_to_interrupts():
+        process.start()
+    theirs.close()
+    return _Worker(process, ours)
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """What a process is told to ignore its children ignore from their first moment on."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _end(worker: _Worker) -> None:
+    worker.pipe.close()
+    worker.process.terminate()
+    worker.process.join()
+
+
+def _serve(pipe: Connection) -> None:
+    """The life of a process: a task after the other until the caller has gone."""
+    threading.Thread(target=_end_with_the_caller, daemon=True).start()
+    while True:
+        try:
+            function, task = pipe.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            reply: tuple[Any, Exception | None] = (function(task), None)
+        except Exception as error:
+            reply = (None, _portable(error))
+        try:
+            pipe.send(reply)
+        except OSError:
+            return
+
+
+def _end_with_the_caller() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _portable(error: Exception) -> Exception:
+    """The error itself, or its words if it cannot be pickled."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

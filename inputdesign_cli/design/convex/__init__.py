@@ -1,0 +1,1 @@
+"""Convex designs: the exchange method, its certificates, limits and baselines."""

@@ -1,0 +1,158 @@
+"""Designs that meet everything: an iterate of the exchange, repaired by scaling or by mixing.
+
+A relaxed optimum misses a little of what it was not told about. Where scaling up only helps (no limits,
+or limits that scale along), the smallest sufficient factor repairs it. Otherwise it is mixed with a
+design that meets everything strictly: the miss is convex along the way, so that its chord already leads
+to a design that is good enough, and a few steps find the best mixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.plant.polynomial import Array
+
+Place = tuple[int, float | None]
+
+_MEETS = 1e-12
+_MIXINGS = 12
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A feasible design: z (size,), s, M' (k, k) and the objective (the cost, or s).
+
+    The spectrum is z / s; goals without s have s = 1.
+    """
+
+    z: Array
+    s: float
+    information: Array
+    objective: float
+
+
+def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
+    """The candidate with these unknowns, whatever it meets."""
+    information = problem.fixed_information + problem.excited_information(z)
+    if problem.scaled:
+        information = information + s * problem.scaled_information
+    return Candidate(z, s, information, s if problem.scaled else problem.price.at(z))
+
+
+def least_scale(problem: Problem, z: Array) -> float:
+    """The least s for which z keeps to its upper limits."""
+    used = [
+        functional.at(z) / limit.bound
+        for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True)
+        if limit.upper
+    ]
+    breaches = problem.density_breaches(z, 1.0, above=-np.inf) if problem.densities else []
+    used += [breach.ratio for breach in breaches if problem.densities[breach.place.limit].upper]
+    return max(used, default=0.0)
+
+
+def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> Candidate:
+    """z times the smallest factor that meets every requirement (s with it), found by the secant method.
+
+    The search looks at `places` (requirement, frequency) only; the full check follows, and adds to them.
+    """
+    if problem.scaled:
+        if problem.floors_fixed:
+            z = z * max(1.0, missing_floor(problem, z))
+        s = max(least_scale(problem, z), s if problem.goal == "samples" else 0.0)
+    if problem.goal == "factor":
+        # All of M' scales, so that one look at the ratios gives the factor, above or below one.
+        information = candidate_at(problem, z, s).information
+        factor = max((v.ratio for _, v in problem.violations(information)), default=1.0) ** 2
+        return candidate_at(problem, factor * z, factor * s)
+    factor, at = 1.0, set(places)
+    for _ in range(12):
+        factor = _smallest_factor(problem, z, s, at, factor)
+        information = candidate_at(problem, factor * z, factor * s).information
+        missed = [(i, v) for i, v in problem.violations(information, above=1.0) if v.ratio > 1.0 + _MEETS]
+        if not missed:
+            break
+        at |= {(i, v.frequency) for i, v in missed}
+    return candidate_at(problem, factor * z, factor * s if problem.scaled else 1.0)
+
+
+def missing_floor(problem: Problem, z: Array) -> float:
+    """The factor by which z must grow to reach its lower limits (below one: it exceeds them)."""
+    shares = [
+        limit.bound / functional.at(z)
+        for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True)
+        if not limit.upper
+    ]
+    if problem.densities:
+        breaches = problem.density_breaches(z, 1.0, above=-np.inf)
+        lower = [2.0 - b.ratio for b in breaches if not problem.densities[b.place.limit].upper]
+        shares += [1.0 / max(share, 1e-12) for share in lower]
+    return max(shares, default=0.0)
+
+
+def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], factor: float) -> float:
+    excited = problem.excited_information(z) + (s * problem.scaled_information if problem.scaled else 0.0)
+    places: dict[int, list[float | None]] = {}
+    for index, frequency in at:
+        places.setdefault(index, []).append(frequency)
+
+    def excess(f: float) -> float:
+        information = problem.fixed_information + f * excited
+        ratios = [problem.requirements[i].ratios(information, np.array(w)).max() for i, w in places.items()]
+        return float(max(ratios, default=0.0)) ** 2 - 1.0
+
+    value = excess(factor)
+    while value > _MEETS:
+        # The squared ratio falls at most like 1 / factor, so this step never overshoots.
+        step = factor * (1.0 + value)
+        slope = (excess(step) - value) / (step - factor)
+        factor = max(step, factor - value / slope) if slope < 0 else step
+        value = excess(factor)
+    return factor
+
+
+def excess(problem: Problem, candidate: Candidate) -> float:
+    """How far the worst condition is missed, negative when all are met: requirements and limits alike."""
+    z, s, information = candidate.z, candidate.s, candidate.information
+    try:
+        ratios = [v.ratio**2 for _, v in problem.violations(information)]
+        ratios += [s * v.ratio**2 for _, v in problem.side_violations(information)]
+    except np.linalg.LinAlgError:
+        return np.inf
+    for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True):
+        level = limit.bound * problem.bound_factor(limit.upper, s)
+        share = functional.at(z) / level if level > 0 else 2.0
+        ratios.append(share if limit.upper else 2.0 - share)
+    ratios += [breach.ratio for breach in problem.density_breaches(z, s, above=-np.inf)]
+    return max(ratios, default=0.0) - 1.0
+
+
+def mixed(problem: Problem, z: Array, s: float, interior: Candidate) -> Candidate:
+    """The design nearest to (z, s) on the way to the strictly feasible `interior` that meets everything."""
+
+    def at(share: float) -> Candidate:
+        return candidate_at(problem, z + share * (interior.z - z), s + share * (interior.s - s))
+
+    start = at(0.0)
+    missed = excess(problem, start)
+    if missed <= _MEETS:
+        return start
+    room = -excess(problem, interior)
+    low, high, good = 0.0, 1.0, interior
+    trial = missed / (missed + room) if np.isfinite(missed) and room > 0 else 0.5
+    for _ in range(_MIXINGS):
+        candidate = at(trial)
+        left = excess(problem, candidate)
+        if left <= _MEETS:
+            high, good, room = trial, candidate, -left
+        else:
+            low, missed = trial, left
+        if high - low <= 1e-3 * high:
+            break
+        share = missed / (missed + room) if np.isfinite(missed) and missed + room > 0 else 0.5
+        trial = low + (high - low) * min(max(share, 0.02), 0.98)
+    return good

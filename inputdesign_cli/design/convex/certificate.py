@@ -1,0 +1,132 @@
+"""Lower bounds that we prove ourselves: dual points, evaluated and made exactly feasible.
+
+Every cut gives tr(Y M') >= r for all admissible M'; every limit a(z) <= b (times s) takes a weight
+w >= 0. With price = cost + sum w a over the upper limits and value = tr(Y M(.)) + sum w a over the lower
+ones, let t be the largest number with price - t value >= 0 on the whole cone of spectra. Then, for the
+goal "cost",
+
+    cost(z) >= t (sum r - tr(Y M0) + sum_lower w b) - sum_upper w b
+
+and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0,
+
+    s >= t (sum r - tr(Y M_fixed)) / (sum_upper w b - t sum_lower w b + t tr(Y M_scaled) - t sum_side r).
+
+The multipliers of the solver only suggest Y and w; the bounds hold whatever they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.design.convex.master import Proof, Row
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import Functional
+
+# Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs
+# the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
+# what only it prices would then set the scale: the largest share is tried last.
+_LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A proved lower bound on the objective, and the dual point that proves it.
+
+    `weight` Y (k, k) and `limits` (a weight for each power limit) are scaled such that
+    price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
+    the spectra for which that is tightest (see `spectrum.Pricing`).
+    """
+
+    bound: float
+    weight: Array
+    directions: Array
+    limits: Array
+    price: Functional | None = None
+    value: Functional | None = None
+
+
+def certify(
+    problem: Problem, proof: Proof, sides: Sequence[bool] = (), rows: Sequence[Row] = ()
+) -> Certificate:
+    """The bound that these multipliers prove for the spectra of the problem.
+
+    Args:
+        sides: for each cut of the proof whether it is a side requirement's; missing means that none is.
+        rows: the limits that the weights `proof.rows` belong to.
+    """
+    found = _certified(problem, proof, sides, rows, _LEAST_SHARES[0])
+    if problem.goal == "cost":
+        return found
+    for share in _LEAST_SHARES[1:]:
+        other = _certified(problem, proof, sides, rows, share)
+        if other.bound <= found.bound:
+            break
+        found = other
+    return found
+
+
+def _certified(
+    problem: Problem, proof: Proof, sides: Sequence[bool], rows: Sequence[Row], share: float
+) -> Certificate:
+    k = problem.experiment.size
+    sides = sides or [False] * len(proof.cuts)
+    weight = sum((Y for Y, _ in proof.cuts), np.zeros((k, k)))
+    required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if not side)
+    scaled_required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if side)
+    weights = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
+    price: Functional | None = problem.price if problem.goal == "cost" else None
+    value = problem.value(weight)
+    upper = lower = fixed_lower = 0.0
+    for row, w in zip(rows, weights, strict=True):
+        if w == 0.0:
+            continue
+        if row.upper:
+            price = row.functional * w if price is None else price + row.functional * w
+            upper += w * row.bound
+        else:
+            value = value + row.functional * w
+            if problem.scaled and not problem.floors_fixed:
+                lower += w * row.bound
+            else:
+                fixed_lower += w * row.bound
+    if price is None:
+        raise ValueError("a goal with s needs an upper limit")
+    pricing = problem.basis.price(price, value, problem.grid)
+    gain = required - float(np.sum(weight * problem.fixed_information)) + fixed_lower
+    t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
+    if problem.goal == "cost":
+        bound, unit = t * gain - upper, 1.0
+    else:
+        scaled = float(np.sum(weight * problem.scaled_information))
+        spent = upper + t * (scaled - lower - scaled_required)
+        bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
+    if bound <= 0.0:
+        t = 0.0
+    shares = np.zeros(len(problem.limits))
+    for row, w in zip(rows, weights, strict=True):
+        if row.limit is not None:
+            shares[row.limit] = w * unit * (1.0 if row.upper else t)
+    return Certificate(
+        bound=max(bound, 0.0),
+        weight=t * unit * weight,
+        directions=pricing.directions,
+        limits=shares,
+        price=price * unit,
+        value=value * (t * unit),
+    )
+
+
+def _kept(rows: Sequence[Row], weights: Array, share: float) -> Array:
+    """The weights with a `share` of what all upper limits take added to each limit on a power."""
+    if not len(rows):
+        return weights
+    powers = np.array([row.upper and row.limit is not None for row in rows])
+    bounds = np.array([row.bound for row in rows])
+    spent = float(np.sum((weights * bounds)[[row.upper for row in rows]]))
+    added = np.zeros(len(rows))
+    added[powers] = share * max(spent, 1e-30) / bounds[powers]
+    return weights + added

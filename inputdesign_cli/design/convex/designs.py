@@ -1,0 +1,271 @@
+"""The three designs, each with its white baseline and its bound over every spectrum.
+
+Least cost, best accuracy and the shortest experiment are one program in different unknowns (see
+`Problem`); what differs is what white excitation is worth and what stands for "nothing is needed".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, least_scale, scaled_up
+from inputdesign_cli.design.convex.certificate import Certificate
+from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
+from inputdesign_cli.design.convex.feasible import strictly_feasible
+from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
+from inputdesign_cli.design.convex.problem import Goal, Problem, RequirementFactory, Weight
+from inputdesign_cli.design.convex.white import least_white_power
+from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
+from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import (
+    Basis,
+    DirectedLines,
+    FirBasis,
+    FlatBasis,
+    LinesBasis,
+    flat_basis,
+    free_lines,
+)
+
+_ANY_SPECTRUM_TOLERANCE = 1e-6
+_KEEPS = 1e-9
+_FAR_BELOW = 1e-12
+_UNEXCITED = 1e-13
+_PLENTY = 1e9
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked, in raw parameters: requirements are made for the coordinates of a design.
+
+    `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
+    `side` must hold besides. The other goals meet all of them. `band` (rad/sample) confines spectra of
+    lines.
+    """
+
+    experiment: Experiment
+    basis: Basis
+    goal: Goal
+    requirements: Sequence[RequirementFactory]
+    side: Sequence[RequirementFactory] = ()
+    cost: Mapping[PowerKind, Weight] = field(default_factory=dict)
+    limits: Sequence[PowerLimit] = ()
+    densities: Sequence[DensityLimit] = ()
+    band: tuple[float, float] = (0.0, np.pi)
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design and what it is compared with.
+
+    `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even
+    over the inputs and meets the same requirements (or exhausts the same limits); `white_power` is its power,
+    `white_within` tells whether it keeps to the limits. `any_spectrum` is the same problem over all
+    spectra; its certificate bounds every excitation whatever (limits on the density left out).
+    """
+
+    problem: Problem
+    white: Candidate
+    white_power: float
+    white_within: bool
+    result: ExchangeResult
+    any_spectrum: ExchangeResult
+
+
+def solve_design(question: Question, *, tolerance: float) -> Design:
+    """Solve a design problem with its baseline and its bound over every spectrum.
+
+    Raises:
+        SpecError: `not-identifiable` when no excitation can tell some parameters apart;
+            `too-few-lines` when the given lines cannot.
+        UnreachableError: the requirements cannot be met within the limits.
+    """
+    power = white_power(question)
+    powers = balanced_powers(question, power or 1.0)
+    question = replace(question, basis=_in_units(question.basis, powers))
+    problem = whitened_problem(question, powers)
+    flat = _on_flat(problem)
+    white = _white(question, flat, power)
+    white_level = float(white.z[0] / white.s)
+    anywhere = _anywhere(question, problem, powers)
+    if power == 0.0 and not problem.has_floors:
+        return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
+    within = excess(flat, white) <= _KEEPS
+    result = _solve(problem, _flat(problem.basis, powers), tolerance)
+    if isinstance(question.basis, LinesBasis | DirectedLines) and question.basis.free:
+        return Design(problem, white, white_level, within, result, result)
+    loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
+    anything = _solve(anywhere, _flat(anywhere.basis, powers), loose)
+    return Design(problem, white, white_level, within, result, anything)
+
+
+def white_power(question: Question) -> float:
+    """The power of white excitation that answers the question, 0 where none is needed."""
+    if question.goal == "cost":
+        return least_white_power(question.experiment, question.requirements)
+    unit = whitened_problem(replace(question, basis=flat_basis(question.experiment)), 1.0)
+    return 1.0 / least_scale(unit, np.ones(1))
+
+
+def balanced_powers(question: Question, power: float) -> float | Array:
+    """Of several inputs the powers (r,) that take equal shares of the price of white excitation.
+
+    Where the units of the inputs differ, so do their prices or limits: an excitation even over the
+    inputs would then be a poor start, and its information matrix a poor measure. One input has `power`.
+    """
+    r, family = question.experiment.inputs, question.basis
+    if r == 1:
+        return power
+    if isinstance(family, FlatBasis):
+        family = free_lines(question.experiment, np.array(question.band))
+    price = _stated(replace(question, basis=family), question.experiment).price
+    prices = np.array([price.at(family.spread(channel)) for channel in np.eye(r)])  # type: ignore[attr-defined]
+    if np.ptp(prices) <= _KEEPS * prices.max():
+        return power
+    return power * prices.mean() / (r * prices)
+
+
+def whitened_problem(question: Question, powers: float | Array) -> Problem:
+    """The problem in coordinates where flat excitation of these powers gives M = I."""
+    coordinates = question.experiment.whitened(powers)  # type: ignore[arg-type]
+    return replace(
+        _stated(question, coordinates),
+        requirements=tuple(make(coordinates) for make in question.requirements),
+        side=tuple(make(coordinates) for make in question.side),
+    )
+
+
+def _stated(question: Question, experiment: Experiment) -> Problem:
+    """The problem but for what it requires."""
+    densities = tuple(question.densities)
+    implied = [implied_power(d, experiment.inputs) for d in densities if d.upper]
+    return Problem(
+        experiment=experiment,
+        basis=question.basis,
+        cost=question.cost,
+        requirements=(),
+        limits=(*question.limits, *implied),
+        densities=densities,
+        goal=question.goal,
+    )
+
+
+def _anywhere(question: Question, problem: Problem, powers: float | Array) -> Problem:
+    lo, hi = question.band
+    grid = problem.grid[(problem.grid >= lo) & (problem.grid <= hi)]
+    lines = _in_units(free_lines(question.experiment, np.union1d(grid, [lo, hi])), powers)
+    return replace(problem, basis=lines, densities=(), finer=None)
+
+
+def _in_units(basis: Basis, powers: float | Array) -> Basis:
+    """Lines with directions that suit the channels; other families have none."""
+    several = isinstance(basis, DirectedLines) and np.ndim(powers) == 1
+    return basis.in_units(np.sqrt(powers)) if several else basis  # type: ignore[attr-defined]
+
+
+def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
+    _check_excites(problem, start)
+    floors = problem.has_floors
+    limited = bool(problem.limits or problem.densities)
+    if problem.goal == "cost" and limited and not floors:
+        # Limits that the cheapest design keeps anyway cost nothing.
+        unlimited = replace(problem, limits=(), densities=(), finer=problem)
+        free = exchange(unlimited, start, tolerance=tolerance)
+        same = free.basis is problem.basis
+        kept = replace(problem, basis=free.basis, finer=problem if same else None)
+        if excess(kept, candidate_at(kept, free.x, 1.0)) <= _KEEPS:
+            no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
+            return replace(free, certificate=no_weight)
+    if not (floors or problem.side or (problem.goal == "cost" and limited)):
+        return exchange(problem, start, tolerance=tolerance)
+    basis, interior = strictly_feasible(problem, start)
+    same = basis is problem.basis
+    problem = replace(problem, basis=basis, finer=problem if same else None)
+    return exchange(problem, start, tolerance=tolerance, interior=interior)
+
+
+def _white(question: Question, flat: Problem, power: float) -> Candidate:
+    if question.goal == "cost":
+        return candidate_at(flat, np.array([power]), 1.0)
+    # From far below, since what meets the requirements with room to spare is not scaled down.
+    return scaled_up(replace(flat, floors_fixed=False), np.array([_FAR_BELOW * power]), 0.0, [])
+
+
+def _on_flat(problem: Problem) -> Problem:
+    basis = flat_basis(problem.experiment)
+    head = isinstance(basis, FirBasis) and isinstance(problem.basis, FirBasis)
+    return replace(problem, basis=basis, finer=problem if head else None)
+
+
+def _flat(basis: Basis, powers: float | Array) -> Array:
+    family: Any = basis  # each has one of these
+    if np.ndim(powers) == 1:
+        return np.asarray(family.spread(powers))
+    return powers * (family.flat if isinstance(basis, LinesBasis | DirectedLines) else family.white)
+
+
+def _check_excites(problem: Problem, start: Array) -> None:
+    """Raise `SpecError` (`too-few-lines`) when even all lines together leave parameters unexcited."""
+    if not problem.needs_definite:
+        return
+    eigenvalues, vectors = np.linalg.eigh(problem.information(start))
+    if eigenvalues[0] > _UNEXCITED * eigenvalues[-1]:
+        _check_reachable(problem, start)
+        return
+    names = problem.experiment.unexcited(vectors[:, 0])
+    raise bad_spec(
+        "too-few-lines",
+        f"these lines cannot tell the parameters apart: nothing is learnt about {names}",
+        hint="each sinusoid tells at most two parameters apart (one at frequency 0 or pi): give more "
+        "frequencies, or use type: free",
+        key="spectrum",
+    )
+
+
+def _check_reachable(problem: Problem, start: Array) -> None:
+    """Raise `InfeasibleError` when no power of these lines is enough: they excite too few directions.
+
+    What the noise alone tells keeps the information matrix regular then, but does not grow with power.
+    """
+    if problem.goal != "cost" or isinstance(problem.basis, FirBasis):
+        return
+    excited = np.linalg.eigvalsh(problem.excited_information(start))
+    if excited[0] > _UNEXCITED * excited[-1]:
+        return
+    try:
+        ratio = problem.worst_ratio(problem.information(_PLENTY * start)).ratio
+    except np.linalg.LinAlgError:
+        ratio = np.inf
+    if ratio > 1.0:
+        raise InfeasibleError(
+            Diagnostic(
+                "infeasible",
+                "no power of these lines reaches the accuracy: they excite only "
+                f"{int(np.sum(excited > _UNEXCITED * excited[-1]))} combinations of the "
+                f"{problem.experiment.size} parameters",
+                "each sinusoid tells at most two parameters apart: give more frequencies, or use type: free",
+                "spectrum",
+            )
+        )
+
+
+def _nothing(problem: Problem) -> ExchangeResult:
+    """The answer when what is known already meets every requirement: no excitation at all."""
+    k = problem.experiment.size
+    none = Certificate(0.0, np.zeros((k, k)), np.zeros(0), np.zeros(len(problem.limits)))
+    return ExchangeResult(
+        basis=problem.basis,
+        x=np.zeros(problem.basis.size),
+        s=1.0,
+        objective=0.0,
+        information=problem.baseline_information,
+        certificate=none,
+        active=(),
+        rounds=0,
+        cuts=0,
+    )

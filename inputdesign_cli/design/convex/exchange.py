@@ -1,0 +1,320 @@
+"""The exchange method: a finite conic program, enlarged by whatever it violates, until a proof closes.
+
+Both the cone of spectra and most requirements hold infinitely many conditions. Each round solves
+with a finite selection, whose optimum is a relaxation, asks every piece for its worst violations,
+and adds those. Upper bound: the iterate, repaired until everything holds (`candidate`). Lower bound:
+its multipliers, made exactly dual feasible (`certificate`). Their distance is the proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.accuracy import Cut, Violation
+from inputdesign_cli.design.convex.candidate import (
+    Candidate,
+    Place,
+    candidate_at,
+    least_scale,
+    mixed,
+    scaled_up,
+)
+from inputdesign_cli.design.convex.certificate import Certificate, certify
+from inputdesign_cli.design.convex.limits import DensityBreach
+from inputdesign_cli.design.convex.master import Proof, Row, solve_master
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.rows import alike, density_row, first_density_rows, on_basis, power_rows
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import Basis, Face
+
+MAX_ROUNDS = 60
+# A far-off iterate is not worth repairing: its upper bound would say nothing.
+_WORTH_REPAIRING = 1.5
+_FIRST_CUTS = 0.3
+_MORE_CUTS = 6
+_HALVINGS = 6
+_BINDS = 1e-5
+_PROGRESS = 1e-5
+_STAGE_TOLERANCE = 1e-2
+_STAGE_ROUNDS = 10
+_MOST_ROWS = 12
+# Rounds without a tenth of progress after which rounding has the last word. A basis that still grows may
+# take several to find the sinusoids that pay.
+_PATIENCE, _PATIENCE_GROWING = 6, 16
+
+Enough = Callable[[float, float], bool]
+
+
+@dataclass(frozen=True)
+class ExchangeResult:
+    """A spectrum `x` of `basis` that meets everything, its information, and the proved bound.
+
+    `objective` is what was minimised: the cost, or s (see `Problem`); `certificate.bound` is its proved
+    lower bound. `information` (k, k) is M(x); for the goal "samples" that of the s samples.
+    """
+
+    basis: Basis
+    x: Array
+    s: float
+    objective: float
+    information: Array
+    certificate: Certificate
+    active: tuple[Place, ...]  # (requirement, frequency) with a positive multiplier
+    rounds: int
+    cuts: int
+
+    @property
+    def cost(self) -> float:
+        """The objective of a least-cost design."""
+        return self.objective
+
+    @property
+    def active_frequencies(self) -> Array:
+        """Frequencies (rad/sample) of the requirements that bind."""
+        return np.array([w for _, w in self.active if w is not None])
+
+    @property
+    def gap(self) -> float:
+        """|objective - bound| / objective: a bound beyond the objective is as wrong as one far below."""
+        difference = abs(self.objective - self.certificate.bound)
+        return difference / self.objective if self.objective > 0 else 0.0
+
+
+def exchange(
+    problem: Problem,
+    start: Array,
+    *,
+    tolerance: float,
+    interior: Array | None = None,
+    enough: Enough | None = None,
+) -> ExchangeResult:
+    """Solve a design problem to a proved relative gap.
+
+    Args:
+        start: (size,) a spectrum to begin with, scaled up until it meets everything (white does);
+            the answer is never worse.
+        interior: (size,) a spectrum that meets limits and (side) requirements strictly. Needed where
+            scaling cannot repair an iterate: limits or lower limits that do not scale, side requirements.
+        tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
+            when the solver makes no more progress: its `gap` says so.
+        enough: stop already when it says so of (objective, bound).
+    """
+    done = enough or (lambda objective, bound: False)
+    coarser = [] if interior is not None else problem.basis.coarser()
+    stages = [problem.coarsened(coarse) for coarse in coarser] + [problem]
+    state = _first_state(stages[0], start, interior)
+    rounds = 0
+    for stage in stages:
+        if stage is not stages[0]:
+            state = state.moved_to(stage) if state.solved else _first_state(stage, start, interior)
+        goal = tolerance if stage is problem else max(_STAGE_TOLERANCE, tolerance)
+        gaps: list[float] = []
+        for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
+            rounds += 1
+            solved = state.improve(tolerance)
+            gaps.append(state.gap)
+            grows = state.problem.basis.size > stage.basis.size
+            patience = _PATIENCE_GROWING if grows else _PATIENCE
+            stalled = len(gaps) > patience and gaps[-1] > 0.9 * gaps[-1 - patience]
+            if not solved or state.gap <= goal or stalled:
+                break
+            if done(state.best.objective, state.certificate.bound):
+                break
+    best = state.best
+    whole = problem.goal == "samples" or not problem.scaled
+    return ExchangeResult(
+        basis=state.problem.basis,
+        x=best.z / best.s,
+        s=best.s,
+        objective=best.objective,
+        information=best.information if whole else best.information / best.s,
+        certificate=state.certificate,
+        active=state.active,
+        rounds=rounds,
+        cuts=len(state.cuts),
+    )
+
+
+@dataclass
+class _State:
+    """What the method knows: the face, cuts and rows of the finite program, the best design and proof."""
+
+    problem: Problem
+    face: Face
+    best: Candidate
+    interior: Candidate | None
+    keys: list[Place]
+    cuts: list[Cut]
+    rows: list[Row]
+    certificate: Certificate
+    active: tuple[Place, ...] = ()
+    proof: Proof | None = None
+    solved: tuple[Face, Array] | None = None  # the face and y of the latest finite program
+
+    @property
+    def gap(self) -> float:
+        return (self.best.objective - self.certificate.bound) / self.best.objective
+
+    @property
+    def sides(self) -> list[bool]:
+        return [index >= len(self.problem.requirements) for index, _ in self.keys]
+
+    def improve(self, tolerance: float) -> bool:
+        """One round: solve, prove, repair, enlarge. False when the solver fails and nothing improves."""
+        problem = self.problem
+        tagged = list(zip(self.cuts, self.sides, strict=True))
+        answer = solve_master(
+            problem,
+            self.face,
+            tagged,
+            self.rows,
+            self.best,
+            tolerance=tolerance,
+            keep=self.interior is not None,
+        )
+        if answer is None:
+            return False
+        before = (self.best.objective, self.certificate.bound)
+        self.solved, self.proof = (self.face, answer.y), answer.proof
+        proved = certify(problem, answer.proof, self.sides, self.rows)
+        moves = proved.bound > (1.0 + _PROGRESS) * self.certificate.bound
+        if proved.bound > self.certificate.bound:
+            self.certificate = proved
+            self.active = _active(self.keys, answer.proof)
+        if moves:  # else cuts that hold without weight (a degenerate optimum) would come and go for ever
+            self._prune(answer.proof)
+        z, s = self._definite(answer.z, answer.s)
+        found, breaches = self._misses(z, s)
+        worst = max([v.ratio for _, v in found] + [b.ratio for b in breaches], default=1.0)
+        if self.interior is not None:
+            self.best = min(self.best, mixed(problem, z, s, self.interior), key=lambda c: c.objective)
+        elif worst <= _WORTH_REPAIRING:
+            candidate = scaled_up(problem, z, s, [(i, v.frequency) for i, v in found])
+            self.best = min(self.best, candidate, key=lambda c: c.objective)
+        self._add(_most_violated(found, self.keys, 2 * problem.experiment.size + _MORE_CUTS))
+        self._add_rows(breaches)
+        basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
+        if basis is not problem.basis:
+            self._grow(replace(problem, basis=basis, finer=None))
+        better = self.best.objective < 0.9 * before[0] or self.certificate.bound > 1.1 * before[1]
+        return answer.converged or better
+
+    def _misses(self, z: Array, s: float) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
+        problem = self.problem
+        information = candidate_at(problem, z, s).information
+        found = problem.violations(information, above=1.0)
+        if problem.side:
+            root = np.sqrt(s)
+            sides = problem.side_violations(information, above=1.0 / root)
+            found += [(i, replace(v, ratio=root * v.ratio)) for i, v in sides]
+        return found, problem.density_breaches(z, s, above=1.0)
+
+    def _prune(self, proof: Proof) -> None:
+        """Drop the cuts that do not bind; each costs the solver a k x k cone, and can come back."""
+        weights = np.array([np.trace(Y) for Y, _ in proof.cuts])
+        kept = np.flatnonzero(weights > _BINDS * weights.sum())
+        self.keys = [self.keys[i] for i in kept]
+        self.cuts = [self.cuts[i] for i in kept]
+        self.proof = Proof(tuple(proof.cuts[i] for i in kept), proof.rows)
+
+    def _definite(self, z: Array, s: float) -> tuple[Array, float]:
+        """(z, s), or halfway to the best design when z leaves some parameter without information."""
+        if not self.problem.needs_definite:
+            return z, s
+        for _ in range(_HALVINGS):
+            try:
+                np.linalg.cholesky(candidate_at(self.problem, z, s).information)
+            except np.linalg.LinAlgError:
+                z, s = 0.5 * (z + self.best.z), 0.5 * (s + self.best.s)
+            else:
+                return z, s
+        return self.best.z, self.best.s
+
+    def _grow(self, problem: Problem) -> None:
+        """The same state on a basis with more functions."""
+        more = problem.basis.size - self.best.z.size
+        self.problem = problem
+        self.best = replace(self.best, z=np.pad(self.best.z, (0, more)))
+        if self.interior is not None:
+            self.interior = replace(self.interior, z=np.pad(self.interior.z, (0, more)))
+        self.rows = [on_basis(problem, row) for row in self.rows]
+
+    def moved_to(self, problem: Problem) -> _State:
+        """The same knowledge for a richer family of spectra: its first face comes from the prices so far."""
+        assert self.solved is not None
+        assert self.proof is not None
+        z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
+        count = len(self.proof.cuts)
+        rows = [on_basis(problem, row) for row in self.rows]
+        proved = certify(problem, self.proof, self.sides[:count], rows[: self.proof.rows.size])
+        _, face = problem.basis.enlarge(*self.solved, proved.directions, problem.price)
+        best = candidate_at(problem, z, self.best.s)
+        return replace(self, problem=problem, face=face, best=best, certificate=proved, rows=rows)
+
+    def _add(self, keys: list[Place]) -> None:
+        self.keys += keys
+        self.cuts += [self.problem.requirement(i).cut(w) for i, w in keys]
+
+    def _add_rows(self, breaches: list[DensityBreach]) -> None:
+        most = _MOST_ROWS * self.problem.experiment.inputs
+        for breach in sorted(breaches, key=lambda b: -b.ratio)[:most]:
+            # Rows that nearly coincide spoil the solver's linear algebra: the new one replaces its like.
+            self.rows = [row for row in self.rows if not alike(self.problem, row, breach.place)]
+            self.rows.append(density_row(self.problem, breach.place))
+
+
+def _first_state(problem: Problem, start: Array, interior: Array | None) -> _State:
+    size, inner = problem.basis.size, None
+    if interior is not None:
+        inner = _inner(problem, interior[:size])
+        best = inner
+    else:
+        best = scaled_up(problem, start[:size], 0.0, [])
+    k = problem.experiment.size
+    state = _State(
+        problem=problem,
+        face=problem.basis.first_face(problem.price),
+        best=best,
+        interior=inner,
+        keys=[],
+        cuts=[],
+        rows=power_rows(problem),
+        certificate=Certificate(
+            0.0, np.zeros((k, k)), np.zeros((problem.basis.size, 0)), np.zeros(len(problem.limits))
+        ),
+    )
+    nearly = problem.violations(best.information, above=_FIRST_CUTS)
+    state._add(_most_violated(nearly, [], 2 * problem.experiment.size + _MORE_CUTS))
+    if problem.side:
+        close = problem.side_violations(best.information / best.s, above=_FIRST_CUTS)
+        state._add(_most_violated(close, state.keys, problem.experiment.size + _MORE_CUTS))
+    if problem.densities:
+        state.rows += first_density_rows(problem)
+    return state
+
+
+def _inner(problem: Problem, x: Array) -> Candidate:
+    """The interior design in the unknowns (z, s), its requirements met with room where s allows that."""
+    if not problem.scaled:
+        return candidate_at(problem, x, 1.0)
+    unit = candidate_at(problem, x, 1.0)
+    ratio = max((v.ratio for _, v in problem.violations(unit.information)), default=0.0)
+    s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
+    if problem.goal == "samples":
+        meets = scaled_up(problem, x, 1.0, [])
+        s = 1.2 * meets.s
+    return candidate_at(problem, s * x, s)
+
+
+def _most_violated(found: list[tuple[int, Violation]], known: list[Place], most: int) -> list[Place]:
+    """Where to cut next: the worst places that have no cut yet (a flat ratio has hundreds of maxima)."""
+    ranked = sorted(found, key=lambda item: -item[1].ratio)
+    return [(i, v.frequency) for i, v in ranked if (i, v.frequency) not in known][:most]
+
+
+def _active(keys: list[Place], proof: Proof) -> tuple[Place, ...]:
+    weights = np.array([np.trace(Y) for Y, _ in proof.cuts])
+    return tuple(key for key, weight in zip(keys, weights, strict=True) if weight > 1e-4 * weights.sum())

@@ -1,0 +1,89 @@
+"""Is there a design within the limits at all: a strictly feasible one, or a proof that there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.design.convex.candidate import least_scale, missing_floor, scaled_up
+from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import Basis
+
+_TOLERANCE = 1e-6
+_ROOM = 0.8
+_PLENTY = 1e4
+
+
+class UnreachableError(Exception):
+    """The requirements cannot be met within the limits.
+
+    `nearest` solves `problem` (goal "factor"): the least multiple s > 1 of the limits for which they can
+    be met, so that the accuracy must be loosened by sqrt(s), with its certificate. With
+    `limits_alone` it is the lower limits that contradict the upper ones, whatever the accuracy.
+    """
+
+    def __init__(self, problem: Problem, nearest: ExchangeResult, *, limits_alone: bool) -> None:
+        super().__init__("no design meets the requirements within the limits")
+        self.problem = problem
+        self.nearest = nearest
+        self.limits_alone = limits_alone
+
+
+def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
+    """A spectrum that meets all requirements (side included) and limits with room to spare.
+
+    Args:
+        start: (size,) any spectrum that excites every parameter (white).
+
+    Returns:
+        The basis, which may have grown, and the spectrum on it.
+
+    Raises:
+        UnreachableError: there is none; the proof comes with it.
+    """
+    if not any(limit.upper for limit in problem.limits):
+        # Nothing caps the excitation: enough of it meets everything.
+        strong = scaled_up(problem, start, 1.0, []).z
+        return problem.basis, 1.2 * max(1.0, missing_floor(problem, strong)) * strong
+    asked = (*problem.requirements, *problem.side) if problem.goal == "cost" else problem.side
+    within = None
+    if problem.has_floors:
+        limits_only = replace(
+            problem, goal="factor", requirements=(), side=(), floors_fixed=True, finer=problem
+        )
+        reached = exchange(limits_only, start, tolerance=_TOLERANCE, enough=_decided)
+        if reached.objective >= 1.0:
+            raise UnreachableError(limits_only, reached, limits_alone=True)
+        within = np.sqrt(reached.s) * reached.x
+        problem, start = _on(problem, reached.basis), np.pad(start, (0, within.size - start.size))
+    factor = replace(problem, goal="factor", requirements=asked, side=(), finer=problem)
+    if not asked:
+        return problem.basis, within if within is not None else start * (0.5 / least_scale(factor, start))
+    found = exchange(factor, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
+    if found.objective >= 1.0 > found.certificate.bound and problem.goal == "cost":
+        # Undecided: the limits alone leave some combination of the inputs free. With a cap on all it is not.
+        most = scaled_up(replace(problem, limits=(), densities=()), start, 1.0, []).z
+        total = problem.power("excitation").at(most)
+        capped = replace(factor, limits=(*factor.limits, PowerLimit("excitation", _PLENTY * total)))
+        again = exchange(capped, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
+        found = again if again.objective < 1.0 else found
+    if found.objective >= 1.0:
+        raise UnreachableError(factor, found, limits_alone=False)
+    if within is None:
+        return found.basis, np.sqrt(found.s) * found.x
+    share = 0.5 * (1.0 - found.s)
+    within = np.pad(within, (0, found.x.size - within.size))
+    return found.basis, (1.0 - share) * found.x + share * within
+
+
+def _on(problem: Problem, basis: Basis) -> Problem:
+    same = basis is problem.basis
+    return replace(problem, basis=basis, finer=problem if same else None)
+
+
+def _decided(objective: float, bound: float) -> bool:
+    return objective < _ROOM or (bound > 1.0 and objective - bound < 1e-4 * bound)

@@ -1,0 +1,116 @@
+"""The papers' own program: one LMI per grid frequency, positivity by a Gram matrix or the KYP lemma, cvxpy.
+
+Least-costly paper, (13) and (19) with footnote 2. It guarantees nothing between the grid frequencies;
+its multipliers still prove a lower bound for the problem at every frequency, of which the grid is a
+relaxation. Whitened coordinates are kept: in raw parameters no solver survives a resonant plant.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from inputdesign_cli.accuracy.cuts import MatrixCut
+from inputdesign_cli.design.convex.certificate import Certificate, certify
+from inputdesign_cli.design.convex.master import Proof
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import FirBasis, svec
+
+
+@dataclass(frozen=True)
+class GridResult:
+    """The optimum on the grid: spectrum `x` (m + 1,), its cost, and the bound that its multipliers prove."""
+
+    x: Array
+    cost: float
+    certificate: Certificate
+
+
+def solve_on_grid(
+    problem: Problem, frequencies: Array, start: Array, *, positivity: Literal["gram", "kyp"] = "gram"
+) -> GridResult:
+    """Minimise the cost of a FIR spectrum subject to the requirements at `frequencies` alone.
+
+    Args:
+        start: a spectrum of the right size (the white baseline), which scales the program.
+
+    Raises:
+        InaccurateError: `solver-failed` when cvxpy reports neither an optimum nor nearly one.
+    """
+    import cvxpy as cp
+
+    basis = problem.basis
+    if not isinstance(basis, FirBasis):
+        raise ValueError("the grid program is for FIR spectra")
+    unit_cost, power = problem.price.at(start), start[0]
+    inverse = np.linalg.inv(np.linalg.cholesky(problem.information(start)))
+    c = cp.Variable(basis.size)
+    constraints = _positive(c, basis.order, positivity)
+    maps = inverse @ problem.information_map @ inverse.T
+    offset = inverse @ problem.baseline_information @ inverse.T
+    information = offset + sum(power * c[i] * _symmetric(maps[i]) for i in range(basis.size))
+    cuts = [
+        MatrixCut(r.cut(float(w)).matrix).moved(inverse)  # type: ignore[attr-defined]
+        for r in problem.requirements
+        for w in frequencies
+    ]
+    lmis = [information - _symmetric(cut.matrix) >> 0 for cut in cuts]
+    program = cp.Problem(cp.Minimize((power / unit_cost) * problem.price.vector @ c), constraints + lmis)
+    try:
+        with warnings.catch_warnings():
+            # An inaccurate solution shows in the gap between its cost and the bound that it proves.
+            warnings.filterwarnings("ignore", message="Solution may be inaccurate")
+            program.solve(solver=cp.CLARABEL)
+    except cp.SolverError as error:
+        raise _failed(str(error)) from error
+    if program.status not in ("optimal", "optimal_inaccurate") or c.value is None:
+        raise _failed(f"its status is {program.status}")
+    x = power * c.value
+    proofs = []
+    for cut, lmi in zip(cuts, lmis, strict=True):
+        Y, r = cut.proof([svec(_symmetric(lmi.dual_value))])
+        proofs.append((unit_cost * inverse.T @ Y @ inverse, unit_cost * r))
+    return GridResult(x, problem.price.at(x), certify(problem, Proof(tuple(proofs), np.zeros(0))))
+
+
+def _positive(c, order: int, positivity: str) -> list:
+    """c_0 + 2 sum c_r cos(r w) >= 0 for all w."""
+    import cvxpy as cp
+
+    if order == 0:
+        return [c >= 0]
+    if positivity == "gram":
+        gram = cp.Variable((order + 1, order + 1), PSD=True)
+        return [cp.trace(gram) == c[0]] + [
+            sum(gram[i, i + lag] for i in range(order + 1 - lag)) == c[lag] for lag in range(1, order + 1)
+        ]
+    # Phi / 2 is the real part of C (zI - A)^-1 B + c_0 / 2 with A the shift and B the first unit column.
+    shift = np.eye(order, k=-1)
+    first = np.eye(order, 1)
+    Q = cp.Variable((order, order), symmetric=True)
+    row = cp.reshape(c[1:], (1, order), order="C")
+    corner = cp.reshape(c[0], (1, 1), order="C") - first.T @ Q @ first
+    block = cp.bmat(
+        [[Q - shift.T @ Q @ shift, row.T - shift.T @ Q @ first], [row - first.T @ Q @ shift, corner]]
+    )
+    return [0.5 * (block + block.T) >> 0]
+
+
+def _symmetric(matrix: Array) -> Array:
+    return 0.5 * (matrix + matrix.T)
+
+
+def _failed(why: str) -> InaccurateError:
+    return InaccurateError(
+        Diagnostic(
+            "solver-failed",
+            f"the solver found no answer to the grid program: {why}",
+            hint="use solver: {method: exchange}, fewer grid frequencies, or a lower order",
+            key="solver.method",
+        )
+    )

@@ -1,0 +1,83 @@
+"""White excitation of the least power that meets the requirements: the baseline of every design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import scipy.optimize
+
+from inputdesign_cli.accuracy import worst
+from inputdesign_cli.design.convex.problem import Problem, RequirementFactory
+from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.spectrum import flat_basis
+
+_POLISH = 3
+# Logarithms: an excitation so much stronger is as good as any, and a ratio that moves less stands still.
+_PLENTY, _STILL = 46.0, 1e-6
+
+
+def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
+    """The smallest white excitation power (per sample) that meets every requirement; 0 if none is needed.
+
+    r_u falls monotonically as the power grows, so this is one scalar equation and needs no solver.
+    The coordinates are whitened again at each new estimate of the power.
+
+    Raises:
+        InfeasibleError: no power is enough, since the requirement is on what noise alone tells.
+    """
+    power = 1.0
+    for _ in range(_POLISH):
+        coordinates = experiment.whitened(power)
+        requirements = tuple(make(coordinates) for make in factories)
+        problem = Problem(coordinates, flat_basis(coordinates), {"excitation": 1.0}, requirements)
+
+        def excess(log_power: float, problem: Problem = problem) -> float:
+            information = problem.information(np.array([np.exp(log_power)]))
+            return np.log(max(problem.worst_ratio(information).ratio, 1e-300))
+
+        if np.linalg.matrix_rank(problem.baseline_information) == coordinates.size:
+            without = worst([v for _, v in problem.violations(problem.baseline_information)])
+            if without.ratio <= 1.0:
+                return 0.0
+        lo = hi = np.log(power)
+        hi = _enough(excess, hi)
+        while excess(lo) <= 0 and lo > -200:
+            lo -= 2.0
+        found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
+        if abs(found - power) <= 1e-3 * power:
+            return found
+        power = found
+    return power
+
+
+def _enough(excess: Callable[[float], float], start: float) -> float:
+    """The logarithm of a power from `start` on at which the excess, the logarithm of a ratio, is gone."""
+    at, found, still = start, excess(start), False
+    while found > 0.0:
+        at += 2.0
+        try:
+            later = excess(at)
+        except np.linalg.LinAlgError:
+            if still:
+                raise _out_of_reach(found) from None
+            raise
+        still = found - later < _STILL
+        if still and at > start + _PLENTY:
+            raise _out_of_reach(found)
+        found = later
+    return at
+
+
+def _out_of_reach(excess: float) -> InfeasibleError:
+    ratio = float(np.exp(excess))
+    return InfeasibleError(
+        Diagnostic(
+            "infeasible",
+            "no power is enough: the accuracy asks for parameters of which only the noise tells, and the "
+            f"error stays at {ratio:.6g} times what is asked",
+            f"take {ratio**2:.4g} times as many samples, or allow {ratio:.4g} times the error",
+            "accuracy",
+        )
+    )

@@ -1,0 +1,146 @@
+"""Is the controller that the law asks for one that can run: causal, stable, and finite on the circle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inputdesign_cli.design.loop_error.laws import InternalModel, MinimumVariance, ModelReference
+from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.design.loop_error.transfer import MatrixTransfer
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant.polynomial import ComplexArray
+from inputdesign_cli.plant.polynomial_matrix import (
+    at,
+    delay_of,
+    determinant_and_adjugate,
+    multiply,
+)
+
+# A zero this close to the unit circle counts as on it.
+_ON_CIRCLE = 1e-7
+_VANISHES = 1e-7
+
+
+def check_invertible(plant: MatrixPlant, *, key: str) -> None:
+    """The determinant of the square G is not zero at every frequency.
+
+    Raises:
+        SpecError: `singular-plant`.
+    """
+    if not plant.regular:
+        raise bad_spec(
+            "singular-plant",
+            "the determinant of the plant vanishes at every frequency, so no controller can invert it",
+            hint="check the gains, or leave out one input and one output",
+            key=key,
+        )
+
+
+def check_model_reference(plant: MatrixPlant, target: MatrixTransfer, *, key: str) -> None:
+    """G^-1 T is causal and stable.
+
+    Raises:
+        SpecError: `delay-too-short`, `non-minimum-phase`, `infinite-criterion`.
+    """
+    _check_circle(plant, target, key=key)
+    det, adj = determinant_and_adjugate(plant.numerator)
+    if delay_of(multiply(adj, target.numerator)) < delay_of(det):
+        need = plant.inverse_delay
+        raise bad_spec(
+            "delay-too-short",
+            f"the desired loop has a delay of {_samples(target.delay)}, the inverse of the plant needs "
+            f"{_samples(need)}: the controller would not be causal",
+            hint=f"begin the numerator in q^-1 with {need} {'zero' if need == 1 else 'zeros'} (in s, lower "
+            "its degree below that of the denominator), or use internal_model, which adds the delay",
+            key=key,
+        )
+    outside = _not_cancelled(plant.zeros[np.abs(plant.zeros) > 1], target)
+    if outside.size:
+        raise _unstable(outside, key)
+
+
+def check_internal_model(plant: MatrixPlant, law: InternalModel, *, key: str) -> None:
+    """No zero of the plant lies on the unit circle; those outside and the delay stay in the loop.
+
+    Raises:
+        SpecError: `infinite-criterion`.
+    """
+    _check_circle(plant, law.target, key=key)
+
+
+def check_minimum_variance(plant: MatrixPlant, *, key: str) -> None:
+    """The plant is minimum phase with the same delay in every direction.
+
+    Raises:
+        SpecError: `non-minimum-phase`, `infinite-criterion`, `not-supported`.
+    """
+    _check_circle(plant, None, key=key)
+    outside = plant.zeros[np.abs(plant.zeros) > 1]
+    if outside.size:
+        raise _unstable(outside, key)
+    T = MinimumVariance(plant).complementary(np.linspace(0.1, 3.0, 30))
+    if np.abs(T).max(axis=(0, 2)).min() < _VANISHES:
+        raise bad_spec(
+            "no-feedback",
+            "the noise of some output cannot be predicted beyond the delay, so minimum-variance control "
+            "leaves it alone and asks nothing of the model there",
+            hint="give the noise poles or zeros (C, D or A), or use another law",
+            key=key,
+        )
+    if plant.inverse_delay != plant.delay:
+        raise bad_spec(
+            "not-supported",
+            "this version designs minimum-variance control for plants with one delay in all directions; "
+            f"here it lies between {_samples(plant.delay)} and {_samples(plant.inverse_delay)}",
+            hint="use internal_model or model_reference",
+            key=key,
+        )
+
+
+def check_law(plant: MatrixPlant, law: ModelReference | InternalModel | MinimumVariance, *, key: str) -> None:
+    """All that must hold for the law on this plant; see the checks above."""
+    check_invertible(plant, key="plant.B")
+    if isinstance(law, ModelReference):
+        check_model_reference(plant, law.target, key=f"{key}.model_reference")
+    elif isinstance(law, InternalModel):
+        check_internal_model(plant, law, key=f"{key}.internal_model")
+    else:
+        check_minimum_variance(plant, key=f"{key}.minimum_variance")
+
+
+def _check_circle(plant: MatrixPlant, target: MatrixTransfer | None, *, key: str) -> None:
+    radius = np.abs(plant.zeros)
+    on = plant.zeros[np.abs(radius - 1) <= _ON_CIRCLE]
+    on = on if target is None else _not_cancelled(on, target)
+    if on.size:
+        raise bad_spec(
+            "infinite-criterion",
+            f"the plant has a zero on the unit circle at {abs(np.angle(on[0])):.4g} rad/sample, where the "
+            "controller would have a pole: the error of the loop is infinite, whatever the input",
+            hint="let the desired loop vanish there, or move the zero inside",
+            key=key,
+        )
+
+
+def _not_cancelled(zeros: ComplexArray, target: MatrixTransfer) -> ComplexArray:
+    """The zeros at which the desired loop does not vanish."""
+    if not zeros.size:
+        return zeros
+    values = np.abs(at(target.numerator, 1 / zeros)).max(axis=(1, 2))
+    scale = np.abs(target.numerator).sum(axis=2).max()
+    return zeros[values > _VANISHES * scale]
+
+
+def _unstable(zeros: ComplexArray, key: str) -> Exception:
+    worst = zeros[np.argmax(np.abs(zeros))]
+    return bad_spec(
+        "non-minimum-phase",
+        f"the plant has a zero outside the unit circle (radius {abs(worst):.4g}, "
+        f"{abs(np.angle(worst)):.4g} rad/sample): the controller inverts it and would be unstable",
+        hint="use internal_model, which keeps such zeros in the loop",
+        key=key,
+    )
+
+
+def _samples(count: int) -> str:
+    return "no sample" if count == 0 else "1 sample" if count == 1 else f"{count} samples"

@@ -1,0 +1,205 @@
+"""The question in one object: which plant, which control law, which reference, which limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.design.loop_error.closed_form import best_spectrum, power_of
+from inputdesign_cli.design.loop_error.laws import (
+    ControlLaw,
+    MinimumVariance,
+    kronecker,
+    propagation,
+    sensitivity,
+)
+from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
+from inputdesign_cli.design.loop_error.parametric import LineDesign, ParametricCriterion, least_error
+from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.design.loop_error.transfer import MatrixTransfer
+from inputdesign_cli.design.loop_error.weight import adjoint
+from inputdesign_cli.design.loop_error.weight import weight as weight_from
+from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
+from inputdesign_cli.plant.frequencies import graded_grid, logarithmic_distance
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_SETTLED = 1e-11
+_HALVINGS = 4
+
+
+@dataclass(frozen=True)
+class PowerLimit:
+    """mean tr(M Phi) <= most, M of one input or output, or of all of them (channel None)."""
+
+    kind: Literal["input", "output"]
+    most: float
+    channel: int | None = None
+
+    def metric(self, G: ComplexArray) -> ComplexArray:
+        """M (K, n, n)."""
+        size = G.shape[2] if self.kind == "input" else G.shape[1]
+        picked = np.eye(size) if self.channel is None else np.diag(np.eye(size)[self.channel])
+        if self.kind == "input":
+            return np.broadcast_to(picked.astype(complex), (G.shape[0], size, size))
+        return np.asarray(adjoint(G) @ picked @ G)
+
+
+@dataclass(frozen=True)
+class ClosedLoopProblem:
+    """E||y - y0||^2 of the loop with the controller designed on the model, and what the input may cost.
+
+    Attributes:
+        reference_variance: (n,) of the white noise behind the reference, one for each output.
+        reference_filter: scalar filter that colours it, as a 1 x 1 matrix.
+        band: normalised frequencies inside which the input may have power. The asymptotic
+            covariance is infinite outside, so there the error is counted inside only.
+    """
+
+    plant: MatrixPlant
+    law: ControlLaw
+    limits: tuple[PowerLimit, ...]
+    reference_variance: Array
+    reference_filter: MatrixTransfer | None = None
+    band: tuple[float, float] = (0.0, np.pi)
+
+    def entering(self, w: ArrayLike) -> ComplexArray:
+        """Phi_r + Phi_v (K, n, n)."""
+        noise = self.plant.disturbance_at(w)
+        shape = 1.0 if self.reference_filter is None else np.abs(self.reference_filter.at(w)) ** 2
+        return np.asarray(noise + np.diag(self.reference_variance) * shape)
+
+    def weight(self, w: ArrayLike) -> ComplexArray:
+        """The weight of (17), (K, n, n)."""
+        sent = propagation(self.law, self.plant.plant_at(w), w)
+        return weight_from(sent, self.entering(w), self.plant.disturbance_at(w))
+
+    def target(self, w: ArrayLike) -> ComplexArray:
+        """Z^T, which is what Phi^-1 is weighted with."""
+        return np.swapaxes(self.weight(w), 1, 2)
+
+    def metrics(self, w: ArrayLike) -> ComplexArray:
+        """M_i (p, K, n, n) of the limits."""
+        G = self.plant.plant_at(w)
+        return np.array([limit.metric(G) for limit in self.limits])
+
+    @cached_property
+    def most(self) -> Array:
+        """(p,): the limits."""
+        return np.array([limit.most for limit in self.limits])
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        """Where integrands over frequency are not analytic, as points of the frequency plane."""
+        parts = [self.plant.singularities, self.law.singularities]
+        if self.reference_filter is not None:
+            parts.append(logarithmic_distance(self.reference_filter.poles))
+        return np.concatenate(parts)
+
+    def rule(self, refine: int, *, band: bool = True) -> Quadrature:
+        """Nodes and weights of means over frequency, inside the band or over all of the circle."""
+        lo, hi = self.band if band else (0.0, np.pi)
+        return graded_quadrature(self.singularities, lo=lo, hi=hi, refine=refine)
+
+    def settled(self, compute: Callable[[Quadrature], float]) -> tuple[Quadrature, float]:
+        """The coarsest rule whose mean agrees with that of halved panels, and the relative change."""
+        rule = self.rule(0)
+        value, change = compute(rule), np.inf
+        for refine in range(1, _HALVINGS + 1):
+            finer = self.rule(refine)
+            again = compute(finer)
+            change = abs(again - value) / max(abs(again), 1e-300)
+            rule, value = finer, again
+            if change <= _SETTLED:
+                break
+        return rule, change
+
+    def asymptotic(self) -> tuple[LimitedDesign, Quadrature, float]:
+        """The best spectrum at the nodes of a rule, the rule, and how far its means have settled."""
+
+        def total(rule: Quadrature) -> float:
+            A = self.target(rule.nodes)
+            M = self._price(np.ones(len(self.limits)) / self.most, rule.nodes)
+            outer = power_of(M, 0.5)
+            root = power_of(outer @ A @ outer, 0.5)
+            return float(np.trace(root, axis1=1, axis2=2).real @ rule.weights)
+
+        rule, change = self.settled(total)
+        design = design_within(self.target(rule.nodes), self.metrics(rule.nodes), self.most, rule.weights)
+        return design, rule, change
+
+    def spectrum_at(self, w: ArrayLike, multipliers: Array, scale: float = 1.0) -> ComplexArray:
+        """Phi (K, n, n) that belongs to the multipliers, at any frequencies; zero outside the band."""
+        w = np.asarray(w, dtype=float)
+        Phi = scale * best_spectrum(self.target(w), self._price(multipliers, w))
+        inside = (w >= self.band[0] * (1 - 1e-12)) & (w <= self.band[1] * (1 + 1e-12))
+        return np.where(inside[:, None, None], Phi, 0.0)
+
+    def _price(self, multipliers: Array, w: ArrayLike) -> ComplexArray:
+        return np.asarray(np.einsum("p,pkab->kab", multipliers, self.metrics(w)))
+
+    def model_of_noise_part(self) -> float:
+        """J_o: what the error of the noise model adds, whatever the input (zero if C ignores H)."""
+        if not isinstance(self.law, MinimumVariance):
+            return 0.0
+        law = self.law
+
+        def mean(rule: Quadrature) -> float:
+            w = rule.nodes
+            G, noise = self.plant.plant_at(w), self.plant.disturbance_at(w)
+            S = sensitivity(law.complementary(w))
+            J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ law.noise_jacobian(G, w)
+            n = self.plant.outputs
+            entering = kronecker(np.conj(self.entering(w)), np.broadcast_to(np.eye(n), S.shape))
+            inverse = np.linalg.inv(self.plant.covariance).T
+            variance = kronecker(np.broadcast_to(inverse, S.shape).astype(complex), noise)
+            return float(np.einsum("kab,kba,k->", adjoint(J) @ entering @ J, variance, rule.weights).real)
+
+        rule = self.rule(1, band=False)
+        return mean(rule)
+
+    def parametric(self) -> ParametricCriterion:
+        """tr(W P) of the model structure of the plant."""
+        law, plant = self.law, self.plant
+
+        def sent(w: Array) -> tuple[ComplexArray, ComplexArray]:
+            """X_l (K, k, n, n) of the loop, and H^-1 dH_l."""
+            dG, relative = plant.plant_gradient(w), plant.noise_gradient(w)
+            G, T = plant.plant_at(w), law.complementary(w)
+            S = sensitivity(T)
+            X = -S[:, None] @ dG @ (np.linalg.inv(G) @ T)[:, None]
+            if isinstance(law, MinimumVariance):
+                n = plant.outputs
+                J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ law.noise_jacobian(G, w)
+                dH = plant.noise_at(w)[:, None] @ relative
+                columns = np.swapaxes(dH, 2, 3).reshape(*dH.shape[:2], n * n)
+                moved = np.einsum("kab,klb->kla", J, columns).reshape(*dH.shape[:2], n, n)
+                X = X + np.swapaxes(moved, 2, 3)
+            return X, relative
+
+        def integrals(rule: Quadrature) -> tuple[Array, Array]:
+            X, relative = sent(rule.nodes)
+            W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(rule.nodes), np.conj(X), rule.weights).real
+            inverse = np.linalg.inv(plant.covariance)
+            M0 = np.einsum(
+                "klab,bc,kmdc,da,k->lm", relative, plant.covariance, np.conj(relative), inverse, rule.weights
+            ).real
+            return W, M0
+
+        whitener = np.linalg.inv(np.linalg.cholesky(plant.covariance))
+
+        def sources(w: Array) -> ComplexArray:
+            return np.asarray(whitener @ plant.input_gradient(w))
+
+        W, M0 = integrals(self.rule(1, band=False))
+        return ParametricCriterion(W, M0, sources)
+
+    def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
+        """The best input of the model structure among all spectra within the limits."""
+        lo, hi = self.band
+        grid = graded_grid(self.plant.singularities, lo, hi)
+        return least_error(criterion, self.metrics, self.most, grid, tolerance=tolerance)

@@ -1,0 +1,144 @@
+"""Sequential convex programming over Toeplitz shapes: good designs, without proof.
+
+Each step linearises the bias, keeps the variance exact by a matrix inequality, and stays within a
+trust region. The variance is convex in the shape; only the bias makes the problem hard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from inputdesign_cli.design.regression.steps import Region, step
+from inputdesign_cli.design.regression.toeplitz import Shape, ToeplitzProblem, Weight
+
+_MAX_STEPS = 60
+_SMALLEST_RADIUS = 1e-9
+# Where the target cannot be met at the present energy, variance is made cheaper in these steps.
+_RELAXED = (1.0, 1e-2, 1e-4, 1e-6, 1e-9)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Least error for an energy, or least energy for a target error, in the units of `ToeplitzProblem`.
+
+    Attributes:
+        kappa: sigma^2 n / (energy unit): the error of v = 1 when the energy is given; else None.
+        target: the largest |b|^2 + kappa v that is allowed when the energy is sought; else None.
+    """
+
+    kappa: float | None = None
+    target: float | None = None
+    biased: bool = True
+
+    def value(self, shape: Shape) -> float:
+        """What is minimised: the error, or 1 / kappa (the energy but for a factor); infinite if not met."""
+        if self.kappa is not None:
+            return Weight(self.kappa, self.biased)(shape)
+        assert self.target is not None
+        slack = self.target - (shape.bias_squared if self.biased else 0.0)
+        return shape.v / slack if slack > 0.0 else np.inf
+
+    def weight(self, value: float) -> Weight:
+        """The convexified goal at a value that is reached: least error at that energy (Dinkelbach)."""
+        return Weight(self.kappa if self.kappa is not None else 1.0 / value, self.biased)
+
+
+@dataclass
+class Counter:
+    """How many small programs were solved."""
+
+    solves: int = field(default=0)
+
+
+def descend(
+    problem: ToeplitzProblem, region: Region, goal: Goal, start: Shape, *, tolerance: float, counter: Counter
+) -> Shape:
+    """A local minimum of the goal from `start`; it may miss the target if no feasible shape was met."""
+    shape = start
+    if not np.isfinite(goal.value(shape)):
+        assert goal.target is not None
+        for relaxed in _RELAXED:
+            weight = Weight(relaxed * goal.target / shape.v, goal.biased)
+            shape = _trust_region(
+                problem,
+                region,
+                shape,
+                lambda _: weight,  # noqa: B023
+                lambda s: weight(s),  # noqa: B023
+                tolerance=tolerance,
+                counter=counter,
+                until=lambda s: np.isfinite(goal.value(s)),
+            )
+            if np.isfinite(goal.value(shape)):
+                break
+        else:
+            return shape
+    return _trust_region(
+        problem,
+        region,
+        shape,
+        lambda s: goal.weight(goal.value(s)),
+        goal.value,
+        tolerance=tolerance,
+        counter=counter,
+    )
+
+
+def _trust_region(
+    problem: ToeplitzProblem,
+    region: Region,
+    shape: Shape,
+    weight_at: Callable[[Shape], Weight],
+    value: Callable[[Shape], float],
+    *,
+    tolerance: float,
+    counter: Counter,
+    until: Callable[[Shape], bool] = lambda _: False,
+) -> Shape:
+    radius = 0.5
+    for _ in range(_MAX_STEPS):
+        if until(shape):
+            break
+        weight = weight_at(shape)
+        counter.solves += 1
+        found = step(problem, region, weight, shape, radius)
+        if found is None:
+            radius /= 4.0
+            if radius < _SMALLEST_RADIUS:
+                break
+            continue
+        rho, model = found
+        now = weight(shape)
+        predicted = now - model
+        if predicted <= tolerance * now:
+            break
+        trial = problem.shape(rho)
+        gained = now - weight(trial) if trial is not None else -np.inf
+        if trial is not None and gained > 0.0 and value(trial) < value(shape):
+            shape = trial
+        if gained < 0.25 * predicted:
+            radius /= 4.0
+        elif gained > 0.75 * predicted:
+            radius = min(2.0, 2.0 * radius)
+        if radius < _SMALLEST_RADIUS:
+            break
+    return shape
+
+
+def starts(problem: ToeplitzProblem, count: int, rng: np.random.Generator) -> list[Shape]:
+    """White, and random shapes of a few lines over a little white noise."""
+    shapes = [problem.shape(np.eye(problem.n)[0])]
+    for _ in range(count):
+        lines = rng.integers(1, problem.n + 1)
+        power = rng.dirichlet(np.ones(lines))
+        rho = np.cos(np.arange(problem.n)[:, None] * np.pi * rng.random(lines)) @ power
+        shapes.append(problem.shape(0.9 * rho + 0.1 * np.eye(problem.n)[0]))
+    return [shape for shape in shapes if shape is not None]
+
+
+def best(shapes: Sequence[Shape], goal: Goal) -> Shape:
+    """The shape of least value; among those that miss the target the one of least bias."""
+    return min(shapes, key=lambda s: (goal.value(s), s.bias_squared))

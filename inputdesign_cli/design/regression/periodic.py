@@ -1,0 +1,95 @@
+"""Toeplitz designs that a periodic signal has exactly: nonnegative powers on the lines of its period.
+
+Optimal R are singular, made of few lines anywhere between 0 and pi; a period only offers multiples of
+2 pi / period. Where R is not among its Gram matrices the design is repeated on these lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+from numpy.typing import NDArray
+
+from inputdesign_cli.design.regression.local import Counter, Goal, descend
+from inputdesign_cli.design.regression.model import Regression
+from inputdesign_cli.design.regression.steps import line_shapes
+from inputdesign_cli.design.regression.structured import Units
+from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
+from inputdesign_cli.plant.polynomial import Array
+
+_EXACT = 1e-10
+_ALL_LINES = 400  # up to this many lines all of them take part
+_COARSE = 100
+_NEIGHBOURS = 3
+_HEAVY = 1e3  # weight of the equation that the powers add up to one
+_STEP_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class PeriodicDesign:
+    """Shares of the energy (period // 2 + 1,) on the lines 2 pi l / period, and the energy.
+
+    `exact` tells that the Gram matrix is the one that was asked for.
+    """
+
+    shares: Array
+    rho: Array
+    energy: float
+    exact: bool
+
+
+def design_periodic(
+    regression: Regression, rho: Array, energy: float, period: int, *, target: float | None
+) -> PeriodicDesign:
+    """The shape rho on the lines of a period, or the nearest good design on them.
+
+    Args:
+        target: the error to be met with the least energy; None: the energy stays, the error follows.
+            A target that the lines cannot meet leaves the energy as it is, too.
+    """
+    problem = ToeplitzProblem.of(regression)
+    lines = 2.0 * np.pi * np.arange(period // 2 + 1) / period
+    shares = _fit(rho, lines)
+    fitted = np.cos(np.arange(rho.size)[:, None] * lines) @ shares
+    if np.abs(fitted - rho).max() < _EXACT:
+        return PeriodicDesign(shares, fitted, energy, True)
+    chosen = _candidates(shares)
+    region = line_shapes(problem, lines[chosen])
+    units = Units(regression)
+    goal = Goal(
+        kappa=units.kappa(energy) if target is None else None,
+        target=None if target is None else target / units.error,
+        biased=problem.biased,
+    )
+    start = problem.shape(fitted)
+    shape = None
+    if start is not None:
+        shape = descend(problem, region, goal, start, tolerance=_STEP_TOLERANCE, counter=Counter())
+    if shape is None:
+        return PeriodicDesign(shares, fitted, energy, False)
+    full = np.zeros(lines.size)
+    full[chosen] = _fit(shape.rho, lines[chosen])
+    value = goal.value(shape)
+    if target is not None and np.isfinite(value):
+        energy = units.energy(1.0 / value)
+    return PeriodicDesign(full, shape.rho, energy, False)
+
+
+def _fit(rho: Array, lines: Array) -> Array:
+    """Nonnegative powers, one in sum, whose autocorrelations are nearest to rho."""
+    A = np.vstack([np.cos(np.arange(rho.size)[:, None] * lines), np.full(lines.size, _HEAVY)])
+    powers, _ = scipy.optimize.nnls(A, np.append(rho, _HEAVY))
+    return powers / powers.sum()
+
+
+def _candidates(shares: Array) -> NDArray[np.intp]:
+    """Indices of all lines if they are few; else those around the lines in use, and some everywhere."""
+    count = shares.size
+    if count <= _ALL_LINES:
+        return np.arange(count)
+    used = np.flatnonzero(shares > 0.0)
+    around = (used[:, None] + np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)).ravel()
+    coarse = np.linspace(0, count - 1, _COARSE).astype(int)
+    return np.unique(np.clip(np.concatenate([around, coarse]), 0, count - 1))

@@ -1,0 +1,112 @@
+"""Diagnostics as text for a terminal and as plain data; pure functions, nothing is printed here."""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import Any
+
+from inputdesign_cli.errors import Diagnostic, IdesignError, Location
+
+_WIDTH = 100
+"""Characters of an offending line that are shown; longer lines are clipped around the column."""
+
+_BOLD, _RED, _BLUE, _CYAN, _RESET = "\x1b[1m", "\x1b[1;31m", "\x1b[1;34m", "\x1b[36m", "\x1b[0m"
+
+
+def render(error: IdesignError, color: bool = False) -> str:
+    """All diagnostics of an error, each with its place, the line with a caret, and the help.
+
+    Parameters
+    ----------
+    error : any error of this package.
+    color : whether to use ANSI colours (the caller knows the terminal and `NO_COLOR`).
+    """
+    blocks = [_block(diagnostic, color) for diagnostic in error.diagnostics]
+    codes = {diagnostic.code for diagnostic in error.diagnostics if diagnostic.code}
+    footer = []
+    if len(blocks) > 1:
+        footer.append(f"{len(blocks)} errors.")
+    if codes:
+        footer.append(f"`idesign explain {codes.pop() if len(codes) == 1 else 'CODE'}` says more.")
+    return "\n\n".join([*blocks, " ".join(footer)] if footer else blocks)
+
+
+def as_json(error: IdesignError) -> list[dict[str, Any]]:
+    """The diagnostics as plain data; `location` is null where there is none."""
+    return [
+        {
+            "code": diagnostic.code,
+            "message": diagnostic.message,
+            "hint": diagnostic.hint,
+            "key": diagnostic.key,
+            "location": None
+            if diagnostic.location is None
+            else {
+                "file": diagnostic.location.file,
+                "line": diagnostic.location.line,
+                "column": diagnostic.location.column,
+                "text": diagnostic.location.text,
+            },
+        }
+        for diagnostic in error.diagnostics
+    ]
+
+
+def _block(diagnostic: Diagnostic, color: bool) -> str:
+    place = diagnostic.location
+    paint = _paint if color else _plain
+    head = f"{paint(_where(place), _BOLD)}: " if place else ""
+    code = f"[{diagnostic.code}]" if diagnostic.code else ""
+    lines = [f"{head}{paint('error' + code, _RED)} {_clean(diagnostic.message)}"]
+    # A file that could not be read has a place but no line to show.
+    if place and place.text.strip():
+        text, caret = _excerpt(place.text, place.column)
+        number = "" if _is_override(place) else str(place.line)
+        bar = paint("|", _BLUE)
+        lines += [
+            f"{paint(number, _BLUE)}{' ' if number else ''}{bar} {text}",
+            f"{' ' * len(number)}{' ' if number else ''}{bar} {' ' * caret}{paint('^', _RED)}",
+        ]
+    if diagnostic.hint:
+        lines.append(f"{paint('help:', _CYAN)} {_clean(diagnostic.hint)}")
+    return "\n".join(lines)
+
+
+def _where(place: Location) -> str:
+    file = _clean(place.file).replace("\n", " ")
+    return file if _is_override(place) else f"{file}:{place.line}:{place.column}"
+
+
+def _is_override(place: Location) -> bool:
+    return place.file.startswith("--set ")
+
+
+def _excerpt(text: str, column: int) -> tuple[str, int]:
+    """The line, clipped around the column if it is long, and the number of cells before the caret."""
+    line = _clean(text.replace("\t", " ")).rstrip()
+    at = min(max(column - 1, 0), len(line))
+    if len(line) > _WIDTH:
+        start = max(0, min(at - _WIDTH // 2, len(line) - _WIDTH))
+        before, after = "..." if start else "", "..." if start + _WIDTH < len(line) else ""
+        line = before + line[start : start + _WIDTH] + after
+        at += len(before) - start
+    return line, sum(_cells(character) for character in line[:at])
+
+
+def _cells(character: str) -> int:
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+
+
+def _clean(text: str) -> str:
+    """Without what could move the cursor or change the colours of a terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def _paint(text: str, style: str) -> str:
+    return f"{style}{text}{_RESET}" if text else ""
+
+
+def _plain(text: str, _style: str) -> str:
+    return text

@@ -1,0 +1,80 @@
+"""bound.png: the model error that the design allows, against what the target admits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from inputdesign_cli.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    figure,
+    frequency_axis,
+    legend_above,
+)
+from inputdesign_cli.runs.results import Array, BoundCurves
+
+DASHED = (0, (5, 2))
+DOTTED = (0, (1, 1.2))
+
+
+def draw_bound(curves: BoundCurves, path: Path, time_unit: str) -> None:
+    """|G|, r_u, r_adm and white excitation's r_u over frequency, with the active frequencies marked."""
+    with figure(path) as page:
+        axes = page.add_subplot()
+        handles = plot_bound(axes, curves)
+        frequency_axis(axes, curves.frequency, time_unit)
+        axes.set_ylabel("magnitude")
+        legend_above(axes, handles)
+
+
+def plot_bound(axes: Axes, curves: BoundCurves) -> list[Artist]:
+    """The curves of one plant on `axes`; the handles of their legend."""
+    w = curves.frequency
+    axes.set_yscale("log")
+    handles: list[Artist] = []
+    handles += axes.plot(w, _positive(curves.G_abs), color=BLACK, linewidth=1.2, label="$|G|$")
+    if curves.r_adm is not None:
+        r_adm = _positive(curves.r_adm)
+        handles += axes.plot(w, r_adm, color=ORANGE, linestyle=DASHED, label=r"$r_\mathrm{adm}$")
+    handles += axes.plot(w, _positive(curves.r_u), color=BLUE, linewidth=2.0, label=f"$r_u$, {curves.label}")
+    if curves.r_u_record is not None:
+        record = _positive(curves.r_u_record)
+        handles += axes.plot(w, record, color=GREEN, linewidth=1.1, label="$r_u$, record")
+    if curves.r_u_white is not None:
+        white = _positive(curves.r_u_white)
+        handles += axes.plot(w, white, color=GREY, linestyle=DOTTED, label="$r_u$, white")
+    if curves.active.size:
+        handles += axes.plot(
+            curves.active,
+            np.exp(np.interp(curves.active, w, np.log(curves.r_u))),
+            linestyle="none",
+            marker="o",
+            markersize=6,
+            markerfacecolor="white",
+            markeredgecolor=BLUE,
+            markeredgewidth=1.4,
+            clip_on=False,
+            zorder=5,
+            label="active",
+        )
+    if curves.r_adm is not None:
+        _shade_above(axes, w, _positive(curves.r_adm))
+    return handles
+
+
+def _positive(values: Array) -> Array:
+    """`values` with gaps where a logarithmic axis has no place for them (an r_adm below zero, say)."""
+    return np.where(values > 0, values, np.nan)
+
+
+def _shade_above(axes: Axes, w: Array, r_adm: Array) -> None:
+    low, high = axes.get_ylim()
+    axes.fill_between(w, r_adm, high, color=ORANGE, alpha=0.07, linewidth=0)
+    axes.set_ylim(low, high)

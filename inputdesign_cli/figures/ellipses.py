@@ -1,0 +1,50 @@
+"""ellipses.png: where the estimates of some pairs of parameters are to be expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from inputdesign_cli.figures.style import BLACK, BLUE, GREY, figure
+from inputdesign_cli.runs.results import Array, Ellipse, EllipseCurves
+
+COLUMNS = 3
+POINTS = 200
+
+
+def draw_ellipses(curves: EllipseCurves, path: Path) -> None:
+    """One panel a pair: the region that holds the estimate with the probability of the title."""
+    columns = min(COLUMNS, len(curves.pairs))
+    rows = -(-len(curves.pairs) // columns)
+    with figure(path) as page:
+        grid = page.subplots(rows, columns, squeeze=False)
+        for axes, pair in zip(grid.flat, curves.pairs, strict=False):
+            _draw(axes, pair, curves.probability)
+        for axes in grid.flat[len(curves.pairs) :]:
+            axes.set_axis_off()
+        handles, _ = grid.flat[0].get_legend_handles_labels()
+        page.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+
+
+def _draw(axes: Axes, pair: Ellipse, probability: float) -> None:
+    label = f"{100 * probability:g} % of estimates, design"
+    axes.plot(*boundary(pair.center, pair.covariance, probability), color=BLUE, linewidth=1.8, label=label)
+    if pair.white is not None:
+        dashed = (0, (5, 2))
+        outline = boundary(pair.center, pair.white, probability)
+        axes.plot(*outline, color=GREY, linestyle=dashed, linewidth=1.2, label="flat input")
+    axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
+    axes.set_xlabel(pair.names[0])
+    axes.set_ylabel(pair.names[1])
+    axes.locator_params(nbins=4)
+    axes.tick_params(axis="x", labelrotation=30)  # the labels are wide for three columns
+
+
+def boundary(center: Array, covariance: Array, probability: float) -> Array:
+    """(2, points): the ellipse with (x - center)^T covariance^-1 (x - center) = chi-squared (2 freedoms)."""
+    radius = np.sqrt(-2.0 * np.log(1.0 - probability))
+    angle = np.linspace(0.0, 2.0 * np.pi, POINTS)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    return center[:, None] + radius * np.linalg.cholesky(covariance) @ circle

@@ -1,0 +1,51 @@
+"""moments.png: the second moments of the regressors, and the lines of the input that has them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from inputdesign_cli.figures.style import BLACK, ORANGE, figure
+from inputdesign_cli.runs.results import MomentsCurves
+
+NUMBERED = 8  # rows up to which the entries are written into the cells
+
+
+def draw_moments(curves: MomentsCurves, path: Path, time_unit: str) -> None:
+    """R as a coloured matrix, the estimated block framed; beside it the power of each line of the input."""
+    with figure(path) as page:
+        if curves.line_frequency is None or curves.line_power is None:
+            _draw_matrix(page.add_subplot(), curves)
+            return
+        matrix, lines = page.subplots(1, 2, width_ratios=[1, 1])
+        _draw_matrix(matrix, curves)
+        lines.vlines(curves.line_frequency, 0.0, curves.line_power, color=ORANGE, linewidth=1.8)
+        lines.plot(curves.line_frequency, curves.line_power, "o", color=ORANGE, markersize=5)
+        lines.set_xlim(-0.03 * curves.nyquist, 1.03 * curves.nyquist)
+        lines.set_ylim(0.0, 1.08 * float(curves.line_power.max()))
+        lines.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+        lines.set_ylabel("power of each line (mean square)")
+
+
+def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
+    R, n, m = curves.R, len(curves.R), curves.estimated
+    largest = float(np.abs(R).max())
+    axes.imshow(R, cmap="RdBu", vmin=-largest, vmax=largest, alpha=0.8)
+    axes.grid(False)
+    axes.set_xticks(range(n), [str(i + 1) for i in range(n)])
+    axes.set_yticks(range(n), [str(i + 1) for i in range(n)])
+    axes.set_title(f"R, trace {np.trace(R):.5g}; framed: estimated", loc="left")
+    axes.plot(
+        np.array([-0.5, m - 0.5, m - 0.5]), np.array([m - 0.5, m - 0.5, -0.5]), color=BLACK, linewidth=1.6
+    )
+    axes.set_xlim(-0.5, n - 0.5)
+    axes.set_ylim(n - 0.5, -0.5)
+    if n <= NUMBERED:
+        for i in range(n):
+            for j in range(n):
+                dark = abs(R[i, j]) > 0.6 * largest
+                axes.text(
+                    j, i, f"{R[i, j]:.3g}", ha="center", va="center", fontsize=8, color="w" if dark else BLACK
+                )

@@ -1,0 +1,86 @@
+"""The look that all figures share: a canvas without global state, a palette, units on the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from inputdesign_cli.runs.results import Array
+
+SIZE = (7.0, 4.5)  # inches
+NARROW = (4.6, 3.4)
+DPI = 150
+
+# Okabe and Ito's palette, which stays apart for colour-blind readers.
+BLACK = "#000000"
+BLUE = "#0072B2"
+ORANGE = "#D55E00"
+GREEN = "#009E73"
+GREY = "#777777"
+PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+
+_RC: dict[Any, Any] = {
+    "svg.hashsalt": "idesign",
+    "font.size": 10.0,
+    "axes.titlesize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "mathtext.fontset": "dejavusans",
+}
+
+
+@contextmanager
+def figure(path: Path) -> Iterator[Figure]:
+    """A figure to draw on, saved to `path` when the block ends well.
+
+    As PNG; or, if `path` ends in `.svg`, as a smaller SVG whose text stays readable on a phone.
+    """
+    narrow = str(path).endswith(".svg")
+    with mpl.rc_context(_RC):
+        size = NARROW if narrow else SIZE
+        canvas = FigureCanvasAgg(Figure(figsize=size, dpi=DPI, layout="constrained"))
+        yield canvas.figure
+        if narrow:
+            # Without a date and with ids that do not change, the same figure is the same file.
+            canvas.print_figure(path, format="svg", metadata={"Date": None, "Creator": None})
+        else:
+            canvas.print_png(path)
+
+
+def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
+    """A logarithmic axis over the positive ones of `frequencies`, in rad per time unit."""
+    positive = frequencies[frequencies > 0]
+    axes.set_xscale("log")
+    if positive.size > 1:
+        axes.set_xlim(positive.min(), positive.max())
+    axes.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+
+
+def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:
+    """A legend over the axes, where it cannot cover a curve."""
+    narrow = axes.get_figure(root=True).get_figwidth() < SIZE[0]  # type: ignore[union-attr]
+    longest = max((len(str(handle.get_label())) for handle in handles), default=0)
+    axes.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=max(1, min(3, 46 // (longest + 6))) if narrow else len(handles),
+        borderaxespad=0.3,
+        handlelength=2.2,
+        columnspacing=1.4,
+    )

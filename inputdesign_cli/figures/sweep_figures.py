@@ -1,0 +1,214 @@
+"""curves.png, map.png and moments.png: what a sweep over one or two keys has come to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.lines import Line2D
+
+from inputdesign_cli.figures.style import BLACK, GREY, PALETTE, figure, legend_above
+from inputdesign_cli.figures.sweep_axes import (
+    LOG_FROM,
+    curve,
+    key_label,
+    mark_failures,
+    plain_numbers,
+    scale_key,
+)
+from inputdesign_cli.figures.sweep_moments import draw_moments, moment_entries
+from inputdesign_cli.figures.sweep_table import SweepTable
+from inputdesign_cli.runs.results import Array
+
+# What is drawn, if the results have it: the first of these.
+QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
+# What no design whatever does better, and what white excitation comes to, in the terms of each objective.
+BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structure_bound": "any moments"}
+_WHITE = {
+    "least_cost": "baseline.white.cost",
+    "shortest_experiment": "baseline.white.samples",
+    "mean_squared_error": "baseline.white.mean_squared_error",
+}
+_WHITE_OTHERWISE = "baseline.white.value"
+MOST_CURVES = len(PALETTE)
+MOST_LABELLED = 100  # cells of a map that carry their number
+_FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
+_ANY = (0, (5, 2))
+_KINDS = {
+    "least_cost": "cost",
+    "shortest_experiment": "samples",
+    "accuracy_factor": "factor on the admissible error",
+    "closed_loop_error": "error of the loop",
+    "mean_squared_error": "mean squared error",
+    "D": "log det $M$",
+    "A": "-trace $M^{-1}$",
+    "E": "smallest eigenvalue of $M$",
+    "T": "trace $M$",
+}
+
+
+def draw_sweep(table: SweepTable, root: Path) -> list[Path]:
+    """Draw the figures that suit the sweep as PNG files, and return their paths."""
+    drawn = []
+    for name, draw in sweep_figures(table):
+        drawn.append(root / f"{name}.png")
+        draw(drawn[-1])
+    return drawn
+
+
+def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Path], None]]]:
+    """The figures that suit the sweep, each with what draws it: curves over a numeric key, a map over two.
+
+    Sweeps over three keys or more, or without two results, have none.
+    """
+    quantity = next((name for name in QUANTITIES if _usable(table.numbers(name))), None)
+    if quantity is None:
+        return []
+    axes = [key for key in table.axes if len(set(table.columns[key])) > 1]
+    numeric = [key for key in axes if _usable(table.numbers(key))]
+    zipped = bool(table.summary.get("zip"))
+    found: list[tuple[str, Callable[[Path], None]]] = []
+    if numeric and (zipped or len(axes) <= 2):
+        along = max(numeric, key=lambda key: len(set(table.columns[key])))
+        across = None if zipped else next((key for key in axes if key != along), None)
+        if across is None or len(set(table.columns[across])) <= MOST_CURVES:
+            found.append(("curves", partial(_draw_curves, table, quantity, along, across)))
+        if across is None and moment_entries(table):
+            found.append(("moments", partial(draw_moments, table, along)))
+    if not zipped and len(axes) == 2 and len(numeric) == 2:
+        found.append(("map", partial(_draw_map, table, quantity, axes[0], axes[1])))
+    return found
+
+
+def _usable(values: Array | None) -> bool:
+    return values is not None and int(np.isfinite(values).sum()) > 1
+
+
+def _kind(table: SweepTable) -> str:
+    """The objective that all points have in common, or nothing."""
+    kinds = {kind for kind in table.columns.get("objective.kind", []) if kind}
+    return kinds.pop() if len(kinds) == 1 else ""
+
+
+def _label(table: SweepTable, quantity: str) -> str:
+    return _KINDS.get(_kind(table), quantity) if quantity == "objective.value" else quantity
+
+
+def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, path: Path) -> None:
+    """The quantity over one key, a curve for each value of the other, each with its bound; white if alone."""
+    x, y = table.numbers(along), table.numbers(quantity)
+    assert x is not None
+    assert y is not None
+    groups = list(dict.fromkeys(table.columns[across])) if across else [""]
+    bound, whatever = _bound(table, quantity)
+    with figure(path) as page:
+        axes = page.add_subplot()
+        handles: list[Artist] = []
+        shown = [y]
+        for group, colour in zip(groups, PALETTE, strict=False):
+            member = np.array([not across or text == group for text in table.columns[across or along]])
+            name = f"{_short(across)} = {group}" if across else "design"
+            handles += curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
+            if bound is not None:
+                shade = colour if across else BLACK
+                curve(axes, x[member], bound[member], color=shade, linestyle=_ANY, linewidth=1.1)
+                shown.append(bound)
+        if bound is not None:
+            side = "ceiling" if _maximised(table) else "floor"
+            label = f"{side}: {whatever}"
+            handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=_ANY, label=label))
+        white = table.numbers(_WHITE.get(_kind(table), _WHITE_OTHERWISE))
+        if quantity == "objective.value" and not across and white is not None:
+            handles += curve(axes, x, white, color=GREY, linestyle=(0, (1, 1.2)), label="white excitation")
+            shown.append(white)
+        mark_failures(axes, x[~np.isfinite(y)])
+        values = np.concatenate([part[np.isfinite(part)] for part in shown])
+        low, high = float(values.min()), float(values.max())
+        if low > 0 and high > LOG_FROM * low and _kind(table) != "D":
+            axes.set_yscale("log")
+            plain_numbers(axes.yaxis, high / low)
+        elif _maximised(table):
+            # What counts are differences; but those of rounding are none.
+            half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
+            axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
+        elif low > 0:
+            axes.set_ylim(bottom=0.0)
+        scale_key(axes, along, x)
+        axes.set_ylabel(_label(table, quantity))
+        if len(handles) > 4:
+            axes.legend(handles=handles, loc="best")
+        else:
+            legend_above(axes, handles)
+
+
+def _bound(table: SweepTable, quantity: str) -> tuple[Array | None, str]:
+    """The bound over all designs whatever, and which they are."""
+    for name, whatever in BOUNDS.items() if quantity == "objective.value" else ():
+        values = table.numbers(name)
+        if values is not None and np.isfinite(values).any():
+            return values, whatever
+    return None, ""
+
+
+def _maximised(table: SweepTable) -> bool:
+    return any(table.columns.get("objective.upper_bound", []))
+
+
+def _draw_map(table: SweepTable, quantity: str, down: str, along: str, path: Path) -> None:
+    """The quantity in colour over two keys; points without a result stay hatched."""
+    values = table.numbers(quantity)
+    assert values is not None
+    rows, columns = _ordered(table.columns[down]), _ordered(table.columns[along])
+    cells = np.full((len(rows), len(columns)), np.nan)
+    for r, c, value in zip(table.columns[down], table.columns[along], values, strict=True):
+        cells[rows.index(r), columns.index(c)] = value
+    low, high = float(np.nanmin(cells)), float(np.nanmax(cells))
+    wide = low > 0 and high > LOG_FROM * low
+    norm = LogNorm(low, high) if wide else Normalize(low, high if high > low else low + 1.0)
+    with figure(path) as page:
+        axes = page.add_subplot()
+        axes.grid(False)
+        axes.patch.set(hatch="xxx", edgecolor="#BBBBBB")
+        image = axes.pcolormesh(np.ma.masked_invalid(cells), norm=norm, cmap="cividis", rasterized=True)
+        bar = page.colorbar(image, label=_label(table, quantity))
+        if wide:
+            plain_numbers(bar.ax.yaxis, high / low)
+        _ticks(axes, columns, "x")
+        _ticks(axes, rows, "y")
+        axes.set_xlabel(key_label(along))
+        axes.set_ylabel(key_label(down))
+        if cells.size <= MOST_LABELLED and len(columns) <= 12:
+            _number_cells(axes, cells, norm)
+
+
+def _number_cells(axes: Axes, cells: Array, norm: Normalize) -> None:
+    size = 8.0 if cells.shape[1] <= 8 else 6.5
+    for (i, j), value in np.ndenumerate(cells):
+        text = f"{value:.3g}" if np.isfinite(value) else "none"
+        dark = np.isfinite(value) and norm(value) < 0.6
+        colour = "white" if dark else mpl.rcParams["text.color"]
+        axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=size, color=colour)
+
+
+def _ordered(texts: list[str]) -> list[str]:
+    return sorted(set(texts), key=float)
+
+
+def _ticks(axes: Axes, texts: list[str], which: str) -> None:
+    step = -(-len(texts) // 20)
+    places = np.arange(len(texts))[::step] + 0.5
+    labels = texts[::step]
+    if which == "x":
+        axes.set_xticks(places, labels)
+    else:
+        axes.set_yticks(places, labels)
+
+
+def _short(key: str | None) -> str:
+    return (key or "").rpartition(".")[2]

@@ -1,0 +1,65 @@
+"""A sweep as the report reads it: what was varied, and the table."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.runs.results import Array
+
+
+@dataclass(frozen=True)
+class SweepTable:
+    """The content of `sweep.json` and the columns of `sweep.csv` as text."""
+
+    summary: Mapping[str, Any]
+    columns: Mapping[str, list[str]]
+
+    @property
+    def axes(self) -> list[str]:
+        """The keys that were varied."""
+        return [axis["key"] for axis in self.summary["axes"]]
+
+    @property
+    def rows(self) -> int:
+        return len(self.columns["status"])
+
+    def numbers(self, name: str) -> Array | None:
+        """A column as numbers (n,), NaN where it is empty; None if it is missing or holds text."""
+        texts = self.columns.get(name)
+        if texts is None:
+            return None
+        try:
+            return np.array([float(text) if text else np.nan for text in texts])
+        except ValueError:
+            return None
+
+
+def read_sweep(root: Path) -> SweepTable:
+    """Read the table of a sweep.
+
+    Raises
+    ------
+    DataError : `run-missing` or `run-unreadable`.
+    """
+    try:
+        summary = json.loads((root / "sweep.json").read_text(encoding="utf-8"))
+        with (root / "sweep.csv").open(encoding="utf-8", newline="") as file:
+            header, *rows = csv.reader(file)
+        columns = {name: [row[i] for row in rows] for i, name in enumerate(header)}
+        table = SweepTable(summary, columns)
+        _ = table.axes, table.rows
+    except (FileNotFoundError, NotADirectoryError) as error:
+        message = f"{root} holds no sweep: there is no {Path(error.filename).name} in it"
+        raise DataError(Diagnostic("run-missing", message, hint="run it with `idesign sweep`")) from None
+    except (OSError, ValueError, KeyError, IndexError) as error:
+        message = f"{root} cannot be read as a sweep: {error}"
+        raise DataError(Diagnostic("run-unreadable", message, hint="run the sweep again")) from error
+    return table

@@ -1,0 +1,1 @@
+"""Monte Carlo studies: experiments tried on a simulated true system, many times."""

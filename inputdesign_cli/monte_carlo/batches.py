@@ -1,0 +1,76 @@
+"""Many runs of one simulated experiment, in batches that any executor may compute.
+
+The batches and their random streams follow from the number of runs and the seed alone, never from where or in
+which order they are computed: the same numbers on one process, on several and on a cluster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from inputdesign_cli.compute.executor import Executor, InProcess, WorkerLostError
+from inputdesign_cli.errors import Diagnostic, IdesignError
+
+Job = TypeVar("Job")
+Answer = TypeVar("Answer")
+Seed = int | np.random.SeedSequence
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """What a worker needs to know of a batch: the same function and job for all, a stream of its own."""
+
+    index: int
+    function: Callable[[Any, int, np.random.Generator], Any]
+    job: Any
+    runs: int
+    seed: np.random.SeedSequence
+
+
+def run_batches(
+    function: Callable[[Job, int, np.random.Generator], Answer],
+    job: Job,
+    *,
+    runs: int,
+    size: int,
+    seed: Seed,
+    executor: Executor | None = None,
+) -> list[Answer]:
+    """The answers of `function(job, count, rng)` for batches of `size` runs (the last one shorter), in order.
+
+    Args:
+        function: importable by name; it draws all that is random from `rng`, and does not change `job`.
+        job: what all batches share; it can be pickled.
+        executor: where the batches are computed (default: in this process).
+
+    Raises:
+        IdesignError: `worker-lost`; otherwise what `function` and the executor raise.
+    """
+    answers: dict[int, Any] = {}
+    batches = _batches(function, job, runs=runs, size=size, seed=seed)
+    for done in (executor or InProcess()).run(_compute, batches):
+        if isinstance(done.error, WorkerLostError):
+            message = f"a batch of {done.task.runs} simulated runs has no result: {done.error}"
+            hint = "the system may have run out of memory; try fewer processes"
+            raise IdesignError(Diagnostic("worker-lost", message, hint)) from done.error
+        if done.error is not None:
+            raise done.error
+        answers[done.task.index] = done.answer
+    return [answers[index] for index in range(len(answers))]
+
+
+def _batches(
+    function: Callable[[Job, int, np.random.Generator], Any], job: Job, *, runs: int, size: int, seed: Seed
+) -> Iterator[_Batch]:
+    root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
+    for index, start in enumerate(range(0, runs, size)):
+        stream = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index))
+        yield _Batch(index, function, job, min(size, runs - start), stream)
+
+
+def _compute(batch: _Batch) -> Any:
+    return batch.function(batch.job, batch.runs, np.random.default_rng(batch.seed))

@@ -1,0 +1,143 @@
+"""The charts of a report, drawn from the CSV files of a run as SVG within the page."""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.figures.plots import Curves, draw
+from inputdesign_cli.report.study_words import study_caption
+from inputdesign_cli.runs.results import Array, BoundCurves, OptimalityCurves, SignalCurves, SpectrumCurves
+from inputdesign_cli.runs.text_formats import read_csv
+
+Result = Mapping[str, Any]
+
+
+_CAPTIONS = {
+    "bound": "The error that the model may have (r_u) against the error that is admitted (r_adm).",
+    "spectrum": "Where in frequency the excitation has its power, and white excitation for comparison.",
+    "optimality": "The certificate of the bound over every spectrum: what a unit of cost buys at each "
+    "frequency, relative to the best. It is nowhere above one, and one where power pays.",
+    "signal": "The signal to apply (signal.csv), and how its values are distributed.",
+    "ellipses": "The confidence ellipses that the design buys, for pairs of parameters.",
+    "directions": "The gains of the plant, and how the design shares its power among their directions.",
+    "moments": "The second moments of the regressors.",
+    "error": "The mean squared error against the energy of the regressors, bias and variance apart.",
+    "loss": "The loss in simulated experiments.",
+}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A picture for an <img>: its data, what it shows in words, and a caption."""
+
+    uri: str
+    alt: str
+    caption: str
+
+
+def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) -> dict[str, Chart]:
+    """The charts of a run by file stem. What has no table we know of is taken from its PNG file."""
+    makers = {"bound": _bound, "spectrum": _spectrum, "optimality": _optimality, "signal": _signal}
+    charts = {}
+    for stem, make in makers.items():
+        path = run / f"{stem}.csv"
+        found = make(read_csv(path), result) if path.is_file() else None
+        if found is not None:
+            curves, alt, caption = found
+            if isinstance(curves, SpectrumCurves) and closed_loop:
+                curves = replace(curves, symbol="r")
+            uri = svg_uri(partial(_draw, curves, time_unit))
+            charts[stem] = Chart(uri, alt, caption)
+    for name in result.get("files", ()):
+        stem, _, kind = name.rpartition(".")
+        if kind == "png" and stem not in charts and (run / name).is_file():
+            charts[stem] = png_chart(run / name)
+    return charts
+
+
+def _draw(curves: Curves, time_unit: str, path: Path) -> None:
+    draw(curves, path, time_unit)
+
+
+def svg_uri(draw_to: Callable[[Path], Any]) -> str:
+    """What a function draws to an SVG file, as a data URI: in an image its ids meet no others of the page."""
+    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
+        path = Path(folder) / "chart.svg"
+        draw_to(path)
+        return "data:image/svg+xml;base64," + base64.b64encode(path.read_bytes()).decode()
+
+
+def png_chart(path: Path) -> Chart:
+    """A figure of the run as it is."""
+    data = base64.b64encode(path.read_bytes()).decode()
+    name = path.stem.replace("_", " ")
+    caption = _CAPTIONS.get(path.stem) or study_caption(path.stem) or f"The figure {name} of the run."
+    return Chart(f"data:image/png;base64,{data}", caption, caption)
+
+
+def _frequency(table: Mapping[str, Array]) -> Array:
+    return next(values for name, values in table.items() if name.startswith("frequency"))
+
+
+def _bound(table: Mapping[str, Array], result: Result) -> tuple[BoundCurves, str, str] | None:
+    if not {"r_u", "G_abs"} <= set(table):
+        return None
+    w = _frequency(table)
+    error = result.get("model_error", {})
+    active = np.clip(np.array(error.get("active_frequencies", []), dtype=float), w[0], w[-1])
+    curves = BoundCurves(
+        w,
+        table["r_u"],
+        table["G_abs"],
+        table.get("r_adm"),
+        table.get("r_u_white"),
+        active,
+        table.get("r_u_record"),
+    )
+    if curves.r_adm is None:
+        alone = "The error r_u that the model may have, and the gain |G|, against frequency."
+        return curves, alone, alone
+    worst = f"; the largest ratio is {error['worst_ratio']:.6g}" if "worst_ratio" in error else ""
+    alt = f"Model error r_u and admissible error r_adm against frequency{worst}."
+    return curves, alt, _CAPTIONS["bound"]
+
+
+def _spectrum(table: Mapping[str, Array], result: Result) -> tuple[SpectrumCurves, str, str] | None:
+    if "phi" not in table:
+        return None
+    w, phi = _frequency(table), table["phi"]
+    white = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation", [None])[0]
+    positive = w > 0
+    record = table["phi_record"][positive] if "phi_record" in table else None
+    curves = SpectrumCurves(w[positive], density=phi[positive], white=white, record=record)
+    peak = w[int(np.argmax(phi))]
+    alt = f"Spectral density of the excitation against frequency, with its peak at {peak:.3g}."
+    return curves, alt, _CAPTIONS["spectrum"]
+
+
+def _optimality(table: Mapping[str, Array], result: Result) -> tuple[OptimalityCurves, str, str] | None:
+    if "ratio" not in table:
+        return None
+    w, ratio = _frequency(table), table["ratio"]
+    curves = OptimalityCurves(w, ratio, np.zeros(0))
+    alt = f"Worth of a unit of cost against frequency; its maximum is {ratio.max():.4g}."
+    return curves, alt, _CAPTIONS["optimality"]
+
+
+def _signal(table: Mapping[str, Array], result: Result) -> tuple[SignalCurves, str, str] | None:
+    names = list(table)
+    channels = {name: table[name] for name in names if not name.startswith("time")}
+    if len(channels) == len(names) or not channels:
+        return None
+    curves = SignalCurves(table[names[0]], channels)
+    listed = ", ".join(channels)
+    alt = f"The signal {listed} against time, and the distribution of its values."
+    return curves, alt, _CAPTIONS["signal"]

@@ -1,0 +1,118 @@
+"""What the page about a sweep says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.figures.sweep_figures import QUANTITIES, sweep_figures
+from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.report.charts import Chart, svg_uri
+from inputdesign_cli.report.render import provenance
+from inputdesign_cli.report.words import ANSWERS, MAXIMISED, citations, question
+from inputdesign_cli.runs.run_directory import read_run
+from inputdesign_cli.specification import Spec, parse_spec
+
+MOST_ROWS = 200
+_SHOWN = (
+    ("status", "status"),
+    ("objective.value", "value"),
+    ("objective.lower_bound", "lower bound"),
+    ("objective.upper_bound", "upper bound"),
+    ("objective.any_spectrum_bound", "any spectrum"),
+    ("baseline.white.cost", "white"),
+    ("model_error.worst_ratio", "r_u / r_adm"),
+    ("time_s", "time (s)"),
+)
+
+
+def sweep_page(root: Path) -> dict[str, Any]:
+    """The content of the template for a sweep. Raises `DataError` as `read_sweep` does."""
+    table = read_sweep(root)
+    summary = table.summary
+    columns = [(name, title) for name, title in _SHOWN if any(table.columns.get(name, []))]
+    names = [*table.axes, *(name for name, _ in columns)]
+    rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]
+    spec, result = _first_run(table, root)
+    return {
+        "title": summary.get("title") or root.resolve().name,
+        "question": question(spec, summary["verb"]) if spec else [],
+        "zipped": summary.get("zip", False),
+        "axes": [(axis["key"], _values(axis["values"]), "") for axis in summary["axes"]],
+        "answer": _answer(table),
+        "charts": list(_charts(table)),
+        "header": [*table.axes, *(title for _, title in columns)],
+        "rows": rows,
+        "left_out": table.rows - len(rows),
+        "failures": _failures(table),
+        "verb": summary["verb"],
+        "spec": (root / "sweep.yaml").read_text(encoding="utf-8"),
+        "provenance": provenance(summary.get("environment", {})),
+        "citations": citations(spec, result) if spec else [],
+    }
+
+
+def _first_run(table: SweepTable, root: Path) -> tuple[Spec | None, dict[str, Any]]:
+    """The spec and the result of the first point that has one: they speak for the others."""
+    run = next((run for run in table.columns["run"] if run), None)
+    if run is None:
+        return None, {}
+    try:
+        text = (root / run / "spec.yaml").read_text(encoding="utf-8")
+        return parse_spec(text), read_run(root / run)
+    except (OSError, SpecError, DataError):
+        return None, {}
+
+
+def _answer(table: SweepTable) -> str:
+    statuses = ", ".join(f"{n} {status}" for status, n in table.summary.get("statuses", {}).items())
+    said = f"{table.rows} points: {statuses}."
+    quantity = next((name for name in QUANTITIES if table.numbers(name) is not None), None)
+    values = table.numbers(quantity) if quantity else None
+    if values is None or not np.isfinite(values).any():
+        return said
+    kinds = {kind for kind in table.columns.get("objective.kind", []) if kind}
+    kind = next(iter(kinds)) if len(kinds) == 1 else ""
+    best = int(np.nanargmax(values)) if kind in MAXIMISED else int(np.nanargmin(values))
+    point = ", ".join(f"{key} = {table.columns[key][best]}" for key in table.axes)
+    what = ANSWERS.get(kind, (quantity, ""))[0]
+    low, high = np.nanmin(values), np.nanmax(values)
+    return f"{said} Over the sweep the {what} ranges from {low:.5g} to {high:.5g}; it is best at {point}."
+
+
+def _charts(table: SweepTable) -> list[Chart]:
+    captions = {
+        "curves": "The result over one key; dashed: the proved bound that no design whatever passes.",
+        "map": "The result over both keys; hatched where a point has none.",
+        "moments": "The second moments of the regressors over the key.",
+    }
+    return [
+        Chart(svg_uri(draw), f"{captions[name]} Drawn from sweep.csv.", captions[name])
+        for name, draw in sweep_figures(table)
+    ]
+
+
+def _failures(table: SweepTable) -> list[tuple[str, str, str]]:
+    found = [i for i, code in enumerate(table.columns["code"]) if code][:MOST_ROWS]
+    points = [", ".join(f"{key} = {table.columns[key][i]}" for key in table.axes) for i in found]
+    return [
+        (p, table.columns["code"][i], table.columns["reason"][i]) for p, i in zip(points, found, strict=True)
+    ]
+
+
+def _values(texts: list[str]) -> str:
+    if len(texts) <= 12:
+        return ", ".join(texts)
+    return f"{', '.join(texts[:3])}, ... {texts[-1]} ({len(texts)} values)"
+
+
+def _cell(text: str) -> str:
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return text
+    return f"{value:.6g}" if isinstance(value, float) else text

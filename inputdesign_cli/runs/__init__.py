@@ -1,0 +1,1 @@
+"""What a run leaves: results, its directory, tables, provenance and golden values."""

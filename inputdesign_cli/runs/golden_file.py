@@ -1,0 +1,148 @@
+"""Reading golden files; every diagnostic names the file, the line and the key.
+
+A golden file holds runs, and each run the quantities to find in its result:
+
+    title: First-order example
+    runs:
+      - name: white
+        spec: ../specs/first_order.yaml      # relative to the golden file
+        command: solve                       # the default; or analyse, simulate
+        overrides: ["spectrum={type: white}"]   # as `--set` takes them
+        quantities:
+          - path: objective.value            # into result.json; list items as [0]
+            label: input power               # the default is the path
+            expected: 1.705495
+            absolute: 1.0e-6                 # or relative: the largest deviation that passes
+            why: two units of the last digit that the source gives
+            source: independent solution
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import PlainValidator, ValidationError, model_validator
+
+from inputdesign_cli.errors import Diagnostic, SpecError
+from inputdesign_cli.specification.models.fields import FileName, Number, Positive, Text
+from inputdesign_cli.specification.models.findings import Finding, Findings, fail
+from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.translate import translate
+from inputdesign_cli.specification.models.values import text
+from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.yaml.places import format_key, parse_key
+from inputdesign_cli.specification.yaml.reader import Tree, read
+
+_PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
+
+
+def _result_path(value: Any) -> str:
+    path = text(value)
+    if not _PATH.fullmatch(path):
+        hint = "write objective.value or power.input[0]"
+        raise fail("golden-path", f"{path!r} is no path into a result", hint)
+    return path
+
+
+class Quantity(Section):
+    """One number of a result: where it stands, what it should be, how far off it may be and why."""
+
+    path: Annotated[str, PlainValidator(_result_path)]
+    expected: Number
+    absolute: Positive | None = None
+    relative: Positive | None = None
+    why: Text
+    source: Text
+    label: Text = ""
+
+    @model_validator(mode="after")
+    def _one_tolerance(self) -> Quantity:
+        if (self.absolute is None) == (self.relative is None):
+            raise fail("golden-tolerance", "{key} needs one tolerance", "give either absolute or relative")
+        if self.absolute is None and self.expected == 0.0:
+            raise fail("golden-tolerance", "{key} of 0 is no tolerance", "give absolute", "relative")
+        return self
+
+    @property
+    def tolerance(self) -> float:
+        """The largest deviation that passes, in the quantity's own unit."""
+        return self.absolute if self.absolute is not None else (self.relative or 0.0) * abs(self.expected)
+
+    @property
+    def name(self) -> str:
+        """The label, or the path in its place."""
+        return self.label or self.path
+
+    @property
+    def steps(self) -> tuple[str | int, ...]:
+        """The path taken apart: keys as text, indices as numbers."""
+        return parse_key(self.path)
+
+
+class GoldenRun(Section):
+    """One run of one spec, and what to look at in its result. `spec` is relative to the golden file."""
+
+    name: Text
+    spec: FileName
+    command: Literal["solve", "analyse", "simulate"] = "solve"
+    overrides: tuple[Text, ...] = ()
+    quantities: tuple[Quantity, ...]
+
+
+class _Content(Section):
+    title: Text = ""
+    runs: tuple[GoldenRun, ...]
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> _Content:
+        findings = Findings()
+        names = [run.name for run in self.runs]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                findings.add("golden-name", f"two runs have the name {name!r}", "", "runs", i, "name")
+        findings.stop()
+        return self
+
+
+@dataclass(frozen=True)
+class Golden:
+    """The content of one golden file."""
+
+    file: Path
+    title: str
+    runs: tuple[GoldenRun, ...]
+
+    def spec_of(self, run: GoldenRun) -> Path:
+        """The spec of a run, relative to the current folder."""
+        return self.file.parent / run.spec
+
+
+def load_golden(path: Path) -> Golden:
+    """Read a golden file.
+
+    Raises
+    ------
+    SpecError
+        Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
+        `golden-path`, `golden-tolerance`, `golden-name`.
+    """
+    tree = read(read_text(path), str(path))
+    readers: dict[Any, Any] = {}
+    try:
+        content = _Content.model_validate(tree.data, context=readers)
+    except ValidationError as error:
+        findings = translate(error.errors(), tree.data, readers)
+        raise SpecError([*tree.diagnostics, *(_complaint(finding, tree) for finding in findings)]) from None
+    if tree.diagnostics:
+        raise SpecError(tree.diagnostics)
+    return Golden(Path(path), content.title or Path(path).stem, content.runs)
+
+
+def _complaint(finding: Finding, tree: Tree) -> Diagnostic:
+    key = format_key(finding.path)
+    location = tree.places.location(tree.places.mark(finding.path, at_key=finding.at_key))
+    message, hint = (part.replace("{key}", key or "the file") for part in (finding.message, finding.hint))
+    return Diagnostic(finding.code, message, hint, key, location)

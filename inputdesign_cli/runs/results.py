@@ -1,0 +1,259 @@
+"""What a design, an analysis or a study hands to the record and the report: plain data, nothing to compute.
+
+`result` is the content of `result.json`; the rest is what the CSV files and the plots need. Frequencies
+are in rad per time unit, spectra in the convention of the contract (power = integral over the normalised
+circle / 2 pi).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one CSV file: header name (with its unit, `frequency_rad_per_s`) -> values (n,)."""
+
+    columns: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class SpectrumCurves:
+    """The designed spectrum over frequency, as a density, as lines, or both."""
+
+    frequency: Array  # (n,) rad per time unit
+    density: Array | None = None  # (n,) Phi(frequency)
+    white: float | None = None  # the flat level of the white baseline, for comparison
+    line_frequency: Array | None = None  # (L,)
+    line_power: Array | None = None  # (L,) mean square of each sinusoid
+    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
+    record: Array | None = None  # (n,) smoothed periodogram of the record
+
+
+@dataclass(frozen=True)
+class MatrixSpectrumCurves:
+    """The spectrum of several inputs over frequency: a density, or the powers of lines."""
+
+    frequency: Array  # (n,) rad per time unit
+    spectrum: NDArray[np.complex128]  # (n, inputs, inputs), Hermitian
+    white: float | None = None  # the level of white noise of the same total power
+    lines: bool = False
+    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
+    logarithmic: bool = False  # the axis of frequency
+    record: Array | None = None  # (n, inputs), smoothed periodograms of the record
+
+
+@dataclass(frozen=True)
+class DirectionCurves:
+    """The plant's gains in its principal directions, and the input's power in each of them."""
+
+    frequency: Array  # (n,)
+    gain: Array  # (n, inputs), singular values of G, largest first
+    power: Array  # (n, inputs), of the input along the right singular vectors
+    white: float | None = None
+    lines: bool = False
+
+
+@dataclass(frozen=True)
+class LossCurves:
+    """What the runs of a Monte Carlo study lost, input by input."""
+
+    losses: Mapping[str, Array]  # name -> (runs,)
+    theory: Mapping[str, float] = field(default_factory=dict)  # name -> mean
+
+
+@dataclass(frozen=True)
+class BoundCurves:
+    """Model error against admissible error over frequency; all arrays (n,)."""
+
+    frequency: Array
+    r_u: Array
+    G_abs: Array
+    r_adm: Array | None = None
+    r_u_white: Array | None = None  # of white excitation at the cost that it needs
+    active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
+    r_u_record: Array | None = None  # of the samples of the record
+    label: str = "design"  # what gave r_u
+
+
+@dataclass(frozen=True)
+class OptimalityCurves:
+    """The equivalence-theorem ratio over frequency: at most one everywhere, one on the support."""
+
+    frequency: Array
+    ratio: Array
+    support: Array
+
+
+@dataclass(frozen=True)
+class ChannelBoundCurves:
+    """Model error against admissible error, entry by entry: "[2,1]" -> its curves."""
+
+    entries: Mapping[str, BoundCurves]
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """The predicted confidence region of a pair of parameters: their values and (2, 2) covariances."""
+
+    names: tuple[str, str]
+    center: Array  # (2,)
+    covariance: Array
+    white: Array | None = None  # of white excitation within the same limits
+
+
+@dataclass(frozen=True)
+class EllipseCurves:
+    """Confidence ellipses of some pairs, all at one `probability`."""
+
+    pairs: tuple[Ellipse, ...]
+    probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class CloudCurves:
+    """Estimates of many runs in some planes of the parameters, and what theory predicts."""
+
+    names: tuple[str, ...]
+    pairs: tuple[tuple[int, int], ...]
+    theta: Array  # (runs, k)
+    centre: Array  # (k,) the truth
+    covariance: Array  # (k, k) in theory
+    probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class ErrorBandCurves:
+    """Quantiles over many runs of |G_hat - G_0| over frequency, against what was promised; arrays (n,)."""
+
+    frequency: Array
+    quantiles: Mapping[float, Array]  # probability -> (n,)
+    r_u: Array | None = None
+    r_adm: Array | None = None
+    name: str = "design"
+    runs: int = 0
+
+
+@dataclass(frozen=True)
+class ChannelErrorBandCurves:
+    """The same entry by entry: "[2,1]" -> its curves."""
+
+    entries: Mapping[str, ErrorBandCurves]
+    name: str = "design"
+
+
+@dataclass(frozen=True)
+class FitCurves:
+    """Recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
+
+    time: Array
+    y: Array
+    predicted: Array
+    simulated: Array | None = None
+    fit: float | None = None  # per cent
+
+
+@dataclass(frozen=True)
+class ResidualCurves:
+    """Normalised correlations of residuals over lags (samples), and the probabilities of the two tests."""
+
+    lags: Array
+    autocorrelation: Array
+    input_lags: Array
+    cross_correlation: Array
+    limit: float
+    whiteness: float
+    independence: float
+
+
+@dataclass(frozen=True)
+class ChannelFitCurves:
+    """The same output by output: "y1" -> its curves."""
+
+    outputs: Mapping[str, FitCurves]
+
+
+@dataclass(frozen=True)
+class ChannelResidualCurves:
+    """Normalised correlations of p residuals among each other and with r past inputs."""
+
+    lags: Array
+    autocorrelation: Array  # (n, p, p)
+    input_lags: Array
+    cross_correlation: Array  # (m, p, r)
+    limit: float
+    whiteness: float
+    independence: float
+
+
+@dataclass(frozen=True)
+class SignalCurves:
+    """The record to be applied: `time` (n,), one array (n,) a channel."""
+
+    time: Array
+    channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
+
+
+@dataclass(frozen=True)
+class ErrorCurves:
+    """Mean-squared error of a shape of moments over the energy; all arrays (n,)."""
+
+    energy: Array
+    bias_squared: Array
+    variance: Array
+    white: Array  # of white regressors of that energy
+    design: tuple[float, float]  # energy and error of the design
+    target: float | None = None
+
+
+@dataclass(frozen=True)
+class MomentsCurves:
+    """The moments of regressors, and the lines of the periodic input that has them (if it is one input)."""
+
+    R: Array  # (n, n)
+    estimated: int  # how many of the n are estimated
+    line_frequency: Array | None = None  # (L,) rad per time unit, from 0 on
+    line_power: Array | None = None  # (L,) mean squares
+    nyquist: float = np.pi
+
+
+Curves = (
+    SpectrumCurves
+    | MatrixSpectrumCurves
+    | DirectionCurves
+    | LossCurves
+    | BoundCurves
+    | OptimalityCurves
+    | SignalCurves
+    | ChannelBoundCurves
+    | EllipseCurves
+    | ErrorCurves
+    | MomentsCurves
+    | CloudCurves
+    | ErrorBandCurves
+    | ChannelErrorBandCurves
+    | FitCurves
+    | ChannelFitCurves
+    | ResidualCurves
+    | ChannelResidualCurves
+)
+
+
+@dataclass(frozen=True)
+class Results:
+    """One run: the result and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
+
+    result: Mapping[str, Any]
+    resolved_spec: str  # YAML text of the spec with all overrides applied
+    time_unit: str = "s"
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    curves: Mapping[str, Curves] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)  # file name ("model.yaml") -> content

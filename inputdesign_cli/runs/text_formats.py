@@ -1,0 +1,80 @@
+"""Results as JSON and tables as CSV: exact to the last bit, and strict about what may stand in them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.runs.results import Array, Table
+
+
+def plain(value: Any, where: str = "result") -> Any:
+    """`value` in JSON's own types: arrays as nested lists, complex numbers as {"re", "im"}, tuples as lists.
+
+    Keys keep their order. `where` names the value in the diagnostic.
+
+    Raises
+    ------
+    ValueError
+        A NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
+    TypeError
+        A value or a key that has no place in JSON.
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{where} is {value}: a result must be finite")
+        return value
+    if isinstance(value, complex):
+        return {"re": plain(value.real, f"{where}.re"), "im": plain(value.imag, f"{where}.im")}
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"{where} has the key {key!r}: keys must be text")
+        return {key: plain(item, f"{where}.{key}") for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
+    raise TypeError(f"{where} is of type {type(value).__name__}, which JSON cannot hold")
+
+
+def json_text(value: Any) -> str:
+    """`value` (anything that `plain` accepts) as JSON text with a final newline."""
+    return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv_text(table: Table) -> str:
+    """A header line and one line a row, 17 significant digits, so that reading gives back every bit.
+
+    Raises
+    ------
+    ValueError
+        A column that is not a real vector, or columns of different lengths.
+    """
+    columns = {name: np.asarray(values) for name, values in table.columns.items()}
+    for name, values in columns.items():
+        if values.ndim != 1 or values.dtype.kind not in "fiu":
+            raise ValueError(f"column {name} is no real vector, but {values.dtype} of shape {values.shape}")
+    if len({len(values) for values in columns.values()}) > 1:
+        lengths = ", ".join(f"{name}: {len(values)}" for name, values in columns.items())
+        raise ValueError(f"the columns of a table differ in length ({lengths})")
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    layout = ",".join(["%.17g"] * len(columns))
+    lines = [",".join(columns), *(layout % row for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def read_csv(path: Path) -> dict[str, Array]:
+    """The columns of a file that `csv_text` made: name -> (n,)."""
+    with path.open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    values = np.array(rows, dtype=float).reshape(len(rows), len(header))
+    return {name: values[:, i] for i, name in enumerate(header)}

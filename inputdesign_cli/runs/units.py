@@ -1,0 +1,79 @@
+"""What turns the numbers of an experiment into those of its user: units, and the names of signals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Units:
+    """Time, frequency and channels of an experiment as its user counts and calls them.
+
+    `sampled` tells discrete time, where the experiment counts in rad/sample, from continuous time, where it
+    counts in rad per `time_unit` as the user does. One input and one output carry no index in the names of
+    curves and entries.
+    """
+
+    time_unit: str
+    sample_time: float
+    sampled: bool
+    closed_loop: bool
+    inputs: int
+    outputs: int
+
+    @property
+    def frequency(self) -> float:
+        """What an experiment's frequency is divided by to be in rad per time unit."""
+        return self.sample_time if self.sampled else 1.0
+
+    @property
+    def step(self) -> float:
+        """The time between samples in the unit of the experiment's frequencies: 1, or `sample_time`."""
+        return 1.0 if self.sampled else self.sample_time
+
+    @property
+    def per_time(self) -> str:
+        """The unit of frequencies, for sentences: rad/s."""
+        return f"rad/{self.time_unit}"
+
+    @property
+    def frequency_header(self) -> str:
+        """The header of a column of frequencies: frequency_rad_per_s."""
+        return f"frequency_rad_per_{self.time_unit}"
+
+    @property
+    def time_header(self) -> str:
+        """The header of a column of times: time_s."""
+        return f"time_{self.time_unit}"
+
+    @property
+    def excitation(self) -> str:
+        """What is designed: r in closed loop, u in open loop."""
+        return "r" if self.closed_loop else "u"
+
+    @property
+    def excitations(self) -> tuple[str, ...]:
+        """The columns of the record: u1, u2, .., in closed loop r1, r2, .."""
+        return tuple(f"{self.excitation}{a + 1}" for a in range(self.inputs))
+
+    @property
+    def single(self) -> bool:
+        """One input and one output."""
+        return self.inputs == self.outputs == 1
+
+    def entry(self, output: int, input: int) -> str:
+        """An entry of G, counted from zero, as it stands in names of parameters: `[2,1]`; nothing for one."""
+        return "" if self.single else f"[{output + 1},{input + 1}]"
+
+    def suffix(self, output: int, input: int) -> str:
+        """The same in names of columns: `_21`; nothing for one."""
+        return "" if self.single else f"_{output + 1}{input + 1}"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What heads every result: the title, the spec as resolved (YAML), and the units."""
+
+    title: str
+    resolved_spec: str
+    units: Units

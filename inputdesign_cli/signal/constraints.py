@@ -1,0 +1,121 @@
+"""Records within limits on their values, their moves and what they cause: exactly, not nearly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from inputdesign_cli.plant.polynomial import Array
+
+LinearMap = Callable[[Array], Array]
+# The limits hold in floating-point arithmetic, not only before rounding.
+_INSIDE = 1.0 - 1e-12
+_ROUNDS = 40
+_PENALTIES = (1.0, 10.0, 100.0, 1000.0)
+_STEPS = 60
+
+
+@dataclass(frozen=True)
+class SignalConstraint:
+    """A signal (n,) that is linear in the record, such as an output, and the largest modulus it may have.
+
+    Several signals (n, q) have a bound (q,) each. `adjoint` is the transpose of `apply`: it answers in the
+    shape of the record.
+    """
+
+    apply: LinearMap
+    adjoint: LinearMap
+    bound: float | Array
+
+
+def slow_moves(values: Array, rate: float) -> Array:
+    """The record nearest to `values` (n,) in the largest deviation that moves by at most `rate` a step.
+
+    Half way between the least such record above and the greatest below, which both are found by
+    one pass forwards and one backwards. It starts from rest: the first value is a move from zero.
+    """
+    above, below = values.copy(), values.copy()
+    for t in range(1, values.size):
+        above[t] = max(above[t], above[t - 1] - rate)
+        below[t] = min(below[t], below[t - 1] + rate)
+    for t in range(values.size - 2, -1, -1):
+        above[t] = max(above[t], above[t + 1] - rate)
+        below[t] = min(below[t], below[t + 1] + rate)
+    reach = rate * np.arange(1.0, values.size + 1.0)
+    return np.clip(0.5 * (above + below), -reach, reach)
+
+
+def largest_move(values: Array) -> float:
+    """The largest change from one value to the next, the first from rest."""
+    return float(np.abs(np.diff(values, prepend=0.0)).max())
+
+
+def compressed(values: Array, peak: float) -> Array:
+    """A record of the same periodogram, and with its peak lowered towards `peak`.
+
+    Clip and restore: E. van der Ouderaa, J. Schoukens and J. Renneboog, IEEE Trans. Instrumentation and
+    Measurement 37 (1988) 145-147. The moduli of the discrete Fourier transform are kept, its phases
+    give way.
+    """
+    best, least = values, float(np.abs(values).max())
+    modulus = np.abs(np.fft.rfft(values))
+    record = values
+    for _ in range(_ROUNDS):
+        if least <= peak:
+            break
+        # Clipping below the goal gets there sooner.
+        transform = np.fft.rfft(np.clip(record, -0.95 * peak, 0.95 * peak))
+        size = np.abs(transform)
+        direction = np.where(size > 0, transform, 1.0) / np.where(size > 0, size, 1.0)
+        record = np.fft.irfft(modulus * direction, values.size)
+        reached = float(np.abs(record).max())
+        if reached < least:
+            best, least = record, reached
+    return best
+
+
+def restrained(values: Array, watched: tuple[SignalConstraint, ...]) -> Array:
+    """The record near `values` (n,) or (n, r) whose `watched` signals all keep to their bounds.
+
+    Least squares, each input in its own root mean square, with the excess penalised ever more (a
+    quasi-Newton method), scaled down at the end so that the bounds hold exactly.
+    """
+    record = values
+    if peak_ratio(record, watched) > 1.0:
+        rms = np.sqrt(np.mean(values**2, axis=0))
+        scale = np.where(rms > 0.0, rms, 1.0)
+        for penalty in _PENALTIES:
+            found = scipy.optimize.minimize(
+                _penalised,
+                (record / scale).ravel(),
+                args=(values, scale, watched, penalty),
+                jac=True,
+                method="L-BFGS-B",
+                options={"maxiter": _STEPS},
+            )
+            record = found.x.reshape(values.shape) * scale
+    excess = peak_ratio(record, watched)
+    return record if excess <= 1.0 else record * (_INSIDE / excess)
+
+
+def peak_ratio(values: Array, watched: tuple[SignalConstraint, ...]) -> float:
+    """The largest modulus of any watched signal relative to its bound."""
+    return max((float((np.abs(w.apply(values)) / w.bound).max()) for w in watched), default=0.0)
+
+
+def _penalised(
+    relative: Array, wanted: Array, scale: Array, watched: tuple[SignalConstraint, ...], penalty: float
+) -> tuple[float, Array]:
+    """Half the squared distance, relative to `scale`, with the penalties, and its slope."""
+    record = relative.reshape(wanted.shape) * scale
+    away = (record - wanted) / scale
+    value, slope = 0.5 * float(np.sum(away**2)), away
+    for signal in watched:
+        ratio = signal.apply(record) / signal.bound
+        excess = ratio - np.clip(ratio, -_INSIDE, _INSIDE)
+        value += 0.5 * penalty * float(np.sum(excess**2))
+        slope = slope + penalty * signal.adjoint(excess / signal.bound) * scale
+    return value, slope.ravel()

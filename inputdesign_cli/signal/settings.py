@@ -1,0 +1,93 @@
+"""How a spectrum is to be turned into a record: plain settings, and what they demand of its length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal.sinusoids import Selection
+
+Method = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "given"]
+Phases = Literal["random", "schroeder", "optimised"]
+LEVELLED = ("binary", "ternary", "prbs")
+
+
+@dataclass(frozen=True)
+class Quantiser:
+    """A converter of 2^bits values, `step` apart, that spans [-span, span - step].
+
+    Deviations are counted from the operating point, which is the converter's value nearest to `offset`.
+    """
+
+    bits: int
+    span: float
+    offset: float = 0.0
+
+    @property
+    def step(self) -> float:
+        """The least significant bit, in the unit of u."""
+        return 2.0 * self.span / 2.0**self.bits
+
+    @property
+    def operating_point(self) -> float:
+        """The value of the converter nearest to the offset."""
+        return self.step * self._centre
+
+    @property
+    def _centre(self) -> float:
+        half = 2.0 ** (self.bits - 1)
+        return float(np.clip(np.floor(self.offset / self.step + 0.5), -half, half - 1))
+
+    def room(self) -> float:
+        """The largest deviation that the converter reaches to both sides."""
+        half = 2.0 ** (self.bits - 1)
+        return self.step * min(half - 1 - self._centre, self._centre + half)
+
+    def codes(self, deviation: Array) -> Array:
+        """The nearest deviations that the converter has, in steps."""
+        half = 2.0 ** (self.bits - 1)
+        nearest = np.floor(deviation / self.step + 0.5)
+        return np.clip(nearest, -half - self._centre, half - 1 - self._centre)
+
+
+@dataclass(frozen=True)
+class SignalSettings:
+    """What is drawn, and how it is dressed.
+
+    `hold`: each value stands for this many samples; `periods`: equal ones in the record; `ramp`: samples
+    over which it fades in and out; `bits`: register of a pseudo-random sequence; `level`: the peak that
+    the record is to have (or the peaks of its inputs), whatever that buys; `quantiser`: of a single input.
+    Up to `most_candidates` are drawn while the best of the first `candidates` costs more than a twentieth
+    beyond the design.
+    """
+
+    method: Method = "filtered_noise"
+    phases: Phases = "random"
+    lines: Selection = None
+    periods: int = 1
+    hold: int = 1
+    ramp: int = 0
+    bits: int | None = None
+    level: float | Array | None = None
+    quantiser: Quantiser | None = None
+    candidates: int = 20
+    most_candidates: int = 80
+    seed: int = 0
+
+    @property
+    def block(self) -> int:
+        """The length of a record is a multiple of this."""
+        return self.periods * self.hold
+
+    def period(self, samples: int) -> int:
+        """Values a period."""
+        return samples // self.block
+
+    def taper(self, values: int) -> Array:
+        """(values,): the fade in and out, half a cosine each."""
+        length = min(-(-self.ramp // self.hold), values // 2)
+        edge = 0.5 - 0.5 * np.cos(np.pi * (np.arange(length) + 1.0) / (length + 1.0))
+        return np.concatenate([edge, np.ones(values - 2 * length), edge[::-1]])

@@ -1,0 +1,115 @@
+"""Is the question complete and without contradiction: what is asked for, and what keeps it finite."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from inputdesign_cli.specification.models.findings import Finding
+from inputdesign_cli.specification.models.plant import RegressionPlant
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.near_words import choices
+
+
+def something_asked(spec: Spec) -> Iterator[Finding]:
+    """A design needs a requirement or a criterion; an analysis of a given excitation does not."""
+    accuracy = spec.accuracy
+    if spec.designs and not accuracy.requirements and not accuracy.goals:
+        yield Finding(
+            "nothing-asked",
+            "nothing is asked of the model: accuracy holds neither a requirement nor a criterion",
+            "write accuracy: {model_error: {relative: 0.01}}, or give the excitation under spectrum.given",
+            ("accuracy",),
+        )
+    if "scale" in accuracy.model_fields_set and accuracy.criterion is None:
+        yield Finding(
+            "unsuitable-key",
+            "{key} is the scale of a criterion, and there is none",
+            "add criterion: D (or A, E, T), or remove scale",
+            ("accuracy", "scale"),
+        )
+
+
+def goals_agree(spec: Spec) -> Iterator[Finding]:
+    """At most one goal, and an objective that has what it needs."""
+    accuracy, objective = spec.accuracy, spec.objective
+    for extra in accuracy.goals[1:]:
+        yield Finding(
+            "conflicting-keys",
+            f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment",
+            "keep one of the two",
+            ("accuracy", extra),
+            at_key=True,
+        )
+    if not spec.designs or not (accuracy.requirements or accuracy.goals):
+        return
+    path = ("objective",)
+    if objective in ("least_cost", "shortest_experiment") and not accuracy.requirements:
+        yield Finding(
+            "contradictory-objective",
+            f"{objective} needs a requirement to meet, but accuracy only holds {choices(accuracy.goals)}",
+            "add accuracy.model_error, or write objective: best_accuracy",
+            path,
+        )
+    elif objective in ("least_cost", "shortest_experiment") and accuracy.goals:
+        yield Finding(
+            "contradictory-objective",
+            f"{objective} leaves nothing to optimise for accuracy.{accuracy.goals[0]}",
+            f"remove accuracy.{accuracy.goals[0]}, or write objective: best_accuracy",
+            path,
+        )
+    elif objective == "best_accuracy" and not accuracy.goals and accuracy.mean_squared_error is not None:
+        yield Finding(
+            "contradictory-objective",
+            "best_accuracy asks for the least mean-squared error, but a target for it is given",
+            "remove the target of mean_squared_error, or write objective: least_cost",
+            path,
+        )
+
+
+def limits_present(spec: Spec) -> Iterator[Finding]:
+    """Without a limit on power the best experiment has no end, and the shortest is one sample."""
+    if not spec.designs or spec.limits.bounds_power:
+        return
+    if spec.goal == "best_accuracy" and (spec.accuracy.goals or spec.accuracy.requirements):
+        asked = (*spec.accuracy.goals, *spec.accuracy.requirements)[0]
+        regression = isinstance(spec.plant, RegressionPlant)
+        key = "limits.energy" if regression else "limits.input_power"
+        yield Finding(
+            "needs-limits",
+            f"accuracy.{asked} is to be the best that limits allow, but nothing limits its power",
+            f"add {key}" + ("" if regression else ", limits.output_power or limits.excitation_power"),
+            ("limits",) if "limits" in spec.model_fields_set else ("accuracy", asked),
+        )
+    if spec.goal == "shortest_experiment":
+        yield Finding(
+            "needs-limits",
+            "the shortest experiment needs a limit on power: otherwise one strong sample would do",
+            "add limits.input_power, limits.output_power or limits.excitation_power",
+            ("limits",) if "limits" in spec.model_fields_set else ("objective",),
+        )
+
+
+def sensitivity_has_loop(spec: Spec) -> Iterator[Finding]:
+    """A sensitivity is that of a loop."""
+    error = spec.accuracy.model_error
+    if error is None or error.sensitivity is None or error.sensitivity.controller is not None:
+        return
+    if not spec.closed_loop:
+        yield Finding(
+            "needs-controller",
+            "{key} is that of a control loop, but there is no controller",
+            "add experiment.controller, or a controller beside it for the loop to be kept",
+            ("accuracy", "model_error", "sensitivity"),
+        )
+
+
+def lengths_agree(spec: Spec) -> Iterator[Finding]:
+    """The experiment is no longer than it may be."""
+    most = spec.limits.samples
+    if most is not None and spec.goal != "shortest_experiment" and spec.experiment.samples > most:
+        yield Finding(
+            "conflicting-keys",
+            f"{{key}} is {spec.experiment.samples}, more than limits.samples ({most})",
+            "shorten the experiment or raise the limit",
+            ("experiment", "samples"),
+        )

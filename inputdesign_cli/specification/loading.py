@@ -1,0 +1,192 @@
+"""YAML text or file to `Spec`; all diagnostics of a file come together."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from pydantic import ValidationError
+
+from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.specification.checks.everything import related, run_checks
+from inputdesign_cli.specification.models.experiment import Cost
+from inputdesign_cli.specification.models.findings import Finding
+from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.spectrum import FirSpectrum
+from inputdesign_cli.specification.models.translate import shorten, translate
+from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.yaml.overrides import compose
+from inputdesign_cli.specification.yaml.places import Path, Places, format_key
+from inputdesign_cli.specification.yaml.reader import Tree, read
+from inputdesign_cli.specification.yaml.source import Source
+
+# Take the place of a section that could not be read, so that the rest can still be checked.
+_STAND_IN: dict[str, dict[str, Any]] = {"plant": {"B": [0, 1]}, "noise": {"variance": 1}}
+
+_MOST_ROUNDS = 50
+
+
+def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Spec:
+    """Read a spec file.
+
+    Parameters
+    ----------
+    path : the YAML file.
+    overrides : `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
+
+    Raises
+    ------
+    SpecError : with one diagnostic for everything that is wrong, in the order of the file.
+    """
+    return _parse(read_text(path), os.fspath(path), overrides, FilePath(path).parent)
+
+
+def parse_spec(
+    text: str, file: str = "<spec>", overrides: Sequence[str] = (), *, folder: FilePath | None = None
+) -> Spec:
+    """Read a spec from its text. Raises `SpecError` as `load_spec` does.
+
+    Parameters
+    ----------
+    file : the name in diagnostics.
+    folder : what the paths in the spec are relative to (default: the current folder).
+    """
+    return _parse(text.removeprefix("\ufeff"), file, overrides, folder or FilePath())
+
+
+def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> Spec:
+    tree = read(text, file)
+    if not isinstance(tree.data, dict):
+        empty = tree.data is None
+        raise SpecError(
+            Diagnostic(
+                "empty-file" if empty else "not-a-mapping",
+                "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
+                "`idesign init` writes a spec to start from",
+                location=tree.places.location(tree.places.mark(())) or Location(file, 1, 1),
+            )
+        )
+    compose(tree, folder, overrides)
+    spec, findings = _validate(tree)
+    diagnostics = [*tree.diagnostics, *(_complaint(f, tree.places) for f in findings)]
+    if diagnostics or spec is None:
+        raise SpecError(_sorted(diagnostics, tree.places))
+    spec = _with_defaults(spec)
+    spec._source = Source(tree.data, tree.places, folder)
+    return spec
+
+
+def _validate(tree: Tree) -> tuple[Spec | None, list[Finding]]:
+    """Validate, take out what is wrong, and validate again, until the rest is a spec that can be checked.
+
+    So a wrong number in `plant` does not hide a contradiction in `accuracy`; findings about what was taken
+    out, or about what contains it, are consequences and not reported.
+    """
+    data = copy.deepcopy(tree.data)
+    findings: list[Finding] = []
+    broken = set(tree.broken)
+    for path in _empty(data, ()):
+        comma = isinstance(path[-1], str) and path[-1].isdecimal()
+        hint = (
+            "use a decimal point: a comma begins the next key"
+            if comma
+            else "write a value, or remove the key"
+        )
+        findings.append(Finding("empty-value", "{key} has no value", hint, path, at_key=True))
+        broken.add(path)
+        _prune(data, path)
+    for attempt in range(_MOST_ROUNDS):
+        readers: dict[int, type[Section]] = {}
+        try:
+            spec = Spec.model_validate(data, context=readers)
+        except ValidationError as error:
+            found = translate(error.errors(include_url=False), data, readers)
+            # Under its right name a misspelt key would be there: it is neither missing nor without effect.
+            broken |= {(*f.path[:-1], f.meant) for f in found if f.meant}
+            known = set(broken)
+            findings += [f for f in found if not _consequence(f, known, attempt)]
+            for finding in found:
+                broken.add(finding.path)
+            for finding in found:
+                _prune(data, finding.path)
+            continue
+        checked = [shorten(f, tree.data) for f in run_checks(spec, broken)]
+        findings += [f for f in checked if not related(f.path, broken)]
+        return spec, findings
+    return None, findings
+
+
+def _consequence(finding: Finding, broken: set[Path], attempt: int) -> bool:
+    """Whether a finding follows from what was taken out before it.
+
+    What was taken out may have told which kind of plant or spectrum this is, so later attempts say nothing
+    about keys: what is missing or too much was said by the first.
+    """
+    if attempt > 0 and finding.code in ("unknown-key", "unsuitable-key"):
+        return True
+    if finding.keys:
+        return any(related((*finding.path, key), broken) for key in finding.keys)
+    missing = attempt > 0 and finding.code == "missing-key"
+    return related(finding.path[:-1] if missing else finding.path, broken)
+
+
+def _empty(data: Any, path: Path) -> list[Path]:
+    if data is None:
+        return [path]
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    return [found for step, value in items for found in _empty(value, (*path, step))]
+
+
+def _prune(data: dict[str, Any], path: Path) -> None:
+    """Remove the deepest mapping entry on the path; a required section gets its stand-in."""
+    holder: dict[str, Any] | None = None
+    key = ""
+    node: Any = data
+    for step in path:
+        if isinstance(node, dict):
+            if step not in node:
+                break
+            holder, key = node, str(step)
+            node = node[step]
+        elif isinstance(node, list) and isinstance(step, int) and step < len(node):
+            node = node[step]
+        else:
+            break
+    if path and path[0] in _STAND_IN and (holder is None or holder is data):
+        data[str(path[0])] = copy.deepcopy(_STAND_IN[str(path[0])])
+    elif holder is not None:
+        holder.pop(key, None)
+
+
+def _with_defaults(spec: Spec) -> Spec:
+    """The defaults that depend on other sections."""
+    update: dict[str, Any] = {}
+    if "cost" not in spec.model_fields_set and spec.closed_loop:
+        update["cost"] = Cost(input_power=1.0, output_power=1.0)
+    single = (spec.plant.inputs, spec.plant.outputs) == (1, 1)
+    if spec.spectrum is None and spec.goal == "least_cost" and spec.plant.sampled and single:
+        update["spectrum"] = FirSpectrum(type="fir")
+    return spec.model_copy(update=update) if update else spec
+
+
+def _complaint(finding: Finding, places: Places) -> Diagnostic:
+    key = format_key(finding.path)
+    name = key or "the spec"
+    location = places.location(places.mark(finding.path, at_key=finding.at_key))
+    message, hint = (text.replace("{key}", name) for text in (finding.message, finding.hint))
+    return Diagnostic(finding.code, message, hint, key, location)
+
+
+def _sorted(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:
+    """In the order of the file, then of the overrides; the same diagnostic is made once."""
+    order = {file: i for i, (file, _) in enumerate(places.sources)}
+
+    def place(diagnostic: Diagnostic) -> tuple[int, int, int]:
+        at = diagnostic.location
+        return (order.get(at.file, len(order)), at.line, at.column) if at else (-1, 0, 0)
+
+    return sorted(dict.fromkeys(diagnostics), key=place)

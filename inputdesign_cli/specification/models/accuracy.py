@@ -1,0 +1,264 @@
+"""`accuracy:`, what the model must reach: requirements, criteria, or both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
+
+from inputdesign_cli.specification.models.control import ClosedLoopError
+from inputdesign_cli.specification.models.controller import Controller
+from inputdesign_cli.specification.models.experiment import SemidefiniteMatrix, check_names, exactly_one
+from inputdesign_cli.specification.models.fields import (
+    Band,
+    Denominator,
+    FileName,
+    Flag,
+    Fraction,
+    Names,
+    Numbers,
+    Numerator,
+    Positive,
+    SymmetricMatrix,
+)
+from inputdesign_cli.specification.models.findings import Findings, describe, fail
+from inputdesign_cli.specification.models.section import Section, Shorthand
+from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
+from inputdesign_cli.specification.models.values import collect, number
+
+DEFAULT_CONFIDENCE = 0.95
+
+
+class Sensitivity(Section):
+    """An admissible error that keeps the sensitivity S of a control loop: |W S| <= 1, or |S| below a peak."""
+
+    numerator: Numerator | None = Field(default=None, description="Numerator of W in q^-1.")
+    denominator: Denominator | None = Field(
+        default=None, description="Denominator of W (default 1), or its factors."
+    )
+    max_db: Positive | None = Field(default=None, description="Largest |S| in dB; stands for a constant W.")
+    controller: Controller | None = Field(
+        default=None, description="C of the loop to be kept (default: the controller of the experiment)."
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Sensitivity:
+        findings = Findings()
+        exactly_one(findings, self, "numerator", "max_db")
+        if self.denominator is not None and self.numerator is None:
+            findings.add(
+                "missing-key", "{key} stands without a numerator", 'add "numerator: [..]"', "denominator"
+            )
+        findings.stop()
+        return self
+
+    @property
+    def weight(self) -> DiscreteTransfer | None:
+        """W as a transfer function; None when the peak is given."""
+        if self.numerator is None:
+            return None
+        return DiscreteTransfer(numerator=self.numerator, denominator=self.denominator or (1.0,))
+
+
+class ModelError(Section):
+    """r_u(w) <= r_adm(w) at every frequency of the band."""
+
+    relative: Positive | None = Field(default=None, description="r_adm = this fraction of |G|.")
+    absolute: Positive | None = Field(default=None, description="r_adm = this value at every frequency.")
+    table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
+    sensitivity: Sensitivity | None = Field(default=None, description="r_adm from a bound on a sensitivity.")
+    confidence: Fraction | None = Field(
+        default=None,
+        description="Probability that fixes alpha by the chi-squared distribution (default 0.95).",
+    )
+    alpha: Positive | None = Field(
+        default=None, description="Size of the confidence region, in place of confidence."
+    )
+    band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
+    weight: Transfer | None = Field(default=None, description="Weight on the model error (default 1).")
+    norm: Literal["entry", "frobenius"] | None = Field(
+        default=None,
+        description="Of several channels: entry, each entry of G for itself (default), or frobenius, the "
+        "root of the sum of their squares (the only choice for sensitivity).",
+    )
+    region: Literal["first_order", "ellipsoid"] = Field(
+        default="first_order", description="first_order: linearised; ellipsoid: every model of the ellipsoid."
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> ModelError:
+        findings = Findings()
+        exactly_one(findings, self, "relative", "absolute", "table", "sensitivity")
+        if self.confidence is not None and self.alpha is not None:
+            findings.add(
+                "conflicting-keys",
+                "{key} stands beside confidence, which fixes it already",
+                "keep one of the two",
+                "alpha",
+                at_key=True,
+            )
+        if self.sensitivity is not None and self.norm == "entry":
+            findings.add(
+                "conflicting-keys",
+                "{key} is entry, but a sensitivity depends on all entries of the error together",
+                "remove norm, or write frobenius",
+                "norm",
+            )
+        findings.stop()
+        return self
+
+    @property
+    def probability(self) -> float | None:
+        """The confidence, 0.95 when neither it nor alpha is given; None when alpha is given."""
+        return None if self.alpha is not None else self.confidence or DEFAULT_CONFIDENCE
+
+
+class InformationTarget(Section):
+    """The information matrix must exceed this one."""
+
+    matrix: SymmetricMatrix = Field(description="Symmetric matrix, a row per parameter.")
+    parameters: Names | None = Field(
+        default=None, description="Names that order its rows (default: of the model)."
+    )
+
+    @model_validator(mode="after")
+    def _sizes(self) -> InformationTarget:
+        findings = Findings()
+        check_names(findings, self.parameters, len(self.matrix), "matrix")
+        findings.stop()
+        return self
+
+
+class Application(Section):
+    """Application-oriented accuracy: M >= (chi2 gamma / 2) V'', V the degradation of the application."""
+
+    parameters: Names = Field(description="Names of the parameters, in the order of the hessian's rows.")
+    hessian: SemidefiniteMatrix = Field(description="V'' of the application cost at the nominal parameters.")
+    gamma: Positive = Field(description="Accuracy: V may reach 1/gamma.")
+    confidence: Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
+
+    @model_validator(mode="after")
+    def _sizes(self) -> Application:
+        findings = Findings()
+        check_names(findings, self.parameters, len(self.hessian), "hessian")
+        findings.stop()
+        return self
+
+
+class WeightedVariance(Section):
+    """|W|^2 Lambda^* P Lambda <= max at every frequency of the band."""
+
+    weight: Transfer | None = Field(default=None, description="The weight W (default 1).")
+    max: Positive = Field(description="Largest admissible weighted variance.")
+    band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
+    relative: Flag = Field(
+        default=False, description="Whether the variance is of G relative to its nominal value."
+    )
+
+
+Norm = Annotated[
+    float,
+    PlainValidator(partial(number, least=0.0, hint="a norm is not negative; 0 stands for no bias at all")),
+    WithJsonSchema({"type": "number", "minimum": 0}),
+]
+ErrorTarget = Annotated[
+    float,
+    PlainValidator(
+        partial(
+            number,
+            above=0.0,
+            hint="every estimate has some error; remove the key for the least that limits.energy allows",
+        )
+    ),
+    WithJsonSchema({"type": "number", "exclusiveMinimum": 0}),
+]
+
+
+class MeanSquaredError(Section):
+    """Mean-squared error of an estimated quantity when some regressors are neglected."""
+
+    estimated: Numbers = Field(description="Weights of the estimated parameters in the quantity of interest.")
+    neglected: Numbers | None = Field(default=None, description="Weights of the neglected ones (default 0).")
+    neglected_norm: Norm = Field(description="Bound on the norm of the neglected parameters.")
+    target: ErrorTarget | None = Field(
+        default=None, description="Largest admissible error; absent: the least that limits.energy allows."
+    )
+
+
+def _deviations(value: Any) -> dict[str, float]:
+    if not isinstance(value, dict) or not value:
+        what = (
+            "is an empty mapping" if isinstance(value, dict) else f"must be a mapping, not {describe(value)}"
+        )
+        raise fail("wrong-shape", "{key} " + what, "write parameter names and numbers: {b1: 0.01}")
+    findings = Findings()
+    result = {
+        name: collect(findings, lambda v: number(v, above=0.0), deviation, name)
+        for name, deviation in value.items()
+    }
+    findings.stop()
+    return result
+
+
+Deviations = Annotated[
+    Mapping[str, float],
+    PlainValidator(_deviations),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "additionalProperties": {"type": "number", "exclusiveMinimum": 0},
+            "minProperties": 1,
+        }
+    ),
+]
+
+
+class Accuracy(Section):
+    """Requirements on the model; several may stand together. A criterion asks for the best instead."""
+
+    model_error: ModelError | None = Field(
+        default=None, description="Bound on the model error over frequency."
+    )
+    information: Annotated[InformationTarget, Shorthand("matrix", {"type": "array"})] | None = Field(
+        default=None, description="Lower bound on the information matrix."
+    )
+    application: Application | None = Field(default=None, description="Application-oriented ellipsoid.")
+    weighted_variance: WeightedVariance | None = Field(
+        default=None, description="Bound on a weighted variance."
+    )
+    standard_deviation: Deviations | None = Field(
+        default=None, description="Largest standard deviation of each named parameter."
+    )
+    criterion: Literal["D", "A", "E", "T"] | None = Field(
+        default=None,
+        description="The best det, trace of inverse, smallest eigenvalue or trace of M within limits.",
+    )
+    scale: Literal["absolute", "relative"] = Field(
+        default="absolute",
+        description="Whether the criterion is of the parameters or of their relative errors.",
+    )
+    closed_loop_error: ClosedLoopError | None = Field(
+        default=None, description="Error of the loop with the controller designed on the model."
+    )
+    mean_squared_error: MeanSquaredError | None = Field(
+        default=None, description="Mean-squared error with neglected regressors."
+    )
+
+    @property
+    def requirements(self) -> tuple[str, ...]:
+        """The keys of the requirements that are given, in the order of the contract."""
+        names = ("model_error", "information", "application", "weighted_variance", "standard_deviation")
+        given = [n for n in names if getattr(self, n) is not None]
+        if self.mean_squared_error is not None and self.mean_squared_error.target is not None:
+            given.append("mean_squared_error")
+        return tuple(given)
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """The keys that ask for the best that limits allow."""
+        given = [n for n in ("criterion", "closed_loop_error") if getattr(self, n) is not None]
+        if self.mean_squared_error is not None and self.mean_squared_error.target is None:
+            given.append("mean_squared_error")
+        return tuple(given)

@@ -1,0 +1,98 @@
+"""What must hold for polynomials: monic, stable, not zero; their products."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+
+import numpy as np
+
+from inputdesign_cli.specification.models.findings import Finding, show
+
+Polynomial = tuple[float, ...]
+
+MAX_ORDER = 300
+"""Roots of higher orders mean nothing in double precision, and take long."""
+
+
+def product(factors: Iterable[Polynomial]) -> Polynomial:
+    """The product of polynomials given by their coefficients (the order of the powers does not matter)."""
+    with np.errstate(all="ignore"):
+        full: np.ndarray = functools.reduce(np.convolve, (np.asarray(f) for f in factors), np.ones(1))
+    return tuple(float(c) for c in full)
+
+
+def check_monic(polynomial: Polynomial) -> Finding | None:
+    """In q^-1, ascending: the first coefficient is exactly 1."""
+    lead = polynomial[0]
+    if lead == 1.0:
+        return None
+    if lead == 0.0:
+        return Finding(
+            "not-monic",
+            "{key} must start with 1, not 0",
+            "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0",
+        )
+    scaled = ", ".join(show(c / lead) for c in polynomial[:6])
+    more = ", ..." if len(polynomial) > 6 else ""
+    return Finding(
+        "not-monic",
+        f"{{key}} must start with 1, not {show(lead)}",
+        f"divide all its coefficients by {show(lead)}: [{scaled}{more}]",
+    )
+
+
+def check_delay_stable(polynomial: Polynomial) -> Finding | None:
+    """In q^-1, ascending: all roots in z lie strictly inside the unit circle."""
+    roots, finding = _roots(polynomial)
+    if finding or not roots.size:
+        return finding
+    worst = roots[np.argmax(np.abs(roots))]
+    radius = float(abs(worst))
+    if radius < 1.0:
+        return None
+    angle = abs(float(np.angle(worst)))
+    where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
+    return Finding(
+        "unstable-polynomial",
+        f"{{key}} has a root of radius {where} at {angle:.4g} rad/sample; "
+        "all roots (in z) must lie inside the unit circle",
+        "check the signs, and that the coefficients ascend in q^-1 and begin with 1",
+    )
+
+
+def check_left_half_plane(polynomial: Polynomial) -> Finding | None:
+    """In s, descending: all roots lie in the open left half plane."""
+    roots, finding = _roots(polynomial)
+    if finding or not roots.size:
+        return finding
+    worst = roots[np.argmax(roots.real)]
+    if worst.real < 0:
+        return None
+    place = f"{worst.real:.4g}" + (f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else "")
+    return Finding(
+        "unstable-polynomial",
+        f"{{key}} has a root at s = {place}; all poles must lie in the left half plane",
+        "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3",
+    )
+
+
+def _roots(polynomial: Polynomial) -> tuple[np.ndarray, Finding | None]:
+    if len(polynomial) - 1 > MAX_ORDER:
+        return np.zeros(0), Finding(
+            "bad-polynomial",
+            f"{{key}} has order {len(polynomial) - 1}; orders above {MAX_ORDER} are not supported",
+            "reduce the order, or write it as a list of factors where that is allowed",
+        )
+    try:
+        with np.errstate(all="ignore"):
+            roots = np.roots(np.asarray(polynomial, dtype=float))
+    except np.linalg.LinAlgError:
+        roots = np.full(1, np.nan)
+    if not np.all(np.isfinite(roots)):
+        return np.zeros(0), Finding(
+            "bad-polynomial",
+            "the roots of {key} cannot be computed: its coefficients differ by too many orders of magnitude",
+            "rescale it, or choose another time unit",
+        )
+    return roots, None

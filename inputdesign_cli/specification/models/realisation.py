@@ -1,0 +1,138 @@
+"""`signal:`, `solver:` and `simulation:`: how a spectrum is realised, found and tried."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from inputdesign_cli.specification.models.experiment import SimulationNoise
+from inputdesign_cli.specification.models.fields import (
+    Count,
+    Harmonics,
+    Index,
+    PerChannel,
+    PositivePerChannel,
+    RegisterLength,
+    Tolerance,
+)
+from inputdesign_cli.specification.models.findings import Findings
+from inputdesign_cli.specification.models.plant import TruePlant
+from inputdesign_cli.specification.models.section import Section
+
+SignalType = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
+
+# Settings that mean something for some types of signal only.
+_ONLY_FOR = {
+    "phases": ("multisine",),
+    "lines": ("multisine", "binary", "ternary"),
+    "ramp": ("filtered_noise", "multisine", "white"),
+    "bits": ("prbs",),
+    "order": ("filtered_noise",),
+}
+
+
+class Quantisation(Section):
+    """The digital-to-analogue converter that applies the signal."""
+
+    bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
+    range: PositivePerChannel = Field(
+        description="They span [-range, range), in the unit of u, the offset included; a number or one per "
+        "input.",
+        examples=[10.0],
+    )
+
+
+class Signal(Section):
+    """The time series that realises the spectrum."""
+
+    type: SignalType | None = Field(
+        default=None, description="Kind of signal (default: what suits the spectrum)."
+    )
+    samples: Count | None = Field(default=None, description="Length (default: experiment.samples).")
+    seed: Index | None = Field(default=None, description="Seed of the random numbers.")
+    phases: Literal["random", "schroeder", "optimised"] | None = Field(
+        default=None, description="Phases of a multisine; optimised: for a low crest factor."
+    )
+    periods: Count | None = Field(default=None, description="Number of equal periods.")
+    hold: Count | None = Field(default=None, description="Samples for which each value is held.")
+    lines: Harmonics | None = Field(
+        default=None, description="Harmonics of a period that are used: their number, odd, or a list."
+    )
+    amplitudes: PositivePerChannel | None = Field(
+        default=None,
+        description="Amplitude (level) to scale to, whatever it buys; a number or one per input.",
+    )
+    offset: PerChannel | None = Field(
+        default=None, description="Operating point added; a number or one per input."
+    )
+    ramp: Index | None = Field(default=None, description="Samples over which the signal fades in and out.")
+    order: Count | None = Field(
+        default=None,
+        description="States for each input of a rational filter for filtered_noise (default: a long filter).",
+    )
+    start: Literal["steady", "zero"] | None = Field(
+        default=None,
+        description="Past of a regression's input: its periodic continuation (default), or zero.",
+    )
+    bits: RegisterLength | None = Field(
+        default=None, description="Length of the shift register of a prbs (default: no repetition)."
+    )
+    quantisation: Quantisation | None = Field(default=None, description="The converter: {bits, range}.")
+    scale: Literal["target", "design"] | None = Field(
+        default=None,
+        description="target: the least power with which the record itself meets the accuracy (default); "
+        "design: the power of the design.",
+    )
+    also: tuple[Literal["mat", "wav"], ...] | None = Field(
+        default=None, description="Other files of the signal beside signal.csv: mat, wav."
+    )
+    candidates: Count | None = Field(
+        default=None, description="Number of random realisations to choose the best of."
+    )
+
+    @model_validator(mode="after")
+    def _companions(self) -> Signal:
+        findings = Findings()
+        for key, types in _ONLY_FOR.items():
+            if getattr(self, key) is not None and self.type is not None and self.type not in types:
+                findings.add(
+                    "unsuitable-key",
+                    f"{{key}} does not go with type: {self.type}",
+                    f"it belongs to type: {types[0]}; remove it, or change the type",
+                    key,
+                    at_key=True,
+                )
+        findings.stop()
+        return self
+
+
+class Solver(Section):
+    """How the optimum is found."""
+
+    method: Literal["exchange", "lmi", "alternating"] = Field(
+        default="exchange",
+        description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
+    )
+    tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
+    grid: Count = Field(default=1000, description="Number of frequencies of the lmi method (default 1000).")
+    positivity: Literal["kyp", "gram"] = Field(default="gram", description="Positivity in the lmi method.")
+
+
+class Simulation(Section):
+    """The Monte Carlo study on the true system."""
+
+    runs: Count = Field(default=100, description="Number of runs (default 100).")
+    seed: Index = Field(default=0, description="Seed of the random numbers (default 0).")
+    plant: TruePlant | None = Field(default=None, description="The true system (default: the nominal plant).")
+    noise: SimulationNoise | None = Field(
+        default=None, description="The true noise (default: the nominal noise)."
+    )
+    excitation: Literal["new", "record"] = Field(
+        default="new",
+        description="new: each run realises the spectrum anew (default); record: all runs apply the one "
+        "record that is delivered.",
+    )
+    compare: tuple[Literal["white", "prbs", "multisine", "binary"], ...] = Field(
+        default=(), description="Other inputs to compare with, at equal power."
+    )

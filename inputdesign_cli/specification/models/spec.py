@@ -1,0 +1,140 @@
+"""The spec as a whole: the frozen object that the other rooms read."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from pydantic import Field, PrivateAttr
+
+from inputdesign_cli.errors import Diagnostic, IdesignError, Location, SpecError
+from inputdesign_cli.specification.models.accuracy import Accuracy
+from inputdesign_cli.specification.models.experiment import Cost, Experiment, Noise
+from inputdesign_cli.specification.models.fields import Positive, Text
+from inputdesign_cli.specification.models.limits import Limits
+from inputdesign_cli.specification.models.plant import Plant
+from inputdesign_cli.specification.models.realisation import Signal, Simulation, Solver
+from inputdesign_cli.specification.models.report import Report
+from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.spectrum import GivenSpectrum, Spectrum
+from inputdesign_cli.specification.models.sweep import Sweep
+from inputdesign_cli.specification.yaml.places import parse_key
+from inputdesign_cli.specification.yaml.source import Source
+from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
+
+Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
+
+_Error = TypeVar("_Error", bound=IdesignError)
+
+
+class Spec(Section):
+    """An experiment to be designed: everything that a spec file says, checked, with defaults filled in.
+
+    Frequencies are in rad per `time_unit`, times in `time_unit`. `load_spec` and `parse_spec` make one;
+    it remembers where each key was written, so that later diagnostics can point at the line.
+    """
+
+    title: Text = Field(default="", description="What this experiment is about.")
+    sample_time: Positive = Field(default=1.0, description="Sampling interval in time_unit (default 1).")
+    time_unit: Literal["s", "ms", "us", "min", "h", "d"] = Field(
+        default="s", description="Unit of time; frequencies are in rad per this unit (default s)."
+    )
+    plant: Plant = Field(
+        description="Nominal plant: polynomials A, B, F; continuous; or regression.",
+        examples=[{"B": [0, 3.6], "F": [1, -0.7]}],
+    )
+    noise: Noise = Field(
+        description="Noise on the output: variance, and polynomials C and D.", examples=[{"variance": 1.0}]
+    )
+    experiment: Experiment = Field(
+        default=Experiment(), description="Samples, controller, prior information."
+    )
+    cost: Cost = Field(
+        default=Cost(input_power=1.0),
+        description="Weights of the powers. Default: input_power 1; in closed loop also output_power 1.",
+    )
+    accuracy: Accuracy = Field(default=Accuracy(), description="What the model must reach.")
+    objective: Objective | None = Field(
+        default=None, description="least_cost, best_accuracy or shortest_experiment; default: from the rest."
+    )
+    limits: Limits = Field(default=Limits(), description="What the experiment may not exceed.")
+    spectrum: Spectrum | None = Field(
+        default=None, description="Family of the input spectrum, or a given excitation."
+    )
+    signal: Signal = Field(default=Signal(), description="The time series that realises the spectrum.")
+    solver: Solver = Field(default=Solver(), description="How the optimum is found.")
+    simulation: Simulation | None = Field(default=None, description="Monte Carlo study on the true system.")
+    report: Report = Field(default=Report(), description="What the figures show.")
+    sweep: Sweep | None = Field(default=None, description="What `idesign sweep` varies.")
+
+    _source: Source = PrivateAttr(default_factory=Source)
+
+    @property
+    def goal(self) -> Objective:
+        """The objective, or the one that follows from the rest when it is not given."""
+        if self.objective is not None:
+            return self.objective
+        return "best_accuracy" if self.accuracy.goals else "least_cost"
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether the experiment runs under a controller."""
+        return self.experiment.controller is not None
+
+    @property
+    def designs(self) -> bool:
+        """Whether an excitation is to be designed (not given)."""
+        return not isinstance(self.spectrum, GivenSpectrum)
+
+    @property
+    def signal_samples(self) -> int:
+        """The length of the signal: signal.samples, or else experiment.samples."""
+        return self.signal.samples or self.experiment.samples
+
+    @property
+    def nyquist(self) -> float:
+        """The largest frequency: pi/sample_time in rad per time unit; infinite in continuous time."""
+        return math.pi / self.sample_time if self.plant.sampled else math.inf
+
+    def clip_band(self, band: tuple[float, float] | None) -> tuple[float, float]:
+        """The band within [0, nyquist]; None is all frequencies. 3.1416 for pi passes the checks."""
+        low, high = band or (0.0, math.inf)
+        return low, min(high, self.nyquist)
+
+    @property
+    def sha256(self) -> str:
+        """The hash of what the spec says, overrides applied; comments, layout and order do not count."""
+        return fingerprint(self._content())
+
+    def to_yaml(self) -> str:
+        """The keys that the user gave, overrides applied, as YAML that `parse_spec` reads back."""
+        return to_yaml(self._content())
+
+    def locate(self, key: str) -> Location | None:
+        """Where a key such as `plant.F` or `plant.B[1]` is written, or its deepest ancestor that is."""
+        places = self._source.places
+        return places.location(places.mark(parse_key(key)))
+
+    def resolve_path(self, name: str) -> Path:
+        """The path of a file that the spec names, relative to the folder of the spec."""
+        return self._source.folder / name
+
+    def complain(self, code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
+        """A `SpecError` with a single diagnostic that points at `key`."""
+        return SpecError(Diagnostic(code, message, hint, key, self.locate(key)))
+
+    def place(self, error: _Error) -> _Error:
+        """An error of the same type whose keyed diagnostics point at their lines."""
+        placed = type(error)(
+            [
+                c if c.location or not c.key else dataclasses.replace(c, location=self.locate(c.key))
+                for c in error.diagnostics
+            ]
+        )
+        placed.__cause__ = error.__cause__
+        return placed
+
+    def _content(self) -> dict[str, object]:
+        return self._source.data or self.model_dump(mode="json", exclude_none=True, exclude_unset=True)

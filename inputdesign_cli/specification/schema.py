@@ -1,0 +1,51 @@
+"""The JSON schema of a spec, for editors that complete and check YAML."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.yaml.include import KEY
+
+
+def json_schema() -> dict[str, Any]:
+    """The schema (draft 2020-12) of a spec file: keys, types, choices and descriptions.
+
+    What spans several keys (shapes, stability, contradictions) is left to `idesign validate`.
+    """
+    schema = _tidy(Spec.model_json_schema())
+    names = {"type": "string", "minLength": 1}
+    schema["properties"][KEY] = {
+        "description": "Files whose blocks stand where the spec has none, such as model.yaml of `identify`.",
+        "anyOf": [names, {"type": "array", "items": names, "minItems": 1}],
+    }
+    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": [KEY]}]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "idesign experiment design",
+        **{key: value for key, value in schema.items() if key != "title"},
+    }
+
+
+def _tidy(node: Any) -> Any:
+    """Without what pydantic adds for Python alone: null for absent keys, class names as titles, defaults
+    that are whole sections."""
+    if isinstance(node, list):
+        return [_tidy(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    kept = {
+        key: _tidy(value)
+        for key, value in node.items()
+        if not (key == "title" and isinstance(value, str))
+        and not (key == "default" and (value is None or isinstance(value, dict)))
+    }
+    options = kept.get("anyOf")
+    if isinstance(options, list):
+        options = [option for option in options if option != {"type": "null"}]
+        if len(options) == 1 and isinstance(options[0], dict):
+            del kept["anyOf"]
+            kept = {**options[0], **kept}
+        else:
+            kept["anyOf"] = options
+    return kept

@@ -1,0 +1,88 @@
+"""A spec file to text: everything that can be wrong before the first character is understood."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from pathlib import Path
+
+from inputdesign_cli.errors import Diagnostic, Location, SpecError
+
+MAX_BYTES = 10 * 1024 * 1024
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a spec file, UTF-8 with or without a byte order mark.
+
+    Raises
+    ------
+    SpecError : no such file, a directory, not readable, too large, or not UTF-8.
+    """
+    name = os.fspath(path)
+    try:
+        # The path may hold what the operating system cannot even name (a NUL): that is a ValueError.
+        if Path(name).is_dir():
+            inside = sorted(p.name for p in Path(name).glob("*.y*ml"))[:3]
+            hint = f"it holds {', '.join(inside)}" if inside else "name the YAML file itself"
+            raise _error("file-unreadable", f"{name} is a folder, not a spec file", name, hint)
+        with open(name, "rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise _error("file-missing", f"there is no file {name}", name, _nearby(Path(name))) from None
+    except PermissionError:
+        raise _error(
+            "file-unreadable", f"{name} may not be read", name, "check the permissions of the file"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "the name is not a file name"
+        raise _error("file-unreadable", f"{name!r} cannot be read: {reason}", name, "") from None
+    if len(raw) > MAX_BYTES:
+        raise _error(
+            "file-too-large",
+            f"{name} is larger than {MAX_BYTES // 2**20} MiB",
+            name,
+            "is it a data file? A spec is a page of text; data belong into a CSV file that it names",
+        )
+    return decode(raw, name)
+
+
+def decode(raw: bytes, file: str) -> str:
+    """The text of UTF-8 bytes; a byte order mark is dropped."""
+    if raw.startswith(_UTF16_MARKS):
+        raise _error("file-encoding", f"{file} is encoded as UTF-16", file, "save it as UTF-8")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        # Everything before the bad byte decodes, so the place can be counted in characters.
+        before = error.object[: error.start].decode("utf-8", errors="replace")
+        rows = (before + "|").splitlines()
+        byte = error.object[error.start]
+        text = error.object.decode("utf-8", errors="replace").splitlines()[len(rows) - 1]
+        place = Location(file, len(rows), len(rows[-1]), text)
+        raise SpecError(
+            Diagnostic(
+                "file-encoding",
+                f"the byte 0x{byte:02X} is not UTF-8",
+                "save the file as UTF-8 (an editor may have used Latin-1 or Windows-1252)",
+                location=place,
+            )
+        ) from None
+
+
+def _nearby(path: Path) -> str:
+    folder = path.parent
+    try:
+        names = sorted(entry.name for entry in folder.iterdir() if entry.is_file())
+    except OSError:
+        return f"there is no folder {folder} either"
+    near = difflib.get_close_matches(path.name, names, n=1, cutoff=0.6)
+    same_stem = [n for n in names if Path(n).stem == path.name or n.startswith(path.name + ".")]
+    if near or same_stem:
+        return f'did you mean "{folder / (near or same_stem)[0]}"?'
+    specs = [n for n in names if n.endswith((".yaml", ".yml"))][:4]
+    return f"the folder holds {', '.join(specs)}" if specs else "`idesign init` writes a spec to start from"
+
+
+def _error(code: str, message: str, file: str, hint: str) -> SpecError:
+    return SpecError(Diagnostic(code, message, hint, location=Location(file, 1, 1)))

@@ -1,0 +1,127 @@
+"""`--set key.path=value`: replace one value of the spec, and remember that it came from there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.specification.yaml.include import KEY, apply_includes
+from inputdesign_cli.specification.yaml.places import Mark, Path, format_key, parse_key
+from inputdesign_cli.specification.yaml.reader import MAX_DEPTH, Tree, read
+
+
+def compose(tree: Tree, folder: FilePath, overrides: Sequence[str]) -> None:
+    """The spec with the files that it includes, then the overrides; `--set include=..` comes first."""
+    first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
+    apply_overrides(tree, first)
+    apply_includes(tree, folder)
+    apply_overrides(tree, [override for override in overrides if override not in first])
+
+
+def apply_overrides(tree: Tree, overrides: list[str]) -> None:
+    """Apply each `key.path=value` to the tree, in order; `null` as the value removes the key.
+
+    A wrong override becomes a diagnostic of the tree. Missing mappings are created, so a misspelt key is
+    found later, by the check that finds it in a file.
+    """
+    for override in overrides:
+        try:
+            _apply(tree, override)
+        except SpecError as error:
+            tree.diagnostics.extend(error.diagnostics)
+
+
+def _apply(tree: Tree, override: str) -> None:
+    file = f"--set {override}"
+    key, equals, text = override.partition("=")
+    path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(key.strip()))
+    if not equals or not path or "" in path or not key.isprintable():
+        raise _error(
+            file,
+            override,
+            1,
+            f"{override!r} is not of the form key.path=value",
+            "write --set noise.variance=0.5",
+        )
+    if len(path) > MAX_DEPTH:
+        raise _error(file, override, 1, "the key has too many steps", "no key has more than six")
+    if not text.strip():
+        raise _error(
+            file,
+            override,
+            len(key) + 2,
+            f"no value is given for {key.strip()}",
+            f"write {key.strip()}=VALUE, or {key.strip()}=null to remove the key",
+        )
+    number = len(tree.places.sources)
+    where = _resolve(tree.data, path, file, override)
+    value = read(text, file, source=number, before=key + equals, at=where)
+    tree.places.sources.append(value.places.sources[0])
+    _put(tree, where, value, Mark(number, 1, 1))
+    tree.diagnostics.extend(value.diagnostics)
+    tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
+
+
+def _resolve(data: Any, path: Path, file: str, override: str) -> Path:
+    """The path with digits turned into indices where the tree has a list."""
+    found: list[str | int] = []
+    for step in path:
+        if isinstance(data, list):
+            index = int(step) if isinstance(step, int) or (step.isascii() and step.isdecimal()) else None
+            if index is None or index >= len(data):
+                has = f"entries 0 to {len(data) - 1}" if data else "no entries"
+                raise _error(
+                    file,
+                    override,
+                    1,
+                    f"{format_key(found)} is a list with {has}; there is no entry {step}",
+                    f"give the whole list: --set {format_key(found)}=[..]",
+                )
+            found.append(index)
+            data = data[index]
+            continue
+        if data is not None and not isinstance(data, dict):
+            raise _error(
+                file,
+                override,
+                1,
+                f"{format_key(found)} is a single value, so it has no part {step}",
+                f"give the whole value: --set {format_key(found)}=..",
+            )
+        step = str(step)
+        found.append(step)
+        data = data.get(step) if isinstance(data, dict) else None
+    return tuple(found)
+
+
+def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
+    if not isinstance(tree.data, dict):
+        tree.data = {}
+    places = tree.places
+    node: Any = tree.data
+    for depth, step in enumerate(path[:-1], start=1):
+        here = path[:depth]
+        if _child(node, step) is None:
+            node[step] = {}
+            places.keys[here] = places.values[here] = mark
+        node = _child(node, step)
+    places.forget(path)
+    last = path[-1]
+    if value.data is None and isinstance(node, dict):
+        node.pop(last, None)
+        return
+    node[last] = value.data
+    places.keys[path] = mark
+    places.values.update(value.places.values)
+    places.keys.update(value.places.keys)
+
+
+def _child(node: Any, step: str | int) -> Any:
+    return node.get(step) if isinstance(node, dict) else node[step]
+
+
+def _error(file: str, override: str, column: int, message: str, hint: str) -> SpecError:
+    first = override.splitlines()[0] if override else ""
+    return SpecError(Diagnostic("bad-override", message, hint, location=Location(file, 1, column, first)))

@@ -1,0 +1,93 @@
+"""Where things stand: key paths such as `plant.B[1]` and the lines and columns they were read from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from inputdesign_cli.errors import Location
+
+Path = tuple[str | int, ...]
+
+_INDEX = re.compile(r"\[(\d+)\]$")
+
+
+def format_key(path: Sequence[str | int]) -> str:
+    """The dotted form of a path: `("plant", "B", 1)` is `plant.B[1]`; the whole spec is the empty text."""
+    parts: list[str] = []
+    for step in path:
+        if isinstance(step, int):
+            parts.append(f"[{step}]")
+        else:
+            parts.append(f".{step}" if parts else step)
+    return "".join(parts)
+
+
+def parse_key(key: str) -> Path:
+    """The steps of a dotted key. `B[1]` is an index, `b3[1,2]` is a parameter name and stays whole.
+
+    A step of digits (`B.1`) stays text: only the tree knows whether it stands in a list.
+    """
+    steps: list[str | int] = []
+    for part in key.split(".") if key else ():
+        indices: list[int] = []
+        while match := _INDEX.search(part):
+            indices.insert(0, int(match.group(1)))
+            part = part[: match.start()]
+        steps.extend(indices if indices and not part else [part, *indices])
+    return tuple(steps)
+
+
+class Mark(NamedTuple):
+    """A place: which source (0 is the spec file, then one per override), line and column from 1."""
+
+    source: int
+    line: int
+    column: int
+
+
+@dataclass
+class Places:
+    """The marks of every key and value, by path.
+
+    `keys` holds where a key is written, `values` what a diagnostic about its value points at: the value
+    itself, but for a mapping its key, because a block mapping begins on the line below.
+    """
+
+    sources: list[tuple[str, list[str]]] = field(default_factory=list)
+    keys: dict[Path, Mark] = field(default_factory=dict)
+    values: dict[Path, Mark] = field(default_factory=dict)
+
+    def mark(self, path: Path, *, at_key: bool = False) -> Mark | None:
+        """The mark of `path`, or of its deepest ancestor that was written."""
+        found = self._known(path)
+        if at_key and found == path and found in self.keys:
+            return self.keys[found]
+        return self.values.get(found)
+
+    def location(self, mark: Mark | None) -> Location | None:
+        """The mark as a `Location` with its file and the text of its line."""
+        if mark is None or mark.source >= len(self.sources):
+            return None
+        file, lines = self.sources[mark.source]
+        text = lines[mark.line - 1] if 0 < mark.line <= len(lines) else ""
+        return Location(file, mark.line, mark.column, text)
+
+    def forget(self, path: Path) -> None:
+        """Drop the marks of `path` and of all below it (an override has replaced them)."""
+        for table in (self.keys, self.values):
+            for known in [p for p in table if p[: len(path)] == path]:
+                del table[known]
+
+    def _known(self, path: Path) -> Path:
+        known: Path = ()
+        for step in path:
+            if (*known, step) in self.values:
+                known = (*known, step)
+            elif isinstance(step, str) and step.isdecimal() and (*known, int(step)) in self.values:
+                known = (*known, int(step))
+            else:
+                break
+        return known

@@ -1,0 +1,181 @@
+"""The points of a sweep: axes, each a key with its values, in every combination or side by side."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic_core import PydanticCustomError
+
+from inputdesign_cli.errors import Diagnostic, Location, SpecError, bad_spec
+from inputdesign_cli.specification import Sweep
+from inputdesign_cli.specification.models.findings import CARRIER
+from inputdesign_cli.specification.models.sweep import range_values
+from inputdesign_cli.specification.yaml.reader import read
+from inputdesign_cli.specification.yaml.scalars import resolve
+
+MOST_POINTS = 1_000_000
+_WORD = re.compile(r"[A-Za-z_][\w.-]*")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key of the spec and the texts of its values, each as `--set KEY=TEXT` takes it."""
+
+    key: str
+    texts: tuple[str, ...]
+
+    @property
+    def numbers(self) -> tuple[float, ...] | None:
+        """The values as numbers, or None if some value is none."""
+        values = [resolve(text.strip()) for text in self.texts]
+        if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+            return None
+        return tuple(float(value) for value in values if isinstance(value, int | float))
+
+
+@dataclass(frozen=True)
+class Grid(Sequence[tuple[str, ...]]):
+    """The points as tuples of texts, one per axis; computed when asked for. The last axis runs fastest."""
+
+    axes: tuple[Axis, ...]
+    zipped: bool = False
+
+    def __len__(self) -> int:
+        lengths = [len(axis.texts) for axis in self.axes]
+        return (min(lengths) if self.zipped else math.prod(lengths)) if lengths else 0
+
+    def __getitem__(self, index: Any) -> Any:
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        if self.zipped:
+            return tuple(axis.texts[index] for axis in self.axes)
+        texts = []
+        for axis in reversed(self.axes):
+            index, place = divmod(index, len(axis.texts))
+            texts.append(axis.texts[place])
+        return tuple(reversed(texts))
+
+    def __iter__(self) -> Iterator[tuple[str, ...]]:
+        return (self[i] for i in range(len(self)))
+
+    def overrides(self, point: tuple[str, ...]) -> list[str]:
+        """The point as `--set` takes it."""
+        return [f"{axis.key}={text}" for axis, text in zip(self.axes, point, strict=True)]
+
+    def block(self) -> dict[str, Any]:
+        """The grid as the `sweep` block of a spec."""
+        block: dict[str, Any] = {
+            "set": {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
+        }
+        return {**block, "zip": True} if self.zipped else block
+
+
+def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
+    """`KEY=V1,V2,..` and `KEY=LOW:HIGH:STEP` as axes; `KEY=VALUE` stays an override of every point.
+
+    Commas inside brackets, braces and quotes belong to a value.
+
+    Raises
+    ------
+    SpecError : `bad-range`, `bad-override`, `sweep-twice`.
+    """
+    fixed: list[str] = []
+    axes: dict[str, Axis] = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        parts = _split(text)
+        try:
+            texts = range_values(text) or parts
+        except PydanticCustomError as error:
+            finding = (error.context or {})[CARRIER][0]
+            place = Location(f"--set {setting}", 1, len(key) + 2, setting)
+            raise SpecError(Diagnostic(finding.code, finding.message, finding.hint, location=place)) from None
+        key = key.strip()
+        if not equals or len(texts) < 2:
+            fixed.append(setting)
+        elif "" in texts:
+            raise bad_spec(
+                "bad-override", f"a value of --set {setting} is empty", hint="remove the extra comma"
+            )
+        elif key in axes:
+            hint = "give all its values at once: key=v1,v2,v3"
+            raise bad_spec("sweep-twice", f"{key} is swept by two settings", hint=hint, key=key)
+        else:
+            axes[key] = Axis(key, tuple(texts))
+    return fixed, list(axes.values())
+
+
+def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Grid:
+    """The grid of the spec's `sweep` block, in which the axes of the command line replace or join those
+    of the block.
+
+    Raises
+    ------
+    SpecError : `sweep-empty`, `sweep-lengths`, `sweep-too-large`.
+    """
+    merged: dict[str, Axis] = {}
+    if block is not None:
+        for key, values in block.set.items():
+            merged[key] = Axis(key, tuple(_text(value) for value in values))
+    for axis in axes:
+        merged[axis.key] = axis
+    grid = Grid(tuple(merged.values()), zipped or (block is not None and block.zip))
+    if not merged:
+        raise bad_spec(
+            "sweep-empty",
+            "nothing is varied: no key has several values",
+            hint="write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5",
+        )
+    lengths = {axis.key: len(axis.texts) for axis in grid.axes}
+    if grid.zipped and len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{key} has {n}" for key, n in lengths.items())
+        raise bad_spec(
+            "sweep-lengths",
+            f"values that are taken side by side must be equally many ({listed})",
+            hint="give each key as many values, or leave out --zip for every combination",
+        )
+    if len(grid) > MOST_POINTS:
+        raise bad_spec(
+            "sweep-too-large",
+            f"the sweep has {len(grid)} points, and at most {MOST_POINTS} are run",
+            hint="vary fewer keys at once, or --zip them",
+        )
+    return grid
+
+
+def _split(text: str) -> tuple[str, ...]:
+    """The parts between the commas that stand outside brackets and quotes."""
+    parts, start, depth, quote = [], 0, 0, ""
+    for i, character in enumerate(text):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'" and not text[start:i].strip():
+            quote = character
+        elif character in "[{":
+            depth += 1
+        elif character in "]}":
+            depth -= 1
+        elif character == "," and depth == 0:
+            parts.append(text[start:i].strip())
+            start = i + 1
+    return (*parts, text[start:].strip())
+
+
+def _text(value: Any) -> str:
+    """A value of the `sweep` block as the text that `--set` takes."""
+    if isinstance(value, str) and _WORD.fullmatch(value) and resolve(value) == value:
+        return value
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _data(text: str) -> Any:
+    """What `--set` makes of a text; a text that it cannot read stays one."""
+    try:
+        return read(text, "--set").data
+    except SpecError:
+        return text

@@ -1,0 +1,151 @@
+"""The directory of a sweep, and what may be relied on in it.
+
+    sweep.yaml           the spec with its `sweep` block: `idesign sweep` on it repeats the sweep
+    sweep.json           what was swept, and how the points ended
+    sweep.csv            one row a point
+    points/<key>/        the run directory of a point that has a result
+    failures/<key>.json  why a point has none
+    .lock, .workers      locks; they hold as long as their processes live
+
+A point is done when its directory or its failure stands: both appear in one step. `<key>` is a hash of
+the resolved spec, of the files that it names, of the command and of the version of this package.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from inputdesign_cli.errors import Diagnostic, OutputError
+from inputdesign_cli.runs.run_directory import RESULT, complaining, replace_text
+
+SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
+LOCK, WORKERS = ".lock", ".workers"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the parts of a sweep stand in its directory."""
+
+    root: Path
+
+    def run(self, key: str) -> Path:
+        """The run directory of a point."""
+        return self.root / "points" / key
+
+    def failure(self, key: str) -> Path:
+        """The file that says why a point has no result."""
+        return self.root / "failures" / f"{key}.json"
+
+    def has_result(self, key: str) -> bool:
+        """Whether the run of a point is whole."""
+        return (self.run(key) / RESULT).is_file()
+
+    def has_failure(self, key: str) -> bool:
+        """Whether a point has been tried in vain."""
+        return self.failure(key).is_file()
+
+    def read(self, key: str) -> dict[str, Any] | None:
+        """The result of a point, or its failure (which has a `code`), or None."""
+        for path in (self.run(key) / RESULT, self.failure(key)):
+            with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+                content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+                return content
+        return None
+
+    def write_failure(self, key: str, text: str) -> None:
+        """Note why a point has no result, in one step."""
+        path = self.failure(key)
+        with complaining(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        replace_text(path, text)
+
+    def adopt(self, key: str, files: dict[str, bytes]) -> None:
+        """Put the run of a point, computed elsewhere, in its place in one step."""
+        target = self.run(key)
+        partial = target.parent / f".{key}.partial-{os.getpid()}"
+        with complaining(target):
+            shutil.rmtree(partial, ignore_errors=True)
+            partial.mkdir(parents=True)
+            for name, content in files.items():
+                (partial / name).write_bytes(content)
+            partial.rename(target)
+
+    def clear(self) -> None:
+        """Remove what killed processes left half written. Only the holder of the lock may."""
+        for folder in (self.root, self.root / "points", self.root / "failures"):
+            for path in folder.glob(".*.partial-*"):
+                if path.is_dir():
+                    shutil.rmtree(path, ignore_errors=True)
+                else:
+                    path.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def opened(root: Path) -> Iterator[Layout]:
+    """The directory of a sweep, made if it is missing and held for this process alone.
+
+    Raises
+    ------
+    OutputError
+        `sweep-locked` (another process sweeps into it), `output-not-a-sweep` (something else is in it),
+        `output-not-a-directory`, `output-not-writable`, `output-full`.
+    """
+    with contextlib.ExitStack() as held:
+        with complaining(root):
+            if root.exists() and not root.is_dir():
+                message = f"{root} is a file, and a sweep is written into a directory"
+                raise OutputError(
+                    Diagnostic("output-not-a-directory", message, hint="choose another directory with -o")
+                )
+            root.mkdir(parents=True, exist_ok=True)
+            foreign = sorted(p.name for p in root.iterdir() if not p.name.startswith("."))
+            if foreign and not (root / SUMMARY).is_file():
+                raise OutputError(
+                    Diagnostic(
+                        "output-not-a-sweep",
+                        f"{root} already has {', '.join(foreign[:4])}, and no {SUMMARY} of an earlier sweep",
+                        hint="choose another directory with -o",
+                    )
+                )
+            lock = held.enter_context((root / LOCK).open("a+", encoding="utf-8"))
+            _claim(lock, root)
+            with (root / WORKERS).open("a") as workers:
+                # Processes of a killed sweep hold it until they have noticed, which takes no time.
+                fcntl.flock(workers, fcntl.LOCK_EX)
+            layout = Layout(root)
+            layout.clear()
+        yield layout
+
+
+def _claim(lock: IO[str], root: Path) -> None:
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.seek(0)
+        owner = lock.read().strip()
+        raise OutputError(
+            Diagnostic(
+                "sweep-locked",
+                f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}",
+                hint="wait for it, or choose another directory with -o",
+            )
+        ) from None
+    lock.truncate(0)
+    lock.write(str(os.getpid()))
+    lock.flush()
+
+
+@contextlib.contextmanager
+def at_work(root: Path) -> Iterator[None]:
+    """Held by a process that writes a point, so that no other sweep begins before it has ended."""
+    with (root / WORKERS).open("a") as workers:
+        fcntl.flock(workers, fcntl.LOCK_SH)
+        yield

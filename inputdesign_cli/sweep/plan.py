@@ -1,0 +1,94 @@
+"""What a sweep is to do: a draft, a grid, a verb, and the key by which each point is known for good."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import inputdesign_cli
+from inputdesign_cli import __version__
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.specification import Draft, read_draft
+from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
+from inputdesign_cli.sweep.point import PointTask
+
+Verb = Literal["solve", "analyse", "simulate"]
+_KEY_LENGTH = 24
+_TRIED = 50
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The points of a sweep, in order."""
+
+    draft: Draft
+    grid: Grid
+    verb: Verb
+    _keys: list[str] = field(default_factory=list, repr=False)
+
+    def key(self, index: int) -> str:
+        """The key of a point: the same for the same spec, files, verb and version of this package."""
+        while len(self._keys) <= index:
+            overrides = self.grid.overrides(self.grid[len(self._keys)])
+            try:
+                digest = self.draft.digest(self.draft.variant(overrides))
+            except SpecError:
+                digest = json.dumps([self.draft.digest(self.draft.data), overrides])
+            name = f"{__version__} {self.verb} {digest}"
+            self._keys.append(hashlib.sha256(name.encode()).hexdigest()[:_KEY_LENGTH])
+        return self._keys[index]
+
+    def task(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointTask:
+        """A point for a worker; `with_files` if the worker may not see the files that the spec names."""
+        overrides = tuple(self.grid.overrides(self.grid[index]))
+        files = None
+        if with_files:
+            with suppress(SpecError):
+                names = self.draft.files(self.draft.variant(overrides))
+                files = {name: (self.draft.folder / name).read_bytes() for name in names}
+        return PointTask(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
+
+    def check(self) -> None:
+        """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
+
+        Raises
+        ------
+        SpecError : what is wrong with the first point, if no point that is tried can be read.
+        """
+        first: SpecError | None = None
+        for index in dict.fromkeys(i * (len(self.grid) - 1) // _TRIED for i in range(_TRIED + 1)):
+            try:
+                self.draft.spec(self.grid.overrides(self.grid[index]))
+            except SpecError as error:
+                first = first or error
+            else:
+                return
+        if first is not None:
+            raise first
+
+    def data(self) -> dict[str, object]:
+        """The spec with the grid as its `sweep` block: it repeats the sweep without any settings."""
+        content = {key: value for key, value in self.draft.data.items() if key != "sweep"}
+        return {**content, "sweep": self.grid.block()}
+
+
+def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb) -> Plan:
+    """Read the spec and the settings.
+
+    Raises
+    ------
+    SpecError : the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
+    """
+    if not hasattr(inputdesign_cli, verb):
+        hint = "sweep with --verb solve"
+        raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
+    fixed, axes = parse_settings(settings)
+    draft = read_draft(spec, fixed)
+    plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
+    plan.check()
+    return plan

@@ -1,0 +1,127 @@
+"""One point of a sweep: run the verb, and leave a run directory or the reason why there is none."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import threading
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import inputdesign_cli
+from inputdesign_cli.errors import (
+    EXIT_BAD_INPUT,
+    EXIT_INACCURATE,
+    EXIT_INFEASIBLE,
+    Diagnostic,
+    IdesignError,
+    OutputError,
+)
+from inputdesign_cli.runs.provenance import environment
+from inputdesign_cli.runs.text_formats import json_text
+from inputdesign_cli.specification import Draft
+from inputdesign_cli.sweep.layout import Layout, at_work
+
+STATUS = {EXIT_BAD_INPUT: "invalid", EXIT_INFEASIBLE: "infeasible", EXIT_INACCURATE: "inaccurate"}
+LOST, BROKEN = "lost", "error"
+
+# So far below the temporary folder stand the data files, so that a name such as ../tables/r.csv stays in it.
+_DEPTH = ["data"] * 8
+
+_alone = threading.Lock()
+
+
+@dataclass(frozen=True)
+class PointTask:
+    """What a worker needs to know of a point."""
+
+    index: int
+    key: str
+    draft: Draft
+    overrides: tuple[str, ...]
+    verb: str
+    figures: bool
+    root: Path
+    files: dict[str, bytes] | None = None  # what the spec names, for a machine that may not see our files
+
+
+@dataclass(frozen=True)
+class PointEnd:
+    """How a point ended: its status; with `files` if it was computed where our files are out of reach."""
+
+    status: str
+    failure: str = ""
+    files: dict[str, bytes] | None = None
+
+
+def run_point(task: PointTask) -> PointEnd:
+    """Compute a point and write it into the directory of the sweep.
+
+    Raises
+    ------
+    OutputError : the files cannot be written, which is not the fault of the point.
+    """
+    layout = Layout(task.root)
+    with at_work(task.root):
+        end = _compute(task, layout.run(task.key))
+        if end.failure:
+            layout.write_failure(task.key, end.failure)
+        return replace(end, failure="")
+
+
+def run_point_elsewhere(task: PointTask) -> PointEnd:
+    """Compute a point on a machine that may not see the directory of the sweep, and return its files."""
+    # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
+    with _alone, tempfile.TemporaryDirectory(prefix="idesign-") as folder:
+        run = Path(folder) / "run"
+        data = Path(folder).joinpath(*_DEPTH)
+        data.mkdir(parents=True)
+        for name, content in (task.files or {}).items():
+            path = Path(os.path.normpath(data / name))
+            if path.is_relative_to(folder):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+        end = _compute(replace(task, draft=replace(task.draft, folder=data)), run)
+        if end.failure:
+            return end
+        return replace(end, files={path.name: path.read_bytes() for path in sorted(run.iterdir())})
+
+
+def _compute(task: PointTask, directory: Path) -> PointEnd:
+    started = time.perf_counter()
+    try:
+        spec = task.draft.spec(task.overrides)
+        outcome = getattr(inputdesign_cli, task.verb)(spec)
+        seconds = time.perf_counter() - started
+        timing = {**outcome.result.get("timing_s", {}), "point": seconds}
+        outcome = replace(outcome, result={**outcome.result, "timing_s": timing})
+        from inputdesign_cli.runs.run_directory import write_run
+
+        write_run(outcome, directory, figures=task.figures)
+    except OutputError:
+        raise
+    except IdesignError as error:
+        return failed(
+            STATUS.get(error.exit_code, BROKEN), error.diagnostics[0], time.perf_counter() - started
+        )
+    except Exception as error:
+        diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
+        return failed(BROKEN, diagnostic, time.perf_counter() - started)
+    return PointEnd(str(outcome.result.get("status", "done")))
+
+
+def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:
+    """The end of a point without a result, with the content of its failure file."""
+    content: dict[str, Any] = {
+        "format": 1,
+        "status": status,
+        "code": diagnostic.code,
+        "message": diagnostic.message,
+        "hint": diagnostic.hint,
+        "key": diagnostic.key,
+        "timing_s": {"point": seconds},
+        "environment": environment(),
+    }
+    return PointEnd(status, failure=json_text(content))

@@ -1,0 +1,272 @@
+"""Batch sweeps: every point once, whatever happens on the way."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
+from inputdesign_cli.errors import (
+    Diagnostic,
+    IdesignError,
+    InaccurateError,
+    InfeasibleError,
+    OutputError,
+    SpecError,
+)
+from inputdesign_cli.runs.provenance import environment
+from inputdesign_cli.runs.run_directory import complaining, replace_text
+from inputdesign_cli.runs.text_formats import json_text
+from inputdesign_cli.specification.yaml.writer import to_yaml
+from inputdesign_cli.sweep.layout import SPEC, SUMMARY, TABLE, Layout, opened
+from inputdesign_cli.sweep.plan import Plan, Verb, build_plan
+from inputdesign_cli.sweep.point import (
+    BROKEN,
+    LOST,
+    STATUS,
+    PointEnd,
+    PointTask,
+    failed,
+    run_point,
+    run_point_elsewhere,
+)
+from inputdesign_cli.sweep.table import PENDING, table_lines
+
+FAILURES = frozenset({*STATUS.values(), LOST, BROKEN})
+_ERRORS: dict[str, type[IdesignError]] = {
+    "infeasible": InfeasibleError,
+    "inaccurate": InaccurateError,
+    "invalid": SpecError,
+}
+# While points are computed the table is written anew now and then: not more often than this, and for no
+# more than a thirtieth of the time.
+_REST, _SHARE = 10.0, 30.0
+
+
+class Listing(NamedTuple):
+    """A point of a sweep that has not been run: its settings, its key, and how it stands."""
+
+    settings: dict[str, str]
+    key: str
+    status: str
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a sweep is: points passed (done before or now), computed now, and failed among those."""
+
+    total: int
+    passed: int
+    computed: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class SweepSummary:
+    """What a sweep has come to: how many points have which status, and the first failure, if any."""
+
+    directory: Path
+    total: int
+    computed: int
+    statuses: dict[str, int]
+    first_failure: IdesignError | None
+    files: list[Path] = field(default_factory=list)
+
+    @property
+    def failures(self) -> int:
+        """How many points have no result though they were tried."""
+        return sum(n for status, n in self.statuses.items() if status in FAILURES)
+
+
+def list_points(
+    spec: Path,
+    settings: Sequence[str] = (),
+    *,
+    directory: Path,
+    zipped: bool = False,
+    verb: Verb = "solve",
+) -> Iterator[Listing]:
+    """The points of a sweep and whether they are done; nothing is computed or written."""
+    plan = build_plan(spec, settings, zipped=zipped, verb=verb)
+    layout = Layout(directory)
+    for index, point in enumerate(plan.grid):
+        key = plan.key(index)
+        status = "done" if layout.has_result(key) else "failed" if layout.has_failure(key) else PENDING
+        names = (axis.key for axis in plan.grid.axes)
+        yield Listing(dict(zip(names, point, strict=True)), key, status)
+
+
+def sweep(
+    spec: Path,
+    settings: Sequence[str] = (),
+    *,
+    directory: Path,
+    zipped: bool = False,
+    verb: Verb = "solve",
+    executor: Executor | None = None,
+    fail_fast: bool = False,
+    rerun_failed: bool = False,
+    figures: bool = False,
+    watch: Callable[[Progress], None] | None = None,
+) -> SweepSummary:
+    """Run a verb at every point of a grid, but for the points that are done already.
+
+    Parameters
+    ----------
+    settings : `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points.
+    executor : where the points are computed (default: in this process).
+    fail_fast : stop at the first point without a result instead of noting it in the table.
+    rerun_failed : try points again that failed in an earlier call.
+    figures : draw the figures of every point too.
+    watch : is told after every point how far the sweep is.
+
+    Raises
+    ------
+    SpecError, OutputError : before anything is computed; later OutputError only.
+    IdesignError : the first failure, with `fail_fast`.
+    """
+    plan = build_plan(spec, settings, zipped=zipped, verb=verb)
+    with opened(directory) as layout:
+        replace_text(layout.root / SPEC, to_yaml(plan.data()))
+        _write_summary(plan, layout, {})
+        run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, figures, watch)
+        try:
+            run.compute()
+        finally:
+            statuses = run.write_table()
+            _write_summary(plan, layout, statuses)
+        if fail_fast and run.first_failure:
+            raise run.first_failure
+        files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
+        files += _draw(directory)
+        return SweepSummary(directory, len(plan.grid), run.computed, statuses, run.first_failure, files)
+
+
+@dataclass
+class _Run:
+    plan: Plan
+    layout: Layout
+    executor: Executor
+    fail_fast: bool
+    rerun_failed: bool
+    figures: bool
+    watch: Callable[[Progress], None] | None
+    passed: int = 0
+    computed: int = 0
+    failed: int = 0
+    stopped: bool = False
+    lost: dict[str, dict[str, Any]] = field(default_factory=dict)
+    first_failure: IdesignError | None = None
+
+    def compute(self) -> None:
+        """Compute what is not done yet."""
+        points = self.layout.root / "points"
+        with complaining(points):
+            points.mkdir(exist_ok=True)
+        due = time.monotonic() + _REST
+        function = run_point if self.executor.shares_files else run_point_elsewhere
+        finished: Finished[PointTask, PointEnd]
+        for finished in self.executor.run(function, self._tasks()):
+            self._take(finished)
+            if self.stopped:
+                return
+            if time.monotonic() > due:
+                started = time.monotonic()
+                self.write_table()
+                due = time.monotonic() + max(_REST, _SHARE * (time.monotonic() - started))
+
+    def write_table(self) -> dict[str, int]:
+        """Write sweep.csv as things stand, and count the points by status."""
+        statuses: Counter[str] = Counter()
+
+        def read(key: str) -> dict[str, Any] | None:
+            content = self.layout.read(key) or self.lost.get(key)
+            statuses[content.get("status", "done") if content else PENDING] += 1
+            return content
+
+        replace_text(self.layout.root / TABLE, table_lines(self.plan, read))
+        # The table reads every point twice.
+        return {status: n // 2 for status, n in sorted(statuses.items())}
+
+    def _tasks(self) -> Iterator[PointTask]:
+        seen: set[str] = set()
+        here = self.executor.shares_files
+        root = self.layout.root if here else Path()
+        for index in range(len(self.plan.grid)):
+            if self.stopped:
+                return
+            key = self.plan.key(index)
+            known = self.layout.has_result(key) or key in seen
+            if not known and self.layout.has_failure(key) and not self.rerun_failed:
+                known = True
+                self._note_failure(index, self.layout.read(key) or {})
+            seen.add(key)
+            if known:
+                self._tell()
+            else:
+                yield self.plan.task(index, root, figures=self.figures, with_files=not here)
+
+    def _take(self, finished: Finished[PointTask, PointEnd]) -> None:
+        """File what a worker has answered."""
+        task, end = finished.task, finished.answer
+        self.computed += 1
+        if isinstance(finished.error, OutputError):
+            raise finished.error
+        if end is None:
+            lost = isinstance(finished.error, WorkerLostError)
+            code, status = ("worker-lost", LOST) if lost else ("internal-error", BROKEN)
+            end = failed(status, Diagnostic(code, str(finished.error)), 0.0)
+        if end.files is not None:
+            self.layout.adopt(task.key, end.files)
+        if end.status == LOST:
+            # Not the fault of the point: the next call tries it again.
+            self.lost[task.key] = json.loads(end.failure)
+        elif end.failure:
+            self.layout.write_failure(task.key, end.failure)
+        elif end.status not in FAILURES:
+            self.layout.failure(task.key).unlink(missing_ok=True)
+        if end.status in FAILURES:
+            self._note_failure(task.index, self.lost.get(task.key) or self.layout.read(task.key) or {})
+        self._tell()
+
+    def _note_failure(self, index: int, content: dict[str, Any]) -> None:
+        self.failed += 1
+        self.stopped = self.stopped or self.fail_fast
+        if self.first_failure is None:
+            point = " ".join(f"--set {text}" for text in self.plan.grid.overrides(self.plan.grid[index]))
+            kind = _ERRORS.get(content.get("status", ""), IdesignError)
+            message = f"{content.get('message', '')} (at {point})"
+            diagnostic = Diagnostic(content.get("code", ""), message, content.get("hint", ""))
+            self.first_failure = kind(replace(diagnostic, key=content.get("key", "")))
+
+    def _tell(self) -> None:
+        self.passed += 1
+        if self.watch:
+            self.watch(Progress(len(self.plan.grid), self.passed, self.computed, self.failed))
+
+
+def _draw(root: Path) -> list[Path]:
+    from inputdesign_cli.figures.sweep_figures import draw_sweep
+    from inputdesign_cli.figures.sweep_table import read_sweep
+
+    return draw_sweep(read_sweep(root), root)
+
+
+def _write_summary(plan: Plan, layout: Layout, statuses: dict[str, int]) -> None:
+    content = {
+        "format": 1,
+        "kind": "sweep",
+        "title": str(plan.draft.data.get("title", "")),
+        "verb": plan.verb,
+        "axes": [{"key": axis.key, "values": list(axis.texts)} for axis in plan.grid.axes],
+        "zip": plan.grid.zipped,
+        "points": len(plan.grid),
+        "statuses": statuses,
+        "environment": environment(),
+    }
+    replace_text(layout.root / SUMMARY, json_text(content))

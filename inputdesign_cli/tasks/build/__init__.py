@@ -1,0 +1,1 @@
+"""Spec sections to mathematical objects; after this nothing takes a spec."""

@@ -1,0 +1,169 @@
+"""A recorded experiment: u and y from a CSV file, its columns, units and times checked, outliers named."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.tables import read_columns
+
+_UNITS = ("s", "ms", "us", "min", "h", "d")
+# Times may jitter by this share of the sample time.
+_JITTER = 1e-3
+# Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
+_OUTLYING = 8.0
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Data:
+    """u (samples, r) and y (samples, p) of one experiment, and what a user should know of them.
+
+    Of one input and one output they are (samples,).
+    """
+
+    u: Array
+    y: Array
+    notes: tuple[str, ...] = field(default=())
+
+
+def read_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
+    """The columns u (or u1), y (or y1) and, if there is one, time, of one input and one output.
+
+    Raises:
+        DataError: the file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
+            the spec says.
+    """
+    data = read_channel_data(spec, path, remove_means=remove_means)
+    return replace(data, u=data.u[:, 0], y=data.y[:, 0])
+
+
+def read_channel_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
+    """The columns u1, u2, .., y1, y2, .. of all channels of the plant and, if there is one, time.
+
+    Raises:
+        DataError: see `read_data`.
+    """
+    header = _header(path)
+    channels = {"u": _names("u", spec.plant.inputs, header), "y": _names("y", spec.plant.outputs, header)}
+    wanted = {name: column for names in channels.values() for name, column in names.items()}
+    timed = [name for name in header if name == "time" or name.startswith("time_")]
+    if timed:
+        wanted["time"] = timed[0]
+        _check_unit(spec, path, timed[0])
+    columns = read_columns(path, wanted, key="")
+    if timed:
+        _check_times(spec, path, columns["time"])
+    notes = []
+    for name in (name for name in wanted if name != "time"):
+        x = columns[name]
+        notes += _outliers(name, x)
+        if remove_means:
+            columns[name] = x - x.mean()
+        elif abs(x.mean()) > x.std() > 0:
+            notes.append(
+                f"{name} varies by {x.std():.3g} about {x.mean():.3g}: models describe deviations from an "
+                "operating point; --remove-means takes the means away"
+            )
+    u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
+    return Data(u, y, tuple(notes))
+
+
+@contextmanager
+def told_of(path: Path) -> Iterator[None]:
+    """What an estimator says against the signals is said of the columns of the file that they came from.
+
+    Raises:
+        DataError: in place of the estimator's `SpecError`.
+    """
+    try:
+        yield
+    except SpecError as error:
+        header = _header(path)
+
+        def placed(diagnostic: Diagnostic) -> Diagnostic:
+            named = [name for name in header if name.startswith(diagnostic.key or "u")]
+            before = header[: header.index(named[0])] if named else []
+            column = 1 + sum(len(name) + 1 for name in before)
+            return replace(diagnostic, location=Location(str(path), 1, column, ",".join(header)))
+
+        raise DataError([placed(diagnostic) for diagnostic in error.diagnostics]) from error
+
+
+def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:
+    """How the channels are called, and how their columns begin: u1, u2, ..; u or u1 for one channel."""
+    if channels == 1:
+        numbered = f"{letter}1"
+        return {letter: numbered if any(name.startswith(numbered) for name in header) else letter}
+    return {f"{letter}{i + 1}": f"{letter}{i + 1}" for i in range(channels)}
+
+
+def _header(path: Path) -> list[str]:
+    """Names of the columns; empty where the file cannot be read, which `read_columns` complains about."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            return [name.strip().lower() for name in next(csv.reader(file), [])]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return []
+
+
+def _check_unit(spec: Spec, path: Path, name: str) -> None:
+    unit = name.removeprefix("time").removeprefix("_")
+    if unit in _UNITS and unit != spec.time_unit:
+        raise DataError(
+            Diagnostic(
+                "data-wrong-unit",
+                f"the times are in {unit}, but the spec counts in {spec.time_unit}",
+                f"set time_unit: {unit} (and sample_time in it), or convert the column",
+                "time_unit",
+                Location(str(path), 1, 1, name),
+            )
+        )
+
+
+def _check_times(spec: Spec, path: Path, time: Array) -> None:
+    steps = np.diff(time)
+    off = np.abs(steps - spec.sample_time) > _JITTER * spec.sample_time
+    if not np.any(off):
+        return
+    row = int(np.argmax(off))
+    typical = float(np.median(steps))
+    if abs(typical - spec.sample_time) > _JITTER * spec.sample_time:
+        message = f"the data are sampled every {typical:.6g} {spec.time_unit}"
+        hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
+    else:
+        message = (
+            f"the time advances by {steps[row]:.6g} {spec.time_unit} here ({int(off.sum())} such places)"
+        )
+        hint = "fill the gap, or use a part of the record without gaps"
+    raise DataError(
+        Diagnostic(
+            "data-not-uniform",
+            f"{message}, but sample_time is {spec.sample_time:g} {spec.time_unit}",
+            hint,
+            "sample_time",
+            Location(str(path), row + 3, 1, f"{time[row + 1]:.10g}"),
+        )
+    )
+
+
+def _outliers(name: str, x: Array) -> list[str]:
+    middle = np.median(x)
+    spread = 1.4826 * np.median(np.abs(x - middle))
+    if spread <= 0.0:
+        return []
+    found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
+    if not found.size:
+        return []
+    rows = ", ".join(str(row + 2) for row in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
+    return [
+        f"{name} has {found.size} outlying value{'s' * (found.size > 1)} (row {rows}): look at the record"
+    ]

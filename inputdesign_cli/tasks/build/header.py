@@ -1,0 +1,23 @@
+"""Spec -> units and header, which travel with everything that is computed."""
+
+from __future__ import annotations
+
+from inputdesign_cli.runs.units import Header, Units
+from inputdesign_cli.specification import Spec
+
+
+def build_units(spec: Spec) -> Units:
+    """Units and names of the experiment of a spec."""
+    return Units(
+        time_unit=spec.time_unit,
+        sample_time=spec.sample_time,
+        sampled=spec.plant.sampled,
+        closed_loop=spec.closed_loop,
+        inputs=spec.plant.inputs,
+        outputs=spec.plant.outputs,
+    )
+
+
+def build_header(spec: Spec) -> Header:
+    """The header of all results of a spec."""
+    return Header(spec.title, spec.to_yaml(), build_units(spec))

@@ -1,0 +1,114 @@
+"""Spec -> limits on powers and on the density of the excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from inputdesign_cli.accuracy.continuous_weight import weight_singularities
+from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
+from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, Experiment
+from inputdesign_cli.plant import graded_grid
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.limits import Curve, TableFile
+from inputdesign_cli.tasks.build.channel_requirements import any_weight
+from inputdesign_cli.tasks.build.channels import frequency_unit
+from inputdesign_cli.tasks.build.tables import read_columns
+
+_KEY = "limits.spectrum"
+
+
+def build_power_limits(spec: Spec) -> list[PowerLimit]:
+    """Upper and lower limits on the powers; lower limits of zero say nothing and are left out."""
+    limits: list[PowerLimit] = []
+    for kind in POWER_KINDS:
+        stated = getattr(spec.limits, f"{kind}_power")
+        if stated is None:
+            continue
+        for value, upper in ((stated.max, True), (stated.min, False)):
+            if value is None:
+                continue
+            values = value if isinstance(value, tuple) else (value,)
+            single = len(values) == 1
+            limits += [
+                PowerLimit(kind, float(v), upper, None if single else channel)
+                for channel, v in enumerate(values)
+                if upper or v > 0
+            ]
+    return limits
+
+
+def build_density_limits(spec: Spec, experiment: Experiment | ChannelExperiment) -> list[DensityLimit]:
+    """Bounds on the density of the excitation at every frequency of its band.
+
+    Raises:
+        SpecError, DataError: a curve cannot be used, or the lower bound crosses the upper one.
+    """
+    stated = spec.limits.spectrum
+    if stated is None:
+        return []
+    unit, limits = frequency_unit(spec), []
+    for curve, upper in ((stated.max, True), (stated.min, False)):
+        if curve is None or curve == 0.0:
+            continue
+        key = f"{_KEY}.{'max' if upper else 'min'}" if stated.min is not None else _KEY
+        level, knots, singular = _level(spec, curve, key)
+        grid = graded_grid(
+            np.concatenate([experiment.singularities, singular]), *experiment.band, knots=knots
+        )
+        if upper and level(grid).min() <= 0:
+            at = grid[int(np.argmin(level(grid)))] / unit
+            raise spec.complain(
+                "bad-limit",
+                f"the upper bound vanishes at {at:.6g} rad/{spec.time_unit}: no spectrum with a density "
+                "vanishes there and stays positive around",
+                hint="give a small positive bound instead",
+                key=key,
+            )
+        limits.append(DensityLimit(level, grid, upper))
+    if len(limits) == 2:
+        grid = np.union1d(limits[0].grid, limits[1].grid)
+        room = limits[0].level(grid) - limits[1].level(grid)
+        if room.min() <= 0:
+            at = grid[int(np.argmin(room))] / unit
+            raise spec.complain(
+                "bad-limit",
+                f"min reaches max at {at:.6g} rad/{spec.time_unit}: no spectrum fits in between",
+                hint="lower min or raise max there",
+                key=_KEY,
+            )
+    return limits
+
+
+def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array], Array, ComplexArray]:
+    """The level over frequency in rad/sample, its kinks, and the points near which it changes fast."""
+    nowhere, smooth = np.zeros(0), np.zeros(0, dtype=complex)
+    if isinstance(curve, float | int):
+        constant = float(curve)
+        return lambda w: np.full(np.shape(w), constant), nowhere, smooth
+    if isinstance(curve, TableFile):
+        frequency, value = _table(spec, curve.table, key)
+        return lambda w: np.interp(w, frequency, value), frequency, smooth
+    W = any_weight(spec, curve, key)
+    return lambda w: np.abs(W.at(w)) ** 2, nowhere, weight_singularities(W)
+
+
+def _table(spec: Spec, name: str, key: str) -> tuple[Array, Array]:
+    path = spec.resolve_path(name)
+    columns = read_columns(path, {"frequency": "frequency", "value": "phi"}, key=key)
+    frequency, value = columns["frequency"] * frequency_unit(spec), columns["value"]
+    if np.any(np.diff(frequency) <= 0) or frequency[0] < 0 or np.any(value < 0):
+        raise DataError(
+            Diagnostic(
+                "bad-table",
+                f"{path.name}: frequencies must be nonnegative and increase from row to row, and phi must "
+                "not be negative",
+                "sort the rows and correct the values",
+                key,
+                spec.locate(key),
+            )
+        )
+    return frequency, value

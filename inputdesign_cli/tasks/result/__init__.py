@@ -1,0 +1,1 @@
+"""Mathematical objects to numbers, curves and tables with units."""

@@ -1,0 +1,82 @@
+"""Predicted confidence ellipses of pairs of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.information import ChannelExperiment, Experiment
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Ellipse, EllipseCurves
+from inputdesign_cli.specification import Spec
+
+_PAIRS = 6
+
+
+def check_pairs(spec: Spec, known: Sequence[str]) -> None:
+    """Raise `SpecError` (`unknown-parameter`) where `report.ellipses` names what the model does not have."""
+    for n, pair in enumerate(spec.report.ellipses or ()):
+        for m, name in enumerate(pair):
+            if name not in known:
+                raise spec.complain(
+                    "unknown-parameter",
+                    f'the model has no parameter "{name}"',
+                    hint=f"its parameters are {', '.join(known)}",
+                    key=f"report.ellipses[{n}][{m}]",
+                )
+
+
+def experiment_ellipses(
+    spec: Spec, experiment: Experiment | ChannelExperiment, information: Array, white: Array | None
+) -> EllipseCurves | None:
+    """The pairs under `report.ellipses`, by default those most correlated, where there are several channels.
+
+    Args:
+        information, white: (k, k) in the coordinates of `experiment`, by the design and by flat excitation.
+
+    Returns:
+        None when there is no pair to show, or some parameter has no finite variance.
+    """
+    pairs = spec.report.ellipses
+    if experiment.size < 2 or (pairs is None and isinstance(experiment, Experiment)):
+        return None
+    try:
+        covariance = experiment.raw_covariance(information)
+        flat = None if white is None else experiment.raw_covariance(white)
+    except np.linalg.LinAlgError:  # a parameter that this excitation does not show
+        return None
+    return ellipse_curves(experiment.model.names, experiment.model.theta, covariance, flat, pairs)
+
+
+def ellipse_curves(
+    names: Sequence[str],
+    theta: Array,
+    covariance: Array,
+    white: Array | None = None,
+    pairs: Sequence[tuple[str, str]] | None = None,
+) -> EllipseCurves:
+    """Predicted confidence ellipses of the chosen `pairs`, by default of the most correlated ones.
+
+    Args:
+        covariance, white: (k, k) of the raw parameters, by the design and by flat excitation.
+    """
+    if pairs is None:
+        scale = np.sqrt(np.diag(covariance))
+        correlation = np.triu(np.abs(covariance / np.outer(scale, scale)), 1)
+        order = np.argsort(-correlation, axis=None)[: min(_PAIRS, len(names) * (len(names) - 1) // 2)]
+        index = [tuple(int(i) for i in np.unravel_index(at, correlation.shape)) for at in order]
+    else:
+        index = [(names.index(a), names.index(b)) for a, b in pairs]
+    found = []
+    for i, j in index:
+        chosen = np.ix_([i, j], [i, j])
+        found.append(
+            Ellipse(
+                (names[i], names[j]),
+                theta[[i, j]],
+                covariance[chosen],
+                None if white is None else white[chosen],
+            )
+        )
+    return EllipseCurves(tuple(found))

@@ -1,0 +1,167 @@
+"""Each figure shows its curves, leaves no global state, and copes with what designs produce."""
+
+import struct
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.runs.results import (
+    BoundCurves,
+    ChannelBoundCurves,
+    DirectionCurves,
+    Ellipse,
+    EllipseCurves,
+    ErrorCurves,
+    LossCurves,
+    MatrixSpectrumCurves,
+    MomentsCurves,
+    OptimalityCurves,
+    SignalCurves,
+    SpectrumCurves,
+)
+
+W = np.geomspace(1e-3, np.pi, 200)
+Z = np.exp(-1j * W)
+G = np.abs(3.6 * Z / (1 - 0.7 * Z))
+DENSITY = 0.03 + 2.5 * np.exp(-((W / 0.22) ** 2))
+PAIR = DENSITY[:, None, None] * np.array([[1.0, 0.9j], [-0.9j, 1.0]])
+
+CURVES = {
+    "bound": BoundCurves(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi])),
+    "bound without a target": BoundCurves(W, 0.008 * G, G),
+    "bound with a gap in r_adm": BoundCurves(W, 0.008 * G, G, np.where(W < 1, 0.01 * G, -1.0)),
+    "spectrum": SpectrumCurves(W, DENSITY, 1.7),
+    "spectrum with zeros": SpectrumCurves(W, 1e4 * np.maximum(np.cos(20 * W), 0.0) / W**2, 1.0),
+    "spectrum with its record": SpectrumCurves(W, DENSITY, 1.7, record=DENSITY * (1 + 0.2 * np.sin(90 * W))),
+    "bound with its record": BoundCurves(W, 0.008 * G, G, 0.01 * G, r_u_record=0.009 * G),
+    "limited signal": SignalCurves(np.arange(50.0), {"u1": 3 + np.sin(np.arange(50.0))}, {"u1": (1.5, 4.5)}),
+    "lines": SpectrumCurves(W, None, 1.7, np.array([0.1553]), np.array([0.1925])),
+    "lines and density": SpectrumCurves(W, DENSITY, None, np.array([0.02, 0.1]), np.array([0.1, 0.2]), "r"),
+    "matrix": MatrixSpectrumCurves(W, PAIR, 1.7),
+    "matrix of lines": MatrixSpectrumCurves(W[::20], PAIR[::20], lines=True),
+    "matrix with zeros": MatrixSpectrumCurves(W, PAIR * np.maximum(np.cos(20 * W), 0.0)[:, None, None]),
+    "directions": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([DENSITY, W], 1), 1.7),
+    "directions of lines": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
+    "loss": LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
+    "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
+    "matrix on a logarithmic axis": MatrixSpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
+    "matrix with a peak": MatrixSpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
+    "one line of channels": MatrixSpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
+    "bounds of entries": ChannelBoundCurves(
+        {"[1,2]": BoundCurves(W, 0.008 * G, G, 0.01 * G), "[2,1]": BoundCurves(W, 0.008 * G, G)}
+    ),
+    "ellipses": EllipseCurves(
+        tuple(
+            Ellipse(("b1", f"a{i}"), np.array([1.0, i]), np.array([[2.0, 1.0], [1.0, 1.0]]), np.eye(2))
+            for i in range(4)
+        )
+    ),
+    "signal": SignalCurves(np.arange(50.0), {"u1": np.sin(np.arange(50.0))}),
+    "long signal": SignalCurves(np.arange(3000.0), {f"u{i}": np.sin(np.arange(3000.0)) for i in range(1, 7)}),
+    "error": ErrorCurves(W, 0.2 + 0 * W, 1 / W, 0.5 + 2 / W, (1.0, 1.2), 1.2),
+    "error without a target": ErrorCurves(W, 0.2 + 0 * W, 1 / W, 0.5 + 2 / W, (1.0, 1.2)),
+    "moments": MomentsCurves(np.eye(3), 1),
+    "many moments": MomentsCurves(np.eye(12), 4, np.array([0.0, 2.8]), np.array([1.0, 0.3])),
+    "constant signal": SignalCurves(np.arange(5.0), {"r1": np.ones(5)}),
+}
+
+
+@pytest.fixture
+def page(monkeypatch):
+    """The figure that was drawn last, instead of its pixels."""
+    kept = []
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, path: kept.append(canvas.figure))
+    return lambda curves, unit="s": (draw(curves, "unused.png", unit), kept[-1])[1]
+
+
+def lines_by_label(axes):
+    handles, labels = axes.get_legend_handles_labels()
+    return dict(zip(labels, handles, strict=True))
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_a_png_of_the_promised_size(name, tmp_path):
+    draw(CURVES[name], tmp_path / "a.png", "s")
+    data = (tmp_path / "a.png").read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", data[16:24]) == (1050, 675)
+
+
+def test_no_global_state(tmp_path):
+    def state():
+        # Reading the backend would choose one.
+        settings = {key: mpl.rcParams[key] for key in mpl.rcParams if key != "backend"}
+        return settings, "matplotlib.pyplot" in sys.modules
+
+    before = state()
+    draw(CURVES["bound"], tmp_path / "a.png", "s")
+    assert state() == before
+
+
+def test_bound_shows_every_curve_and_marks_the_active_frequencies(page):
+    (axes,) = page(CURVES["bound"]).axes
+    lines = lines_by_label(axes)
+    np.testing.assert_array_equal(lines["$|G|$"].get_ydata(), G)
+    np.testing.assert_array_equal(lines["$r_u$, design"].get_ydata(), 0.008 * G)
+    np.testing.assert_array_equal(lines["$r_u$, white"].get_ydata(), 0.01 * G)
+    np.testing.assert_array_equal(lines[r"$r_\mathrm{adm}$"].get_ydata(), 0.01 * G)
+    z = np.exp(-0.5j)
+    expected = 0.008 * abs(3.6 * z / (1 - 0.7 * z))
+    assert lines["active"].get_xdata()[0] == 0.5
+    assert lines["active"].get_ydata()[0] == pytest.approx(expected, rel=1e-3)
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+
+
+def test_only_what_is_there_is_in_the_legend(page):
+    (axes,) = page(CURVES["bound without a target"]).axes
+    assert list(lines_by_label(axes)) == ["$|G|$", "$r_u$, design"]
+
+
+def test_the_unit_of_time_is_on_the_axis(page):
+    assert "rad/min" in page(CURVES["spectrum"], "min").axes[0].get_xlabel()
+    assert "(min)" in page(CURVES["signal"], "min").axes[0].get_xlabel()
+
+
+def test_the_spectrum_beside_the_white_level(page):
+    (axes,) = page(CURVES["spectrum"]).axes
+    lines = lines_by_label(axes)
+    np.testing.assert_array_equal(lines[r"$\Phi_{u}$, design"].get_ydata(), DENSITY)
+    assert set(lines[r"$\Phi_{u}$, white"].get_ydata()) == {1.7}
+    assert axes.get_yscale() == "linear"
+
+
+def test_a_spectrum_over_decades_is_logarithmic_and_not_endless(page):
+    (axes,) = page(CURVES["spectrum with zeros"]).axes
+    low, high = axes.get_ylim()
+    assert axes.get_yscale() == "log"
+    assert 1.0 < np.log10(high / low) < 7.0
+
+
+def test_lines_stand_as_stems_of_their_power(page):
+    (axes,) = page(CURVES["lines"]).axes
+    (stems,) = axes.collections
+    np.testing.assert_allclose(stems.get_segments(), [[[0.1553, 0.0], [0.1553, 0.1925]]])
+    assert "0.1925" in stems.get_label()
+
+
+def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
+    figure = page(CURVES["long signal"])
+    record, histogram = figure.axes[:2]
+    assert "first 1000 of 3000 samples, 4 of 6 channels" in record.get_title(loc="left")
+    assert record.lines[0].get_xdata().size == 1000
+    assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_no_curve_lies_under_a_legend(name, page):
+    figure = page(CURVES[name])
+    figure.canvas.draw()
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        if legend:
+            assert legend.get_window_extent().y0 >= axes.get_window_extent().y1
+            assert legend.get_window_extent().x1 <= figure.bbox.x1

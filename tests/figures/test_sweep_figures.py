@@ -1,0 +1,135 @@
+"""Which figures a sweep has, and what is on them."""
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from inputdesign_cli.figures.sweep_figures import draw_sweep, sweep_figures
+from inputdesign_cli.figures.sweep_table import SweepTable
+
+
+def table(axes, values, *, zipped=False, floor=None, kind="least_cost"):
+    keys = list(axes)
+    columns = {key: list(texts) for key, texts in axes.items()}
+    columns |= {"status": ["x"] * len(values), "objective.value": [str(v) for v in values]}
+    columns["objective.kind"] = [kind] * len(values)
+    if floor is not None:
+        columns["objective.any_spectrum_bound"] = [str(f) for f in floor]
+    summary = {"axes": [{"key": key, "values": axes[key]} for key in keys], "zip": zipped}
+    return SweepTable(summary, columns)
+
+
+N = "experiment.samples"
+M = "spectrum.order"
+
+
+@pytest.mark.parametrize(
+    ("given", "names"),
+    [
+        (table({N: "123"}, [3, 2, 1]), ["curves"]),
+        (table({N: "1122", M: "1212"}, [4, 3, 2, 1]), ["curves", "map"]),
+        (table({"spectrum": "aabb", M: "1212"}, [4, 3, 2, 1]), ["curves"]),
+        (table({"spectrum": "ab"}, [4, 3]), []),
+        (table({N: "12", M: "12"}, [4, 3], zipped=True), ["curves"]),
+        (table({N: "12", M: "12", "x": "12"}, [4, 3]), []),
+        (table({N: "12"}, ["", ""]), []),
+        (table({N: "12"}, [4, ""]), []),
+        (table({N: "11", M: "12"}, [4, 3]), ["curves"]),
+    ],
+)
+def test_the_figures_that_suit_a_sweep(given, names, tmp_path):
+    assert [path.stem for path in draw_sweep(given, tmp_path)] == names
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in tmp_path.iterdir())
+
+
+@pytest.fixture
+def pages(monkeypatch):
+    kept = []
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, path: kept.append(canvas.figure))
+
+    def draw(given, tmp_path):
+        for _, make in sweep_figures(given):
+            make(tmp_path / "unused.png")
+        return kept
+
+    return draw
+
+
+def test_cost_against_samples_is_sorted_logarithmic_and_has_its_floor(pages, tmp_path):
+    (page,) = pages(table({N: ["1000", "250", "500"]}, [1.0, 40.0, 2.0], floor=[0.5, 20.0, 1.0]), tmp_path)
+    axes = page.axes[0]
+    curve, floor = (line for line in axes.lines if len(line.get_xdata()) == 3)
+    assert list(curve.get_xdata()) == [250.0, 500.0, 1000.0]
+    assert list(curve.get_ydata()) == [40.0, 2.0, 1.0]
+    assert list(floor.get_ydata()) == [20.0, 1.0, 0.5]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+
+
+def test_points_without_a_result_are_marked(pages, tmp_path):
+    (page,) = pages(table({M: ["0", "5", "10"]}, [3.0, "", 2.0]), tmp_path)
+    marked = [list(line.get_xdata()) for line in page.axes[0].lines if line.get_marker() == "x"]
+    assert marked == [[5.0]]
+
+
+def test_the_map_has_a_cell_for_each_point(pages, tmp_path):
+    given = table({N: ["10", "10", "9", "9"], M: ["1", "2", "1", "2"]}, [1.0, 2.0, 3.0, ""])
+    page = pages(given, tmp_path)[-1]
+    texts = {(t.get_position(), t.get_text()) for t in page.axes[0].texts}
+    assert texts == {((0.5, 0.5), "3"), ((1.5, 0.5), "none"), ((0.5, 1.5), "1"), ((1.5, 1.5), "2")}
+
+
+def test_a_criterion_has_a_ceiling_and_its_own_white_value(pages, tmp_path):
+    given = table({M: ["0", "4", "8"]}, [3.0, 4.0, 4.5], floor=[4.7] * 3, kind="D")
+    given.columns["objective.upper_bound"] = ["3.0", "4.0", "4.5"]
+    given.columns["baseline.white.cost"] = ["1.0"] * 3
+    given.columns["baseline.white.value"] = ["3.0"] * 3
+    (page,) = pages(given, tmp_path)
+    axes = page.axes[0]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["design", "ceiling: any spectrum", "white excitation"]
+    drawn = [list(line.get_ydata()) for line in axes.lines]
+    assert [3.0] * 3 in drawn
+    assert [1.0] * 3 not in drawn
+    assert axes.get_yscale() == "linear"
+    assert 2.5 < axes.get_ylim()[0] < 3.0
+
+
+def test_shortest_experiments_are_compared_with_the_samples_that_white_needs(pages, tmp_path):
+    given = table({M: ["0", "5"]}, [852.7, 194.8], floor=[96.3] * 2, kind="shortest_experiment")
+    given.columns["baseline.white.cost"] = ["1.0"] * 2
+    given.columns["baseline.white.samples"] = ["853"] * 2
+    (page,) = pages(given, tmp_path)
+    assert [853.0, 853.0] in [list(line.get_ydata()) for line in page.axes[0].lines]
+
+
+def moments_table(alphas, entries, trace):
+    given = table({ALPHA: alphas}, trace)
+    given.columns.update({f"moments.entries.{name}": [str(v) for v in column] for name, column in entries})
+    given.columns["moments.trace"] = [str(v) for v in trace]
+    return given
+
+
+ALPHA = "accuracy.mean_squared_error.neglected_norm"
+
+
+def test_moments_are_drawn_over_the_parameter_with_infeasible_points_marked(pages, tmp_path):
+    entries = [("R_1_1", [1.0, 5.0, ""]), ("R_1_2", [1.0, 5.0, ""]), ("R_2_2", [1.0, 5.5, ""])]
+    given = moments_table(["0", "0.9", "1"], entries, [2.0, 21.0, ""])
+    assert [name for name, _ in sweep_figures(given)] == ["curves", "moments"]
+    axes = pages(given, tmp_path)[-1].axes[0]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["$R_{11}$", "$R_{12}$", "$R_{22}$", "trace $R$"]
+    assert axes.get_yscale() == "log"
+    assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == [[1.0]]
+
+
+def test_moments_that_vanish_keep_a_linear_axis(pages, tmp_path):
+    entries = [("R_1_1", [1.0, 9.0]), ("R_1_2", [0.0, -2.0]), ("R_2_2", [1.0, 9.0])]
+    axes = pages(moments_table(["0", "1"], entries, [2.0, 40.0]), tmp_path)[-1].axes[0]
+    assert axes.get_yscale() == "linear"
+
+
+def test_of_large_moments_the_diagonal_is_drawn(pages, tmp_path):
+    entries = [(f"R_{i}_{j}", [1.0, 2.0]) for i in range(1, 5) for j in range(i, 5)]
+    axes = pages(moments_table(["0", "1"], entries, [4.0, 8.0]), tmp_path)[-1].axes[0]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["$R_{1,1}$", "$R_{2,2}$", "$R_{3,3}$", "$R_{4,4}$", "trace $R$"]

@@ -1,0 +1,123 @@
+"""Records of matrix spectra: masses, multisines, causal factors and low-order filters."""
+
+import numpy as np
+import pytest
+from asymptotic.column import adjoint, column, random_hermitian
+
+from inputdesign_cli.signal.line_powers import (
+    lines_of,
+    masses_of_density,
+    masses_on_record,
+    matrix_multisine,
+    periodic_noise,
+    periodogram_masses,
+    roots_of,
+)
+from inputdesign_cli.signal.matrix_factor import matrix_factor
+from inputdesign_cli.signal.rational import rational_filter
+
+TAPS = np.array([[[2.0, 0.0], [0.5, 1.0]], [[0.6, 0.3], [-0.4, 0.2]]])
+
+
+def moving_average(w):
+    """psi psi^* of a minimum-phase matrix of order one."""
+    psi = np.einsum("kl,lij->kij", np.exp(-1j * np.outer(w, [0, 1])), TAPS)
+    return psi @ adjoint(psi)
+
+
+def covariance(u):
+    return u @ u.T / u.shape[1]
+
+
+@pytest.mark.parametrize("samples", [64, 65])
+def test_masses_add_up_to_the_covariance(samples):
+    masses = masses_of_density(moving_average(lines_of(samples)), samples)
+    expected = sum(tap @ tap.T for tap in TAPS)
+    np.testing.assert_allclose(masses.sum(axis=0).real, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("samples", "periods"), [(128, 2), (126, 2), (128, 1), (96, 3)])
+def test_a_multisine_has_its_masses(samples, periods):
+    rng = np.random.default_rng(0)
+    n = max(periods, 2)
+    length = samples // periods
+    masses = masses_of_density(random_hermitian(rng, length // 2 + 1, n), length)
+    u = matrix_multisine(masses, samples, rng, periods=periods)
+    assert u.shape == (n, samples)
+    blocks = [periodogram_masses(block) for block in np.split(u, periods, axis=1)]
+    if periods == n:
+        np.testing.assert_allclose(sum(blocks) / periods, masses, atol=1e-12)
+        np.testing.assert_allclose(covariance(u), masses.sum(axis=0).real, atol=1e-12)
+    for block in blocks:  # one period: every line has rank one
+        values = np.linalg.eigvalsh(block)
+        assert np.all(values[:, :-1] < 1e-12 * values[:, -1:].max())
+
+
+def test_masses_of_a_record_give_its_covariance():
+    u = np.random.default_rng(1).standard_normal((3, 51))
+    np.testing.assert_allclose(periodogram_masses(u).sum(axis=0).real, covariance(u), rtol=1e-12)
+
+
+def test_periodic_noise_has_the_spectrum_on_average():
+    rng = np.random.default_rng(2)
+    masses = masses_of_density(moving_average(lines_of(32)), 32)
+    u = periodic_noise(roots_of(masses), 32, 20_000, rng)
+    mean = np.mean([periodogram_masses(u[:, r]) for r in range(0, 20_000, 4)], axis=0)
+    np.testing.assert_allclose(mean, masses, atol=6 * np.abs(masses).max() / np.sqrt(5000))
+
+
+def test_lines_move_to_the_nearest_of_the_record_and_keep_their_power():
+    frequencies = np.array([0.0, 0.101, 0.103, np.pi])
+    masses = random_hermitian(np.random.default_rng(3), 4, 2)
+    moved = masses_on_record(frequencies, masses, 1000)
+    assert np.count_nonzero(np.abs(moved).sum(axis=(1, 2))) == 3
+    np.testing.assert_allclose(moved.sum(axis=0).real, masses.sum(axis=0).real, rtol=1e-12)
+
+
+def test_the_factor_of_a_moving_average_is_its_taps():
+    factor = matrix_factor(moving_average, points=256, floor=1e-12)
+    assert factor.residual < 1e-12
+    assert factor.floor == 0.0
+    # A factor is unique up to an orthogonal matrix on the right.
+    turn = np.linalg.solve(TAPS[0], factor.taps[0])
+    np.testing.assert_allclose(turn @ turn.T, np.eye(2), atol=1e-10)
+    np.testing.assert_allclose(factor.taps[1], TAPS[1] @ turn, atol=1e-10)
+    np.testing.assert_allclose(factor.taps[2:], 0, atol=1e-10)
+
+
+def test_a_spectrum_that_touches_zero_is_lifted_and_says_so():
+    problem = column()
+    design, *_ = problem.asymptotic()
+    factor = matrix_factor(lambda w: problem.spectrum_at(w, design.multipliers))
+    assert factor.floor == pytest.approx(1e-4, rel=1e-6)
+    assert factor.residual < 0.01
+    assert (factor.taps**2).sum() == pytest.approx(2.0, rel=1e-3)
+    u = factor.filtered(40_000, np.random.default_rng(0))
+    np.testing.assert_allclose(np.trace(covariance(u)), 2.0, rtol=0.1)
+
+
+def test_a_rational_filter_recovers_one_of_its_order():
+    a, n = 0.7, 2
+    B, C = np.array([[1.0, 0.2], [0.1, 0.8]]), np.array([[0.5, -0.3], [0.2, 0.9]])
+    taps = np.array([np.eye(n)] + [C @ B * a**k for k in range(200)])
+    filter_ = rational_filter(taps, 1)
+    w = np.linspace(0, np.pi, 20)
+    z = np.exp(1j * w)[:, None, None]
+    np.testing.assert_allclose(filter_.at(w), np.eye(n) + C @ B / (z - a), atol=1e-9)
+    np.testing.assert_allclose(filter_.power(), (taps**2).sum(axis=(0, 2)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_low_order_filters_of_the_column_are_stable_and_nearly_as_good(order):
+    problem = column()
+    criterion = problem.parametric()
+    design, rule, _ = problem.asymptotic()
+    factor = matrix_factor(lambda w: problem.spectrum_at(w, design.multipliers))
+    filter_ = rational_filter(factor.taps, order)
+    assert filter_.order == 2 * order
+    assert filter_.radius < 1
+    filter_ = filter_.scaled(np.sqrt(2 / filter_.power().sum()))
+    M = criterion.information(rule.nodes, filter_.spectrum(rule.nodes), rule.weights)
+    assert criterion.value(M) < {2: 6.3e-6, 4: 5.3e-6}[order]
+    u = filter_.filtered(100_000, np.random.default_rng(1))
+    np.testing.assert_allclose((u**2).mean(axis=1), filter_.power(), rtol=0.1)

@@ -1,0 +1,286 @@
+"""From the spec to the result: figures, files, other laws and limits, and what is refused."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import load_spec, simulate, solve, validate
+from inputdesign_cli.cli import main
+from inputdesign_cli.runs.run_directory import write_run
+
+CONTROL = "accuracy.closed_loop_error.control"
+SHORT = ("experiment.samples=1000", "signal.candidates=2")
+NON_MINIMUM = "plant.B=[[[0, 1, 2], [0, 0.2]], [[0, 0.5], [0, 1]]]"
+
+
+@pytest.fixture
+def spec(request):
+    path = request.config.rootpath / "specs" / "distillation_column.yaml"
+    return lambda *overrides: load_spec(path, overrides)
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path, request):
+    """`idesign COMMAND specs/distillation_column.yaml`: exit code, stdout, stderr."""
+    path = request.config.rootpath / "specs" / "distillation_column.yaml"
+
+    def call(command, *overrides):
+        sets = [part for text in overrides for part in ("--set", text)]
+        arguments = ["idesign", command, str(path), "-o", str(tmp_path / "run"), "--no-figures", *sets]
+        monkeypatch.setattr("sys.argv", arguments)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return call
+
+
+def test_the_design_of_the_column(spec, tmp_path):
+    outcome = solve(spec(*SHORT))
+    result = outcome.result
+    assert result["status"] == "optimal"
+    assert result["objective"]["kind"] == "closed_loop_error"
+    # (mean tr Z^{1/2})^2 / power, from the errata: mean S2, the noise, the eigenvalues of the matrix root.
+    by_hand = (1.637898 * 1e-5 * np.sqrt(2) * 72.376130) ** 2 / 2
+    assert result["objective"]["value"] == pytest.approx(by_hand, rel=1e-5)
+    assert 0 <= result["objective"]["relative_gap"] < 1e-10
+    assert sum(result["power"]["input"]) == pytest.approx(2.0, rel=1e-9)
+    structure = result["closed_loop_error"]["parametric"]
+    assert structure["design"]["value"] == pytest.approx(5.26270e-6, rel=1e-5)
+    assert structure["white"]["value"] == pytest.approx(1.02222e-5, rel=5e-6)
+    assert result["information"]["parameters"] == ["a1", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]"]
+    assert set(outcome.curves) == {"spectrum", "directions", "signal"}
+    write_run(outcome, tmp_path / "run", figures=True)
+    with (tmp_path / "run" / "spectrum.csv").open(encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    assert header == ["frequency_rad_per_min", "phi_11", "phi_12_re", "phi_12_im", "phi_22"]
+    values = np.array(rows, dtype=float)
+    assert values.shape == (512, 5)
+    assert values[-1, 0] == pytest.approx(np.pi / 2)
+    # The grid is even, so that the trapezoidal rule gives back the power.
+    weights = np.full(512, 1 / 511)
+    weights[[0, -1]] /= 2
+    assert (values[:, 1] + values[:, 4]) @ weights == pytest.approx(2.0, rel=2e-3)
+    saved = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    assert saved["spectrum"]["peak"]["frequency"] == pytest.approx(0.02667 / 2, abs=1e-5)
+    for picture in ("spectrum.png", "directions.png", "signal.png"):
+        assert (tmp_path / "run" / picture).stat().st_size > 10_000
+
+
+def test_the_signal_keeps_its_limits_and_serves_nearly_as_designed(spec):
+    limits = "limits={input_power: [1.2, 0.5], output_power: [0.001, 0.001]}"
+    outcome = solve(spec("experiment.samples=4000", "signal.candidates=3", limits))
+    u = np.array([outcome.tables["signal"].columns[f"u{i}"] for i in (1, 2)])
+    assert np.all(np.mean(u**2, axis=1) <= np.array([1.2, 0.5]) * (1 + 1e-9))
+    result = outcome.result
+    assert [row["attained"] for row in result["closed_loop_error"]["limits"]] == pytest.approx(
+        [result["power"]["input"][0], 0.5, result["power"]["output"][0], 0.001], rel=1e-6
+    )
+    designed = result["closed_loop_error"]["parametric"]["design"]["value"]
+    assert result["signal"]["parametric_value"] == pytest.approx(designed, rel=0.05)
+    assert result["objective"]["relative_gap"] < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("overrides", "kind"),
+    [
+        (["signal={type: filtered_noise}"], "taps"),
+        (["signal={type: filtered_noise, order: 2}"], "filter"),
+        (["signal={type: filtered_noise, order: 4}"], "filter"),
+    ],
+)
+def test_filtered_noise_reports_its_factor(spec, overrides, kind):
+    signal = solve(spec("experiment.samples=1000", *overrides, "signal.candidates=2")).result["signal"]
+    assert signal["type"] == "filtered_noise"
+    assert kind in signal
+    assert signal["spectral_factor_residual"] < 0.01
+    assert signal["floor"] == pytest.approx(1e-4, rel=1e-6)
+    if kind == "filter":
+        assert signal["pole_radius"] < 1
+        assert signal["filter_value"] < 6.3e-6
+
+
+def test_the_exact_covariance_gives_lines_and_a_better_input(spec):
+    outcome = solve(spec(*SHORT, "accuracy.closed_loop_error.covariance=parametric"))
+    result = outcome.result
+    assert result["objective"]["value"] == pytest.approx(5.204e-6, rel=1e-4)
+    assert result["objective"]["relative_gap"] < 1e-6
+    assert result["spectrum"]["type"] == "multisine"
+    assert sum(result["power"]["input"]) == pytest.approx(2.0, rel=1e-6)
+    assert result["closed_loop_error"]["parametric"]["design"]["value"] == pytest.approx(
+        result["objective"]["value"], rel=1e-9
+    )
+
+
+def test_a_band_counts_the_error_inside_it_only(spec):
+    inside = solve(spec(*SHORT, "limits.band=[0.005, 0.5]")).result
+    whole = solve(spec(*SHORT)).result
+    assert inside["objective"]["value"] < whole["objective"]["value"]
+    assert inside["closed_loop_error"]["band"] == pytest.approx([0.005, 0.5])
+    assert sum(inside["power"]["input"]) == pytest.approx(2.0, rel=1e-9)
+
+
+def test_internal_model_with_its_filter_is_model_reference_on_a_plant_without_zeros(spec):
+    reference = "{numerator: [0, 0.3], denominator: [1, -0.7]}"
+    by_reference = solve(spec(*SHORT, f"{CONTROL}={{model_reference: {reference}}}")).result
+    internal = f"{CONTROL}={{internal_model: {{numerator: [0.3], denominator: [1, -0.7]}}}}"
+    by_filter = solve(spec(*SHORT, internal)).result
+    assert by_filter["objective"]["value"] == pytest.approx(by_reference["objective"]["value"], rel=1e-10)
+    assert by_filter["closed_loop_error"]["law"] == "internal_model"
+
+
+def test_a_target_matrix_and_its_scalar_agree(spec):
+    t = "[0, 0.3]"
+    scalar = f"{CONTROL}={{model_reference: {{numerator: {t}, denominator: [1, -0.7]}}}}"
+    matrix = f"{CONTROL}={{model_reference: {{numerator: [[{t}, [0]], [[0], {t}]], denominator: [1, -0.7]}}}}"
+    continuous = (
+        f"{CONTROL}={{model_reference: {{continuous: {{numerator: [[[1], [0]], [[0], [1]]], "
+        "denominator: [75, 1]}}}"
+    )
+    values = [
+        solve(spec(*SHORT, *o)).result["objective"]["value"] for o in ([scalar], [matrix], [continuous], [])
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-10)
+    assert values[2] == pytest.approx(values[3], rel=1e-10)
+
+
+def test_minimum_variance_reports_what_no_input_changes(spec):
+    result = solve(spec(*SHORT, f"{CONTROL}={{minimum_variance: true}}")).result
+    part = result["closed_loop_error"]["noise_model_part"]
+    assert 0 < part < result["objective"]["value"]
+
+
+def test_a_continuous_time_plant_is_sampled(spec):
+    plant = (
+        "plant={continuous: {numerator: [[[0.878], [-0.864]], [[1.082], [-1.096]]], denominator: [75, 1]}, "
+        "sample: zoh}"
+    )
+    noise = "noise={D: [1, -0.9736857494], variance: 1.0e-10}"
+    result = solve(spec(*SHORT, plant, noise)).result
+    loop = result["spectrum"]["loop_input"]
+    np.testing.assert_allclose(
+        loop["matrix"], [[2586.76231842, 2582.4486396], [2582.4486396, 2578.65557718]], rtol=1e-9
+    )
+    np.testing.assert_allclose(loop["root_eigenvalues"], [0.50707707, 71.86905293], rtol=1e-7)
+
+
+def test_a_sensitivity_with_a_zero_on_the_circle_does_no_harm(spec):
+    """S = 1 - T vanishes at pi/2 rad/sample, where C is infinite: the criterion stays finite and settles."""
+    z0 = "{numerator: [0, 0.2, -0.5, 0.2, 0.5], denominator: [1]}"
+    numerator = np.array([0, 0.2, -0.5, 0.2, 0.5])
+    sensitivity = np.concatenate([[1.0], np.zeros(4)]) - numerator
+    value = abs(np.polynomial.polynomial.polyval(np.exp(-0.5j * np.pi), sensitivity))
+    assert value < 1e-12
+    result = solve(spec(*SHORT, f"{CONTROL}={{model_reference: {z0}}}")).result
+    assert np.isfinite(result["objective"]["value"])
+    assert result["solver"]["settled"] < 1e-10
+
+
+def test_validate_sets_the_problem_up(spec):
+    validate(spec())
+
+
+BAD = [
+    ("not-square", "2 outputs and 3 inputs", ["plant.B=[[[0,1],[0,0.2],[0,0.3]],[[0,0.5],[0,1],[0,1]]]"]),
+    ("not-square", "1 x 2", [f"{CONTROL}.model_reference={{numerator: [[[0, 1], [0, 0.2]]]}}"]),
+    ("non-minimum-phase", "radius 2.222", [NON_MINIMUM]),
+    ("non-minimum-phase", "would be unstable", [NON_MINIMUM, f"{CONTROL}={{minimum_variance: true}}"]),
+    ("delay-too-short", "needs 1 sample",
+     [f"{CONTROL}.model_reference={{numerator: [0.5], denominator: [1, -0.5]}}"]),
+    ("delay-too-short", "not be causal",
+     [f"{CONTROL}.model_reference={{continuous: {{numerator: [1, 1], denominator: [75, 1]}}}}"]),
+    ("delay-too-short", "needs 2 samples", ["plant.B=[[[0, 0, 1], [0]], [[0], [0, 0, 1]]]"]),
+    ("infinite-criterion", "unit circle at 0 rad/sample",
+     ["plant.B=[[[0, 1, -1], [0, 0]], [[0, 0], [0, 1]]]"]),
+    ("infinite-criterion", "unit circle at 3.142",
+     ["plant.B=[[[0, 1, 1], [0, 0]], [[0, 0], [0, 1]]]",
+      f"{CONTROL}={{internal_model: {{numerator: [0.5], denominator: [1, -0.5]}}}}"]),
+    ("singular-plant", "determinant", ["plant.B=[[[0, 1], [0, 1]], [[0, 2], [0, 2]]]"]),
+    ("unstable-polynomial", "radius 1",
+     ["accuracy.closed_loop_error.reference={filter: {numerator: [1], denominator: [1, -1]}}"]),
+    ("unstable-polynomial", "radius 1.1",
+     [f"{CONTROL}.model_reference={{numerator: [[[0, 1], [0]], [[0], [0, 1]]], denominator: [1, -1.1]}}"]),
+    ("wrong-shape", "shape of the numerator",
+     [f"{CONTROL}.model_reference={{numerator: [[[0, 1], [0]], [[0], [0, 1]]], denominator: [[[1]]]}}"]),
+    ("no-feedback", "asks nothing of the model",
+     ["noise.C=[1, -0.9736857494]", f"{CONTROL}={{minimum_variance: true}}"]),
+    ("not-identifiable", "indistinguishable",
+     ["noise={C: [1, -0.5], D: [1, -0.5], variance: 1}"]),
+    ("needs-limits", "nothing limits", ["limits=null"]),
+    ("not-supported", "limits.amplitude", ["limits.amplitude=3"]),
+    ("not-supported", "least powers", ["limits.input_power={max: 2, min: 1}"]),
+    ("not-supported", "type fir", ["spectrum={type: fir, order: 3}"]),
+    ("not-supported", "model_error", ["accuracy.model_error={relative: 0.1}"]),
+    ("not-supported", "several|one delay",
+     ["plant.B=[[[0, 1], [0, 0]], [[0, 0], [0, 0, 1]]]", f"{CONTROL}={{minimum_variance: true}}"]),
+    ("conflicting-keys", "equal periods", ["signal.periods=3"]),
+    ("unsuitable-key", "order", ["signal={type: multisine, order: 4}"]),
+    ("not-supported", "multisines",
+     ["signal={type: filtered_noise}", "accuracy.closed_loop_error.covariance=parametric"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "words", "overrides"), BAD, ids=[f"{b[0]}-{i}" for i, b in enumerate(BAD)])
+def test_bad_input_is_refused_with_its_place_and_a_hint(run, code, words, overrides):
+    exit_code, out, err = run("solve", *overrides)
+    assert exit_code == 2
+    assert out == ""
+    assert f"error[{code}]" in err
+    assert any(word in err for word in words.split("|"))
+    assert "help:" in err
+    assert "Traceback" not in err
+
+
+def test_simulate_adds_the_study(spec):
+    outcome = simulate(spec("experiment.samples=1500", "signal.candidates=2", "simulation.runs=40"))
+    study = outcome.result["simulation"]
+    assert study["runs"] == 40
+    assert set(study["inputs"]) == {"design", "white"}
+    white = study["inputs"]["white"]
+    assert white["theory"]["loss"]["mean"] == pytest.approx(0.002835, rel=1e-3)
+    assert abs(white["loss"]["mean"] - white["theory"]["loss"]["mean"]) < 4 * white["loss"]["standard_error"]
+    assert white["exact"]["squared"]["mean"] == pytest.approx(white["squared"]["mean"], rel=0.1)
+    assert study["improvement"]["theory"] == pytest.approx(0.277, abs=1e-3)
+    assert "loss" in outcome.curves
+
+
+def test_simulate_on_a_true_system_of_its_own(spec):
+    """The S1 design of the paper: H without its pole in the design, with it in the true system."""
+    outcome = simulate(
+        spec(
+            "experiment.samples=1500",
+            "signal.candidates=2",
+            "simulation.runs=20",
+            "noise.C=[1, -0.9736857494]",
+            "simulation.noise={variance: 1.0e-10}",
+        )
+    )
+    theory = outcome.result["simulation"]["inputs"]["design"]["theory"]["loss"]
+    assert (theory["mean"], theory["sd"]) == pytest.approx((0.002283, 0.001015), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("words", "overrides"),
+    [
+        ("compares the design with white", ["simulation.compare=[prbs]"]),
+        ("model-reference and internal-model", [f"{CONTROL}={{minimum_variance: true}}"]),
+        ("least squares", ["noise.C=[1, 0.5]"]),
+        ("relative_std", ["simulation.noise={relative_std: 0.1}"]),
+    ],
+)
+def test_what_is_not_simulated_is_said(run, words, overrides):
+    exit_code, _, err = run("simulate", *overrides)
+    assert exit_code == 2
+    assert "error[not-supported]" in err
+    assert words in err
+
+
+@pytest.mark.slow
+def test_the_monte_carlo_row_of_table_i(spec):
+    study = simulate(spec("signal.candidates=1")).result["simulation"]
+    for name, mean in (("white", 0.002835), ("design", 0.002050)):
+        loss = study["inputs"][name]["loss"]
+        assert abs(loss["mean"] - mean) < 4 * loss["standard_error"]

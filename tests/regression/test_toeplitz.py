@@ -1,0 +1,215 @@
+"""Toeplitz moments: closed forms, reference values, independent searches, and bounds that are bounds."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from cases import autocorrelations, general_search, mse, one_estimated_by_cvxpy
+
+from inputdesign_cli.design.regression import (
+    OutOfReachError,
+    Regression,
+    design_toeplitz,
+    energy_bound,
+    least_energy,
+)
+from inputdesign_cli.design.regression.alternating import alternate
+from inputdesign_cli.design.regression.branch import Search
+from inputdesign_cli.design.regression.lift import Box
+from inputdesign_cli.design.regression.limits import reach
+from inputdesign_cli.design.regression.structured import least_variance
+from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
+
+FOUR = ([0.94, 0.166], [2.245, 1.096], 0.5)
+
+
+def regression(L1, L2, alpha, variance=1.0):
+    return Regression(np.array(L1, dtype=float), np.array(L2, dtype=float), alpha, variance)
+
+
+def design(r, **goal):
+    return design_toeplitz(r, rng=np.random.default_rng(0), **goal)
+
+
+def gap(found, value):
+    return (value - found.bound) / value
+
+
+@pytest.mark.parametrize("alpha", [0.1, 1.0, 10.0])
+def test_example_3_is_the_same_for_every_alpha(alpha):
+    found = design(regression([1], [1], alpha), target=1.0)
+    np.testing.assert_allclose(found.R, np.ones((2, 2)), rtol=1e-8)
+    assert 0.0 <= gap(found, found.energy) <= 1.1e-6
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.5, 0.9, 0.99])
+def test_example_4_and_figure_2(alpha):
+    found = design(regression([1], [2], alpha), target=1.0)
+    assert found.energy == pytest.approx(2.0 / (1.0 - alpha**2), rel=1e-8)
+    np.testing.assert_allclose(found.R, np.full((2, 2), 1.0 / (1.0 - alpha**2)), rtol=1e-8)
+    assert 0.0 <= gap(found, found.energy) <= 1.1e-6
+
+
+@pytest.mark.parametrize("alpha", [1.0, 1.2, 3.0])
+def test_example_4_is_infeasible_from_alpha_one(alpha):
+    with pytest.raises(OutOfReachError) as error:
+        design(regression([1], [2], alpha), target=1.0)
+    assert error.value.bias == pytest.approx(1.0, rel=1e-8)
+    assert error.value.reach >= 1e6
+    assert not error.value.assumed
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.0, 0.3), (0.5, -2.0), (-1.0, 1.0)])
+def test_two_taps_in_closed_form(first, second):
+    alpha, variance, target = 0.4, 0.7, 1.5
+    found = design(regression([first], [second], alpha, variance), target=target)
+    slack = target - alpha**2 * max(abs(second) - abs(first), 0.0) ** 2
+    assert found.energy == pytest.approx(2.0 * variance * first**2 / slack, rel=1e-8)
+
+
+REFERENCE = [
+    (FOUR, {"target": 1.0}, 9.562917),
+    (FOUR, {"energy": 8.0}, 1.072300),
+    (([1], [1.2, 0.5], 0.5), {"target": 1.0}, 3.079436),
+    (([1], [1.2, 0.5], 0.5), {"energy": 6.0}, 0.525796),
+]
+
+
+@pytest.mark.parametrize(("case", "goal", "value"), REFERENCE)
+def test_reference_values(case, goal, value):
+    found = design(regression(*case), **goal)
+    reached = found.energy if "target" in goal else found.split.total
+    assert reached == pytest.approx(value, rel=1e-6)
+    assert 0.0 <= gap(found, reached) <= 1.1e-6
+    assert not found.assumed
+    assert mse(found.R + 1e-13 * np.eye(len(found.R)), *map(np.array, case[:2]), case[2]) == pytest.approx(
+        found.split.total, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_one_estimated_parameter_against_cvxpy(seed):
+    rng = np.random.default_rng(seed)
+    L1, L2 = rng.uniform(0.5, 2.0), rng.standard_normal(int(rng.integers(1, 5)))
+    alpha, energy = rng.uniform(0.2, 1.5), rng.uniform(1.0, 20.0)
+    found = design(regression([L1], L2, alpha), energy=energy)
+    assert found.split.total == pytest.approx(one_estimated_by_cvxpy(L1, L2, alpha, energy=energy), rel=1e-6)
+    assert 0.0 <= gap(found, found.split.total) <= 1.1e-6
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_estimated_parameters_are_proved(seed):
+    rng = np.random.default_rng(seed)
+    weights = rng.standard_normal(4 + seed % 2)
+    case = (weights[:2], weights[2:], rng.uniform(0.2, 1.0))
+    found = design(regression(*case), energy=rng.uniform(2.0, 20.0))
+    assert 0.0 <= gap(found, found.split.total) <= 1e-4
+    assert found.split.total <= general_search(*case, rng, energy=found.energy, starts=5) * (1 + 1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("n", [6, 7, 8])
+@pytest.mark.parametrize("seed", range(3))
+def test_three_and_four_estimated_parameters(n, seed):
+    rng = np.random.default_rng([n, seed])
+    m = 3 if n < 8 else 4
+    weights = rng.standard_normal(n)
+    case = (weights[:m], weights[m:], rng.uniform(0.2, 1.0))
+    found = design(regression(*case), energy=rng.uniform(2.0, 20.0))
+    assert found.bound <= found.split.total
+    assert found.split.total <= general_search(*case, rng, energy=found.energy) * (1 + 1e-8)
+
+
+@pytest.mark.parametrize(("m", "n"), [(1, 3), (2, 4), (2, 5), (3, 5)])
+def test_no_shape_in_a_box_beats_its_bound(m, n):
+    """The certificate itself: random shapes in random boxes, wide and narrow, never fall below the bound."""
+    rng = np.random.default_rng([m, n])
+    weights = rng.standard_normal(n)
+    problem = ToeplitzProblem.of(regression(weights[:m], weights[m:], 0.7))
+    lift = Search.start(problem).lift
+    for width in (2.0, 0.5, 0.1, 0.01):
+        for kappa in (0.03, 1.0, 10.0):
+            centre = autocorrelations(rng.uniform(-0.8, 0.8, n - 1))
+            head = centre[1:m]
+            box = Box(np.maximum(head - width / 2, -1), np.minimum(head + width / 2, 1))
+            largest_v = 50.0
+            found = lift.bound(box, kappa, reach(problem, box, largest_v).scaling)
+            shapes = [problem.shape(centre)]
+            for _ in range(200):
+                rho = autocorrelations(rng.uniform(-1, 1, n - 1))
+                rho = centre + rng.random() * (rho - centre)
+                inside = np.all(rho[1:m] >= box.lower) and np.all(rho[1:m] <= box.upper)
+                if inside:
+                    shapes.append(problem.shape(rho))
+            values = [s.bias_squared + kappa * s.v for s in shapes if s is not None and s.v <= largest_v]
+            assert found.bound <= min(values) * (1 + 1e-9)
+
+
+def test_weights_stay_within_their_limit():
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        m = int(rng.integers(1, 5))
+        problem = ToeplitzProblem.of(regression(rng.standard_normal(m), rng.standard_normal(2), 1.0))
+        rho = autocorrelations(rng.uniform(-0.95, 0.95, m + 1))
+        shape = problem.shape(rho)
+        shift, width = rng.uniform(-0.5, 0.5, m - 1), 10.0 ** rng.uniform(-4, 0)
+        box = Box(rho[1:m] + (shift - 0.5) * width, rho[1:m] + (shift + 0.5) * width)
+        allowed = reach(problem, box, 1.01 * shape.v)
+        u = problem.weights(scipy.linalg.toeplitz(rho))
+        w = np.linalg.lstsq(allowed.scaling.D, u - allowed.scaling.centre, rcond=None)[0]
+        assert w @ w <= allowed.scaling.limit * (1 + 1e-6)
+        assert allowed.least_v <= shape.v * (1 + 1e-9)
+
+
+def test_the_least_variance_is_a_bound():
+    rng = np.random.default_rng(5)
+    problem = ToeplitzProblem.of(regression(rng.standard_normal(3), rng.standard_normal(2), 1.0))
+    least = least_variance(problem)
+    values = [problem.shape(autocorrelations(rng.uniform(-1, 1, 4))).v for _ in range(500)]
+    assert 0.5 * min(values) < least <= min(values)
+
+
+def test_a_structure_costs_energy():
+    r = regression(*FOUR)
+    free = least_energy(r, 1.0)
+    assert energy_bound(r, 1.0, free) < design(r, target=1.0).bound
+
+
+def test_all_units_scale_out():
+    """Weights times 3, noise times 5: the error grows by 9 and 25 at equal energy over noise."""
+    L1, L2, alpha = FOUR
+    plain = design(regression(L1, L2, alpha), energy=8.0)
+    scaled = design(regression(3 * np.array(L1), 3 * np.array(L2), alpha, 25.0), energy=8.0 * 25.0)
+    assert scaled.split.total == pytest.approx(9.0 * plain.split.total, rel=1e-8)
+
+
+def test_the_alternation_leaves_the_shape_of_its_start():
+    """For m = 2 it keeps rho_1 of white noise, and the gap that is reported says so."""
+    found = design(regression(*FOUR), energy=8.0, search=alternate)
+    assert found.rho[1] == pytest.approx(0.0, abs=1e-9)
+    best = 1.072300
+    assert found.split.total > best * 1.01
+    assert gap(found, found.split.total) == pytest.approx(1.0 - best / found.split.total, abs=1e-5)
+
+
+def test_the_alternation_is_enough_for_one_parameter():
+    found = design(regression([1], [1.2, 0.5], 0.5), energy=6.0, search=alternate)
+    assert found.split.total == pytest.approx(0.525796, rel=1e-6)
+
+
+def test_infeasible_targets_of_two_parameters():
+    with pytest.raises(OutOfReachError) as error:
+        design(regression([1, -0.3], [1, 4], 1.0), target=1.0)
+    assert error.value.reach >= 1e6
+    # What would be feasible is: a target above the least bias.
+    least = error.value.bias**2 * 1.09
+    assert np.isfinite(design(regression([1, -0.3], [1, 4], 1.0), target=1.5 * least).energy)
+
+
+def test_without_bias_only_the_variance_counts():
+    """alpha = 0: any rho_1 is optimal for two taps; the least biased is taken, the limit alpha -> 0."""
+    found = design(regression([1], [2], 0.0), target=0.5)
+    assert found.energy == pytest.approx(4.0, rel=1e-9)
+    assert found.split.bias_squared == 0.0
+    np.testing.assert_allclose(found.R, np.full((2, 2), 2.0), rtol=1e-8)
+    assert 0.0 <= gap(found, found.energy) <= 1.1e-6

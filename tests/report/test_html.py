@@ -1,0 +1,278 @@
+"""The page about a run or a sweep: strict HTML that needs nothing, says what it must, and escapes text."""
+
+import base64
+import json
+import re
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import html5lib
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.report.render import report_text
+from inputdesign_cli.runs.run_directory import write_run
+from inputdesign_cli.sweep.running import sweep
+
+SPEC = """\
+title: "Heat <script>alert(1)</script> & flow"
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 1}
+experiment: {samples: 100%s}
+accuracy: {model_error: {relative: 0.1, confidence: 0.9}}
+spectrum: {type: fir, order: 2}
+signal: {type: multisine, candidates: 1, seed: 5}
+"""
+LOOP = ", controller: {numerator: [0.1], denominator: [1]}"
+XHTML = "{http://www.w3.org/1999/xhtml}"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """An open and a closed loop, solved and written without figures."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, loop in (("open", ""), ("closed", LOOP)):
+        (folder / f"{name}.yaml").write_text(SPEC % loop)
+        write_run(solve(load_spec(folder / f"{name}.yaml")), folder / name, figures=False)
+    return folder
+
+
+def parse(text):
+    """The page, which must be valid HTML; whatever points out of it is an error."""
+    page = html5lib.HTMLParser(strict=True).parse(text)
+    assert page.findall(f".//{XHTML}script") == []
+    for element in page.iter():
+        for name, value in element.attrib.items():
+            assert not name.startswith("on"), "a script"
+            if name in ("src", "href"):
+                assert value.startswith("data:image/"), value[:80]
+    assert "url(" not in text
+    assert "@import" not in text
+    return page
+
+
+def words(page):
+    return re.sub(r"\s+", " ", "".join(page.itertext()))
+
+
+@pytest.mark.parametrize("name", ["open", "closed"])
+def test_the_page_of_a_run(runs, name):
+    page = parse(report_text(runs / name))
+    result = json.loads((runs / name / "result.json").read_text())
+    headings = [element.text for element in page.iter(f"{XHTML}h2")]
+    assert headings == [
+        "The question", "The answer", "Accuracy", "Spectrum", "Signal", "The certificate",
+        "What was assumed", "How to reproduce it", "Methods", "All numbers",
+    ]  # fmt: skip
+    said = words(page)
+    for part in (
+        "output-error system with one input and one output",
+        "90 % confidence",
+        "10 % of |G|",
+        f"in {name} loop",
+        f"{result['cost']:.6g}",
+        f"{result['baseline']['white']['ratio']:.3g} times as much",
+        f"No spectrum of this family gets below {result['objective']['lower_bound']:.8g}",
+        f"No spectrum whatever gets below {result['objective']['any_spectrum_bound']:.8g}",
+        result["spec_sha256"],
+        "idesign solve spec.yaml",
+        "Bombois and G. Scorletti",
+        result["environment"]["numpy"],
+        "alert(1)",
+    ):
+        assert part in said, part
+    assert (runs / name / "spec.yaml").read_text() in "".join(page.itertext())
+
+
+def test_charts_are_pictures_with_words(runs):
+    page = parse(report_text(runs / "closed"))
+    images = list(page.iter(f"{XHTML}img"))
+    assert len(images) == 4
+    for image in images:
+        assert len(image.get("alt")) > 20
+        kind, _, data = image.get("src").partition(";base64,")
+        assert kind == "data:image/svg+xml"
+        assert ElementTree.fromstring(base64.b64decode(data)).tag.endswith("svg")
+
+
+def test_the_same_run_gives_the_same_page(runs):
+    assert report_text(runs / "open") == report_text(runs / "open")
+
+
+def test_figures_without_a_known_table_are_taken_as_they_are(runs, tmp_path):
+    run = tmp_path / "run"
+    write_run(solve(load_spec(runs / "open.yaml")), run, figures=False)
+    result = json.loads((run / "result.json").read_text())
+    (run / "loss.png").write_bytes(b"\x89PNG not really")
+    result |= {
+        "files": [*result["files"], "loss.png"],
+        "simulation": {"runs": 10, "inputs": {"white": {"a": 0.5}}},
+    }
+    (run / "result.json").write_text(json.dumps(result))
+    page = parse(report_text(run))
+    assert "data:image/png;base64," in [i.get("src")[:22] for i in page.iter(f"{XHTML}img")]
+    assert "Further figures" in words(page)
+    assert "inputs.white.a" in words(page)
+    assert "idesign simulate spec.yaml" in words(page)
+
+
+def test_the_page_of_a_sweep(runs, tmp_path):
+    out = tmp_path / "out"
+    sweep(runs / "open.yaml", ["experiment.samples=50,100,-1", "spectrum.order=1,2"], directory=out)
+    page = parse(report_text(out))
+    said = words(page)
+    for part in ("6 points: 2 invalid, 4 optimal", "best at experiment.samples = 100",
+                 "out-of-range", "at least 1", "idesign sweep sweep.yaml", "Bombois"):  # fmt: skip
+        assert part in said, part
+    assert len(list(page.iter(f"{XHTML}img"))) == 2
+    assert (out / "sweep.yaml").read_text() in "".join(page.itertext())
+
+
+def test_a_sweep_without_any_result_has_a_page(runs, tmp_path):
+    out = tmp_path / "out"
+    sweep(runs / "open.yaml", ["accuracy.model_error={table: a.csv},{table: b.csv}"], directory=out)
+    said = words(parse(report_text(out)))
+    assert "2 points: 2 invalid" in said
+
+
+def test_a_directory_without_a_run(tmp_path):
+    with pytest.raises(DataError) as caught:
+        report_text(tmp_path)
+    assert caught.value.diagnostics[0].code == "run-missing"
+
+
+SPECS = Path(__file__).parents[2] / "specs"
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "verb", "said"),
+    [
+        (
+            "regression",
+            ["experiment.samples=100"],
+            solve,
+            [
+                "bias and variance together, must not exceed 1",
+                "Asked: the least energy",
+                "No moments whatever",
+            ],
+        ),
+        (
+            "first_order",
+            ["objective=shortest_experiment", "limits={input_power: 1}", "spectrum={type: white}"],
+            solve,
+            ["The length of the experiment is sought", "has 853 samples", "same limits needs 853"],
+        ),
+        (
+            "first_order",
+            ["objective=best_accuracy", "limits={input_power: 1}", "spectrum={type: white}"],
+            solve,
+            ["Asked: the smallest multiple of what is admitted", "can be kept to 1.30595 times"],
+        ),
+        (
+            "criterion",
+            ["spectrum.order=2"],
+            solve,
+            ["Asked: the experiment that teaches most", "log det M ="],
+        ),
+        (
+            "first_order_given",
+            [],
+            analyse,
+            ["what accuracy the given excitation buys", "The figures hold for"],
+        ),
+    ],
+)
+def test_each_kind_of_question_has_its_own_words(name, overrides, verb, said, tmp_path):
+    write_run(verb(load_spec(SPECS / f"{name}.yaml", overrides)), tmp_path / "run", figures=False)
+    page = words(parse(report_text(tmp_path / "run")))
+    for part in said:
+        assert part in page, part
+
+
+@pytest.fixture
+def data(tmp_path):
+    """A record of the plant of SPEC."""
+    rng = np.random.default_rng(1)
+    u, e = rng.standard_normal((2, 400))
+    y = scipy.signal.lfilter([0, 1], [1, -0.5], u) + e
+    path = tmp_path / "data.csv"
+    path.write_text("u,y\n" + "".join(f"{a},{b}\n" for a, b in zip(u, y, strict=True)))
+    return path
+
+
+def rows(page):
+    """The cells of all tables, row by row."""
+    return [
+        [re.sub(r"\s+", " ", "".join(cell.itertext())).strip() for cell in row]
+        for row in page.iter(f"{XHTML}tr")
+    ]
+
+
+@pytest.mark.parametrize(("relative", "met"), [(0.5, True), (0.1, False)])
+def test_the_page_of_an_assessment(relative, met, data, tmp_path):
+    spec = parse_spec(SPEC % "", overrides=[f"accuracy.model_error.relative={relative}"])
+    found = assess(spec, data)
+    assert found.met == met
+    write_run(found.outcome, tmp_path / "run", figures=False)
+    page, result = parse(report_text(tmp_path / "run")), found.outcome.result
+    verdict = result["assessment"]["requirements"][0]
+    assert f"model error reaches {verdict['worst_ratio']:.4g}" in words(page)
+    assert ("These data meet" if met else "The experiment below makes up for it") in words(page)
+    assert "idesign assess spec.yaml DATA" in words(page)
+    cells = rows(page)
+    assert ["model error", f"{verdict['worst_ratio']:.4g}", "met" if met else "missed"] == [
+        cell for i, cell in enumerate(next(r for r in cells if r[0] == "model error")) if i != 2
+    ]
+    identified = result["identification"]
+    for name, value in identified["theta"].items():
+        assert [name, f"{value:.6g}", f"{identified['standard_deviation'][name]:.2g}"] in cells
+
+
+def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):
+    write_run(identify(parse_spec(SPEC % ""), data), tmp_path / "run")
+    page = parse(report_text(tmp_path / "run"))
+    assert "The model was estimated from 400 samples" in words(page)
+    assert "predicted one step ahead" in words(page)
+    assert "Further figures" not in words(page)
+
+
+def test_the_page_of_a_study(tmp_path):
+    overrides = ["simulation={runs: 20, compare: [white], plant: {B: [0, 1.1], F: [1, -0.4]}}"]
+    outcome = simulate(parse_spec(SPEC % LOOP, overrides=overrides))
+    write_run(outcome, tmp_path / "run")
+    page, inputs = parse(report_text(tmp_path / "run")), outcome.result["simulation"]["inputs"]
+    cells = rows(page)
+    for name, entry in inputs.items():
+        row = next(r for r in cells if r[0] == name.replace("_", " ") and len(r) > 4)
+        assert row[1].startswith(f"{100 * entry['within_r_adm']:.1f} %")
+        assert row[2].startswith(f"{100 * entry['on_design_model']['within_r_adm']:.1f} %")
+        assert row[4] == f"{entry['cost']:.5g}"
+    assert "20 runs of each input" in words(page)
+    assert "What the excitation alone does to the loop: white." in words(page)
+    assert "Further figures" not in words(page)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "row"),
+    [
+        (
+            {"white": {"loss": {"mean": 2.0, "sd": 0.5}, "theory": {"loss": {"mean": 1.9, "sd": 0.4}}}},
+            ["white", "2 ± 0.5", "1.9 ± 0.4"],
+        ),
+        (
+            {"design": {"mse": 1.25, "mse_standard_error": 0.1, "theory": {"mse": 1.2}}},
+            ["design", "1.25 ± 0.1", "1.2"],
+        ),
+    ],
+)
+def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
+    result = json.loads((runs / "open" / "result.json").read_text())
+    shutil.copytree(runs / "open", tmp_path / "run")
+    result["simulation"] = {"runs": 10, "inputs": inputs}
+    (tmp_path / "run" / "result.json").write_text(json.dumps(result))
+    assert row in rows(parse(report_text(tmp_path / "run")))

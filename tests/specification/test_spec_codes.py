@@ -1,0 +1,86 @@
+"""Every code that a diagnostic carries anywhere in the package is explained."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import inputdesign_cli
+from inputdesign_cli.error_codes import CODES, explanation
+from inputdesign_cli.errors import SpecError
+
+PACKAGE = Path(inputdesign_cli.__file__).parent
+MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "fail", "Finding", "stop", "_error"}
+CODE = re.compile(r"[a-z]+(-[a-z]+)*")
+
+
+def codes_in(source: str) -> set[str]:
+    """The string literals that stand for a code: in calls that make diagnostics, and the codes that
+    `why_not_number` and `findings.add` are given."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call):
+            continue
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        is_add = called == "add" and "findings" in ast.unparse(node.func)
+        if called not in MAKERS and not is_add:
+            continue
+        arguments = [*node.args, *(k.value for k in node.keywords if k.arg == "code")]
+        candidates = arguments[:1] if called != "_complain" else arguments[:2]
+        for argument in candidates:
+            parts = [argument.body, argument.orelse] if isinstance(argument, ast.IfExp) else [argument]
+            found |= {p.value for p in parts if isinstance(p, ast.Constant) and isinstance(p.value, str)}
+    return {code for code in found if CODE.fullmatch(code)}
+
+
+def test_the_scan_finds_codes():
+    assert codes_in(
+        "raise bad_spec('a-b', 'm')\nx.complain('c', 'm')\nComplaint(code='d-e', message='')"
+    ) == {
+        "a-b",
+        "c",
+        "d-e",
+    }
+    everything = set().union(*(codes_in(p.read_text()) for p in (PACKAGE / "spec").glob("*.py")))
+    assert {
+        "unknown-key",
+        "unstable-polynomial",
+        "duplicate-key",
+        "file-missing",
+        "needs-limits",
+    } <= everything
+
+
+def test_every_code_is_explained():
+    missing = {
+        (code, path.relative_to(PACKAGE).as_posix())
+        for path in PACKAGE.rglob("*.py")
+        for code in codes_in(path.read_text(encoding="utf-8"))
+        if code not in CODES
+    }
+    assert not missing
+
+
+def test_no_code_is_explained_in_vain():
+    source = "\n".join(p.read_text() for p in PACKAGE.rglob("*.py") if p.name != "codes.py")
+    source += 'unknown-code"'
+    assert [code for code in CODES if f'{code}"' not in source] == []
+
+
+def test_explanations_are_complete():
+    for code, entry in CODES.items():
+        assert CODE.fullmatch(code), code
+        assert entry.title
+        assert not entry.title.endswith("."), code
+        assert entry.text.endswith("."), code
+        assert entry.remedy.endswith("."), code
+
+
+def test_explaining():
+    assert explanation("not-monic").startswith("not-monic: ")
+    with pytest.raises(SpecError) as caught:
+        explanation("not-monik")
+    assert caught.value.diagnostics[0].hint == 'did you mean "not-monic"?'

@@ -1,0 +1,98 @@
+"""`--set`: what it changes, and its own diagnostics."""
+
+from __future__ import annotations
+
+import pytest
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification import parse_spec
+
+GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
+
+
+def test_values_replace_create_and_remove():
+    spec = parse_spec(
+        GOOD,
+        overrides=[
+            "plant.B.1=3",
+            "plant.F[1]=-0.25",
+            "experiment.samples=1e3",
+            "signal={type: multisine, seed: 2}",
+            "signal.seed=7",
+            "accuracy.model_error.relative=null",
+            "accuracy.model_error.absolute=0.5",
+            "title= a = b",
+        ],
+    )
+    assert spec.plant.B == (0.0, 3.0)
+    assert spec.plant.F == (1.0, -0.25)
+    assert spec.experiment.samples == 1000
+    assert spec.signal.seed == 7
+    assert spec.accuracy.model_error.relative is None
+    assert spec.accuracy.model_error.absolute == 0.5
+    assert spec.title == "a = b"
+    assert parse_spec(spec.to_yaml()).sha256 == spec.sha256
+
+
+def test_an_override_mends_a_file():
+    broken = GOOD.replace("[1, -0.5]", "[1, -1.5]")
+    assert parse_spec(broken, overrides=["plant.F=[1, -0.5]"]).sha256 == parse_spec(GOOD).sha256
+    assert parse_spec(GOOD + "spectrum:\n", overrides=["spectrum.type=white"]).spectrum.type == "white"
+
+
+def test_the_last_override_of_a_key_holds():
+    assert parse_spec(GOOD, overrides=["noise.variance=2", "noise.variance=3"]).noise.variance == 3.0
+
+
+def test_places_point_at_the_override():
+    spec = parse_spec(GOOD, "x.yaml", overrides=["plant.F=[1, -0.25]"])
+    at = spec.locate("plant.F[1]")
+    assert (at.file, at.line, at.column, at.text) == ("--set plant.F=[1, -0.25]", 1, 13, "plant.F=[1, -0.25]")
+    assert spec.locate("plant.B").file == "x.yaml"
+
+
+@pytest.mark.parametrize(
+    ("override", "code", "column", "words"),
+    [
+        ("plant.F=[1, -1.7]", "unstable-polynomial", 9, "radius 1.7"),
+        ("plant.F=[1, x]", "not-a-number", 13, 'the text "x"'),
+        ("plant.Q=1", "unknown-key", 1, "A, B, F"),
+        ("spectrum.ordr=3", "unknown-key", 1, "x"),
+        ("expriment.samples=3", "unknown-key", 1, 'did you mean "experiment"'),
+        ("sample_time=0", "out-of-range", 13, "greater than 0"),
+        ("plant.B.2=1", "bad-override", 1, "entries 0 to 1"),
+        ("plant.B.x=1", "bad-override", 1, "no entry x"),
+        ("plant.B.-1=1", "bad-override", 1, "no entry -1"),
+        ("noise.variance.x=1", "bad-override", 1, "single value"),
+        ("noise", "bad-override", 1, "key.path=value"),
+        ("=3", "bad-override", 1, "key.path=value"),
+        ("a..b=3", "bad-override", 1, "key.path=value"),
+        ("", "bad-override", 1, "key.path=value"),
+        ("noise.variance=", "bad-override", 16, "null"),
+        ("noise.variance=[1", "yaml-syntax", 18, "closed"),
+        ("noise={variance: 1, variance: 2}", "duplicate-key", 21, "twice"),
+        ("noise.variance=!!x 1", "yaml-tag", 16, "tag"),
+        ("x" + ".x" * 100 + "=1", "bad-override", 1, "too many steps"),
+        ("title=\x07", "file-encoding", 7, "U+0007"),
+    ],
+)
+def test_complaints_name_the_override(override, code, column, words):
+    base = GOOD + "spectrum: {type: fir}\n" if override.startswith("spectrum") else GOOD
+    with pytest.raises(SpecError) as caught:
+        parse_spec(base, "x.yaml", overrides=[override])
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == code
+    assert diagnostic.location.file == f"--set {override}"
+    assert (diagnostic.location.line, diagnostic.location.column) == (1, column)
+    if words != "x":
+        assert words in diagnostic.message + " | " + diagnostic.hint
+
+
+def test_complaints_of_file_and_overrides_come_together():
+    with pytest.raises(SpecError) as caught:
+        parse_spec(GOOD + "sampletime: 1\n", "x.yaml", overrides=["nonsense", "noise.variance=-1"])
+    assert [(c.location.file, c.code) for c in caught.value.diagnostics] == [
+        ("x.yaml", "unknown-key"),
+        ("--set noise.variance=-1", "out-of-range"),
+        ("--set nonsense", "bad-override"),
+    ]

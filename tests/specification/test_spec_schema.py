@@ -1,0 +1,90 @@
+"""The JSON schema accepts the examples and refuses what no spec may hold."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import inputdesign_cli
+from inputdesign_cli.specification import json_schema
+from inputdesign_cli.specification.yaml.reader import read
+
+HERE = Path(__file__).parent
+SPECS = sorted([*(HERE / "data").glob("*.yaml"), *(HERE.parents[1] / "specs").glob("*.yaml")])
+
+GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
+
+
+def accepts(value, schema):
+    return jsonschema.Draft202012Validator(schema).is_valid(value)
+
+
+@pytest.fixture(scope="module")
+def schema():
+    return json_schema()
+
+
+def test_it_is_json_and_closed(schema):
+    assert json.loads(json.dumps(schema)) == schema
+    assert schema["$schema"].endswith("2020-12/schema")
+    assert schema["anyOf"] == [{"required": ["plant", "noise"]}, {"required": ["include"]}]
+    assert schema["additionalProperties"] is False
+    for definition in schema["$defs"].values():
+        assert definition["additionalProperties"] is False
+        for key, entry in definition["properties"].items():
+            assert "description" in entry, key
+    assert '"null"' not in json.dumps(schema)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        "limits: {input_power: 1}",
+        "limits: {input_power: [1, 2]}",
+        "limits: {input_power: {max: 1}}",
+        "limits: {spectrum: {max: {table: a.csv}}}",
+        "spectrum: {given: {signal: u.csv}}",
+        "accuracy: {information: [[1]]}",
+        "title: 3",
+    ],
+)
+def test_it_accepts_shorthands(extra, schema):
+    text = GOOD if "accuracy" not in extra else GOOD.rsplit("accuracy", 1)[0]
+    assert accepts(read(text + extra, "x").data, schema)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "noise: {variance: 1}",
+        GOOD + "titel: x",
+        GOOD + "sample_time: 0",
+        GOOD + "sample_time: fast",
+        GOOD + "time_unit: sec",
+        GOOD + "spectrum: {type: fir, basis: legendre}",
+        GOOD + "spectrum: {type: spline}",
+        GOOD + "limits: {input_power: -1}",
+        GOOD + "experiment: {samples: 0.5}",
+        GOOD.replace("[0, 1]", "[]"),
+        GOOD.replace("B:", "b:"),
+    ],
+)
+def test_it_refuses(text, schema):
+    assert not accepts(read(text, "x").data, schema)
+
+
+STARTERS = sorted((Path(inputdesign_cli.__file__).parent / "cli" / "starters").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", [*SPECS, *STARTERS], ids=lambda path: path.stem)
+def test_an_editor_accepts_the_shipped_specs(schema, path):
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.Draft202012Validator(schema).validate(read(path.read_text(), path.name).data)
+
+
+@pytest.mark.parametrize("wrong", ["spectrum: {typ: fir}", "sweep: {set: {a: 3}}", "sweep: {}"])
+def test_an_editor_refuses_what_is_no_spec(schema, wrong):
+    assert not accepts(read(GOOD + wrong, "x").data, schema)

@@ -1,0 +1,153 @@
+"""What given excitations buy: Example 1 of the least-costly paper, closed forms, tables and records."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import analyse, load_spec, parse_spec, solve
+from inputdesign_cli.errors import DataError, SpecError
+
+BASE = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.01, alpha: 1}}
+spectrum: {given: GIVEN}
+"""
+
+
+def spec_of(given, base=BASE):
+    return parse_spec(base.replace("GIVEN", given), file="given.yaml")
+
+
+def r_u(outcome):
+    columns = outcome.tables["bound"].columns
+    return columns["frequency_rad_per_s"], columns["r_u"]
+
+
+WHITE = "{type: white, power: 1.7}"
+COSINE = "{type: multisine, frequencies: [0.15], amplitudes: [0.75]}"
+SLOW = "{type: multisine, frequencies: [0.05], amplitudes: [0.75]}"
+
+
+def test_example_1_of_the_paper():
+    """The cosine at 0.15 beats white of six times its power everywhere; the one at 0.05 only slowly."""
+    white, cosine, slow = (analyse(spec_of(given)) for given in (WHITE, COSINE, SLOW))
+    assert white.result["power"]["input"][0] / cosine.result["power"]["input"][0] == pytest.approx(6, abs=0.1)
+    w, r_white = r_u(white)
+    assert np.all(r_u(cosine)[1] < r_white)
+    r_slow = r_u(slow)[1]
+    assert np.all(r_slow[w < 0.03] < 0.6 * r_white[w < 0.03])
+    assert np.all(r_slow[w > 1.0] > 1.3 * r_white[w > 1.0])
+
+
+def test_closed_form_of_one_cosine():
+    """M = N A^2 / 2 Re(F F^*) for b and f; c is known by the noise alone, N / (1 - c^2)."""
+    information = analyse(spec_of(COSINE)).result["information"]
+    assert information["parameters"] == ["b1", "c1", "f1"]
+    q = np.exp(-0.15j)
+    F = np.array([q / (1 - 0.7 * q), -3.6 * q**2 / (1 - 0.7 * q) ** 2]) / (1 - 0.9 * q)
+    expected = 500 * 0.75**2 / 2 * np.outer(F, F.conj()).real
+    M = np.asarray(information["matrix"])
+    np.testing.assert_allclose(M[np.ix_([0, 2], [0, 2])], expected, rtol=1e-9)
+    assert M[1, 1] == pytest.approx(500 / (1 - 0.81), rel=1e-9)
+    sd = information["standard_deviation"]
+    np.testing.assert_allclose([sd["b1"], sd["f1"]], np.sqrt(np.diag(np.linalg.inv(expected))), rtol=1e-9)
+
+
+def test_a_flat_table_is_white_noise(tmp_path):
+    table = tmp_path / "phi.csv"
+    rows = "\n".join(f"{w:.17g},1.7" for w in np.linspace(0.0, np.pi, 40))
+    table.write_text("frequency_rad_per_s,phi\n" + rows + "\n", encoding="utf-8")
+    tabulated = analyse(spec_of(f"{{type: table, file: {table}}}"))
+    white = analyse(spec_of(WHITE))
+    np.testing.assert_allclose(
+        tabulated.result["information"]["matrix"], white.result["information"]["matrix"], rtol=1e-9
+    )
+    assert tabulated.result["power"]["output"] == pytest.approx(white.result["power"]["output"])
+
+
+def test_a_designed_spectrum_analysed_keeps_its_promise(tmp_path):
+    """spectrum.csv of a run, given back as a table, meets the accuracy with ratio one."""
+    design = solve(parse_spec(BASE.replace("{given: GIVEN}", "{type: fir, order: 6}")))
+    columns = design.tables["spectrum"].columns
+    table = tmp_path / "phi.csv"
+    w = np.linspace(0.0, np.pi, 6001)
+    c = np.asarray(design.result["spectrum"]["coefficients"])
+    phi = c[0] + 2 * np.cos(np.outer(w, np.arange(1, 7))) @ c[1:]
+    assert np.interp(0.4, w, phi) == pytest.approx(
+        np.interp(0.4, columns["frequency_rad_per_s"], columns["phi"]), rel=1e-3
+    )
+    rows = "\n".join(f"{a:.17g},{max(b, 0.0):.17g}" for a, b in zip(w, phi, strict=True))
+    table.write_text("frequency,phi\n" + rows + "\n", encoding="utf-8")
+    outcome = analyse(spec_of(f"{{type: table, file: {table}}}"))
+    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_signal_is_judged_by_its_own_samples(tmp_path):
+    """A long cosine gives the information of its line; the length is that of the record."""
+    t = np.arange(20000)
+    record = tmp_path / "u.csv"
+    record.write_text(
+        "time_s,u1\n" + "\n".join(f"{i},{0.75 * np.cos(0.15 * i):.17g}" for i in t) + "\n", encoding="utf-8"
+    )
+    outcome = analyse(spec_of(f"{{signal: {record}}}"))
+    assert outcome.result["samples"] == 20000
+    line = np.asarray(analyse(spec_of(COSINE)).result["information"]["matrix"])
+    np.testing.assert_allclose(outcome.result["information"]["matrix"], 40 * line, rtol=2e-3, atol=1.0)
+
+
+def test_solve_analyses_a_given_excitation():
+    solved, analysed = solve(spec_of(COSINE)), analyse(spec_of(COSINE))
+    assert (
+        solved.result["information"]["standard_deviation"]
+        == (analysed.result["information"]["standard_deviation"])
+    )
+    assert solved.result["status"] == "met"
+    assert analyse(spec_of("{type: white, power: 0.01}")).result["status"] == "missed"
+
+
+def test_without_a_requirement_there_is_still_an_answer():
+    outcome = analyse(
+        spec_of(WHITE, BASE.replace("accuracy: {model_error: {relative: 0.01, alpha: 1}}\n", ""))
+    )
+    assert outcome.result["status"] == "given"
+    assert "r_adm" not in outcome.tables["bound"].columns
+    assert outcome.result["model_error"]["alpha"] == pytest.approx(np.sqrt(-2 * np.log(0.05)))
+
+
+def test_closed_loop_excitation_adds_to_what_the_noise_tells(flexible):
+    spec = load_spec("specs/flexible_transmission.yaml", ["spectrum={given: {type: white, power: 7.663650}}"])
+    outcome = analyse(spec)
+    assert outcome.result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    assert outcome.result["cost"] == pytest.approx(21.939919, rel=1e-6)
+
+
+def test_a_constant_excites_too_little():
+    oe = BASE.replace("B: [0, 3.6]", "B: [0, 1, 0.5]").replace("F: [1, -0.7]", "F: [1, -1.2, 0.5]")
+    with pytest.raises(SpecError) as caught:
+        analyse(spec_of("{type: multisine, frequencies: [0.0], amplitudes: [1]}", oe))
+    diagnostic = caught.value.diagnostics[0]
+    assert (diagnostic.code, diagnostic.key) == ("not-exciting", "spectrum.given")
+    assert diagnostic.location is not None
+
+
+BAD_TABLES = [
+    ("frequency,phi\n0.2,1\n0.1,1\n", "increase"),
+    ("frequency,phi\n0.2,1\n5.0,1\n", "Nyquist"),
+    ("frequency,phi\n0.2,-1\n0.5,1\n", "nonnegative"),
+]
+
+
+@pytest.mark.parametrize(("content", "words"), BAD_TABLES, ids=[w for _, w in BAD_TABLES])
+def test_bad_tables(tmp_path, content, words):
+    table = tmp_path / "phi.csv"
+    table.write_text(content, encoding="utf-8")
+    with pytest.raises(DataError) as caught:
+        analyse(spec_of(f"{{type: table, file: {table}}}"))
+    assert words in caught.value.diagnostics[0].message
+
+
+def test_nothing_to_analyse():
+    with pytest.raises(SpecError) as caught:
+        analyse(parse_spec(BASE.replace("{given: GIVEN}", "{type: white}")))
+    assert caught.value.diagnostics[0].code == "nothing-given"

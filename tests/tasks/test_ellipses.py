@@ -1,0 +1,59 @@
+"""The pairs of parameters whose confidence ellipses are drawn."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import analyse, load_spec, solve, validate
+from inputdesign_cli.errors import SpecError
+
+SPECS = Path(__file__).parents[2] / "specs"
+
+
+def shown(outcome):
+    return [pair.names for pair in outcome.curves["ellipses"].pairs]
+
+
+def test_chosen_pairs_have_the_blocks_of_the_covariance():
+    pairs = 'report={ellipses: [["b2[2,1]", "a1[2]"], ["b1[1,1]", "b1[2,2]"]]}'
+    outcome = analyse(load_spec(SPECS / "two_by_two_given.yaml", [pairs]))
+    assert shown(outcome) == [("b2[2,1]", "a1[2]"), ("b1[1,1]", "b1[2,2]")]
+    P = np.asarray(outcome.result["information"]["covariance"])
+    names = outcome.result["information"]["parameters"]
+    at = [names.index("b2[2,1]"), names.index("a1[2]")]
+    ellipse = outcome.curves["ellipses"].pairs[0]
+    np.testing.assert_allclose(ellipse.covariance, P[np.ix_(at, at)], rtol=1e-12)
+    np.testing.assert_allclose(ellipse.center, [0.2, 0.4])
+
+
+def test_one_channel_shows_ellipses_when_they_are_asked_for():
+    plain = solve(load_spec(SPECS / "first_order.yaml"))
+    assert "ellipses" not in plain.curves
+    asked = ["report.ellipses=[[b1, f1]]"]
+    assert shown(solve(load_spec(SPECS / "first_order.yaml", asked))) == [("b1", "f1")]
+    assert shown(analyse(load_spec(SPECS / "first_order_given.yaml", asked))) == [("b1", "f1")]
+
+
+REFUSED = [
+    (
+        "two_by_two_arx",
+        'report={ellipses: [["b1[1,1]", "a1"]]}',
+        "unknown-parameter",
+        "report.ellipses[0][1]",
+    ),
+    ("two_by_two_given", "report={ellipses: [[b1, f1]]}", "unknown-parameter", "report.ellipses[0][0]"),
+    ("first_order", "report.ellipses=[[b1, f2]]", "unknown-parameter", "report.ellipses[0][1]"),
+    ("regression", "report.ellipses=[[b1, b2]]", "not-supported", "report.ellipses"),
+    ("distillation_column", "report.ellipses=[[b1, b2]]", "not-supported", "report.ellipses"),
+]
+
+
+@pytest.mark.parametrize(("name", "override", "code", "key"), REFUSED)
+def test_unknown_names_and_other_designs_are_refused(name, override, code, key):
+    with pytest.raises(SpecError) as caught:
+        validate(load_spec(SPECS / f"{name}.yaml", [override]))
+    diagnostic = caught.value.diagnostics[0]
+    assert (diagnostic.code, diagnostic.key) == (code, key)
+    assert diagnostic.hint
+    assert diagnostic.location is not None

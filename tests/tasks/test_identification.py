@@ -1,0 +1,156 @@
+import json
+
+import numpy as np
+import pytest
+import scipy.signal
+import yaml
+from typer.testing import CliRunner
+
+from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
+from inputdesign_cli.cli import app
+from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.runs.results import Table
+from inputdesign_cli.runs.text_formats import csv_text
+
+SPEC = "specs/first_order.yaml"
+EASY = ["spectrum.order=5", "accuracy.model_error={relative: 0.03, alpha: 2.45}"]
+
+
+def record(u, seed=0):
+    """The system of the first-order spec."""
+    e = np.random.default_rng(seed).standard_normal(u.size)
+    y = scipy.signal.lfilter([0, 3.6], [1, -0.7], u) + scipy.signal.lfilter([1, -0.9], [1], e)
+    return {"time_s": np.arange(u.size, dtype=float), "u1": u, "y1": y}
+
+
+def write(path, columns):
+    path.write_text(csv_text(Table(columns)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def data(tmp_path):
+    u = np.random.default_rng(1).standard_normal(500)
+    return write(tmp_path / "data.csv", record(u))
+
+
+def test_the_blocks_can_be_pasted(data):
+    outcome = identify(load_spec(SPEC), data)
+    theta = outcome.result["identification"]["theta"]
+    deviations = outcome.result["identification"]["standard_deviation"]
+    for name, true in {"b1": 3.6, "c1": -0.9, "f1": -0.7}.items():
+        assert abs(theta[name] - true) < 4 * deviations[name]
+    pasted = yaml.safe_load(outcome.files["model.yaml"].decode())
+    assert pasted["plant"] == {"B": [0.0, theta["b1"]], "F": [1.0, theta["f1"]]}
+    content = {**yaml.safe_load(load_spec(SPEC).to_yaml()), **pasted}
+    assert solve(parse_spec(yaml.safe_dump(content))).result["status"] == "optimal"
+    prior = outcome.files["model.yaml"].decode().split("uncomment:\n")[1]
+    uncommented = "\n".join(line.removeprefix("# ") for line in prior.splitlines())
+    information = np.array(yaml.safe_load(uncommented)["experiment"]["prior"]["information"])
+    np.testing.assert_allclose(information, outcome.result["information"]["matrix"])
+
+
+def test_data_that_suffice_meet_the_target(data):
+    assessment = assess(load_spec(SPEC, ["accuracy.model_error={relative: 0.1, alpha: 2.45}"]), data)
+    assert assessment.met
+    assert assessment.outcome.result["status"] == "met"
+
+
+def test_a_top_up_makes_up_for_what_is_missing(tmp_path):
+    u = 0.3 * np.random.default_rng(2).standard_normal(500)
+    columns = record(u)
+    path = write(tmp_path / "short.csv", columns)
+    spec = load_spec(SPEC, EASY)
+    short = assess(spec, path)
+    assert not short.met
+    result = short.outcome.result
+    assert result["assessment"]["requirements"][0]["worst_ratio"] > 1
+    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    # Cheaper than the experiment from scratch on the same model.
+    pasted = yaml.safe_load(short.outcome.files["model.yaml"].decode())
+    scratch = solve(parse_spec(yaml.safe_dump({**yaml.safe_load(spec.to_yaml()), **pasted})))
+    assert result["cost"] < scratch.result["cost"]
+
+
+def test_the_command_exits_with_one_when_the_target_is_missed(data, tmp_path):
+    run = CliRunner().invoke(
+        app, ["assess", SPEC, str(data), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
+    )
+    assert run.exit_code == 1
+    result = json.loads(run.stdout)
+    assert result["status"] == "missed"
+    assert "signal.csv" in result["files"]
+    assert "model.yaml" in result["files"]
+    run = CliRunner().invoke(
+        app, ["identify", str(data), "--spec", SPEC, "-o", str(tmp_path / "id"), "--no-figures"]
+    )
+    assert run.exit_code == 0
+    assert "estimate" in run.stdout
+
+
+def test_offsets_and_outliers_are_told(tmp_path):
+    columns = record(np.random.default_rng(3).standard_normal(500))
+    columns["y1"] = columns["y1"] + 100.0
+    columns["u1"][40] = 60.0
+    outcome = identify(load_spec(SPEC), write(tmp_path / "d.csv", columns))
+    notes = " ".join(outcome.result["notes"])
+    assert "row 42" in notes
+    assert "--remove-means" in notes
+    centred = identify(load_spec(SPEC), tmp_path / "d.csv", remove_means=True)
+    assert "--remove-means" not in " ".join(centred.result["notes"])
+
+
+@pytest.mark.parametrize("names", [("u", "y"), ("U_volt", "y1_bar"), ("u1_V", "y")])
+def test_columns_may_carry_units(names, tmp_path):
+    columns = record(np.random.default_rng(3).standard_normal(300))
+    plain = identify(load_spec(SPEC), write(tmp_path / "d.csv", columns)).result["identification"]
+    renamed = {"time_s": columns["time_s"], names[0]: columns["u1"], names[1]: columns["y1"]}
+    found = identify(load_spec(SPEC), write(tmp_path / "e.csv", renamed)).result["identification"]
+    assert found["theta"] == plain["theta"]
+
+
+def _without(name):
+    return lambda c: {k: v for k, v in c.items() if k != name}
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        (_without("y1"), "data-missing-column"),
+        (lambda c: {k: v[:5] for k, v in c.items()}, "too-few-samples"),
+        (lambda c: {**c, "u1": np.ones(500)}, "constant-input"),
+        (lambda c: {**c, "time_s": 0.1 * c["time_s"]}, "data-not-uniform"),
+        (lambda c: {**c, "time_s": c["time_s"] + (c["time_s"] > 99)}, "data-not-uniform"),
+        (lambda c: {"time_ms": c["time_s"], "u1": c["u1"], "y1": c["y1"]}, "data-wrong-unit"),
+        (lambda c: {**c, "y1": scipy.signal.lfilter([0, 3.6], [1, -0.7], c["u1"])}, "noise-free-data"),
+    ],
+)
+def test_bad_records_are_refused(change, code, tmp_path):
+    columns = change(record(np.random.default_rng(4).standard_normal(500)))
+    path = write(tmp_path / "d.csv", columns)
+    with pytest.raises((SpecError, DataError)) as caught:
+        identify(load_spec(SPEC, ["noise={variance: 1}"]), path)
+    assert caught.value.diagnostics[0].code == code
+
+
+@pytest.mark.parametrize("text", ["nan", "fast", ""])
+def test_gaps_and_text_are_refused_with_their_line(text, data):
+    lines = data.read_text().splitlines()
+    lines[7] = f"6,{text},1"
+    data.write_text("\n".join(lines))
+    with pytest.raises(DataError) as caught:
+        identify(load_spec(SPEC), data)
+    assert caught.value.diagnostics[0].code == "data-not-a-number"
+    assert caught.value.diagnostics[0].location.line == 8
+
+
+def test_there_must_be_a_target(data):
+    spec = load_spec(SPEC, ["accuracy={criterion: D}", "limits={input_power: 1}"])
+    with pytest.raises(SpecError) as caught:
+        assess(spec, data)
+    assert caught.value.diagnostics[0].code == "nothing-to-assess"
+
+
+def test_data_of_another_structure_are_told(data):
+    outcome = identify(load_spec(SPEC, ["plant={B: [0, 1]}", "noise={variance: 1}"]), data)
+    assert "past inputs explain residuals" in " ".join(outcome.result["notes"])

@@ -1,0 +1,321 @@
+"""Specs with limits, criteria and further requirements: results, messages, and what they promise."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.cli.summary import summary
+from inputdesign_cli.errors import DataError, InfeasibleError, SpecError
+
+PLANT = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+"""
+ERROR = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}\n"
+FIR = "spectrum: {type: fir, order: 8}\nsignal: {candidates: 2}\n"
+
+
+def run(text):
+    return solve(parse_spec(PLANT + text, file="plant.yaml")).result
+
+
+def complaint_of(text, kind=SpecError, verb=solve):
+    with pytest.raises(kind) as caught:
+        verb(parse_spec(PLANT + text, file="plant.yaml"))
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.hint
+    return diagnostic
+
+
+def test_result_of_a_limited_design():
+    least = run(ERROR + FIR)["cost"]
+    result = run(ERROR + FIR + f"limits: {{input_power: {1.2 * least}, output_power: 1000}}\n")
+    assert result["cost"] == pytest.approx(least, rel=1e-6)
+    assert [entry["binding"] for entry in result["limits"]] == [False, False]
+    assert result["limits"][0]["value"] == pytest.approx(least, rel=1e-6)
+    assert result["requirements"] == [
+        {
+            "name": "model_error",
+            "worst_ratio": pytest.approx(1.0),
+            "frequency": pytest.approx(np.pi, rel=1e-5),
+        }
+    ]
+
+
+def test_shortest_experiment_reports_whole_samples():
+    result = run(ERROR + FIR + "objective: shortest_experiment\nlimits: {input_power: 0.4}\n")
+    objective = result["objective"]
+    assert objective["kind"] == "shortest_experiment"
+    assert result["samples"] == np.ceil(objective["value"])
+    assert objective["lower_bound"] <= objective["value"]
+    assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    assert result["signal"]["samples"] == result["samples"]
+    M = np.asarray(result["information"]["matrix"])  # that of the whole samples
+    assert M[1, 1] == pytest.approx(result["samples"] / (1 - 0.81), rel=1e-9)
+    # The same number of samples as a least-cost design needs no more than this power.
+    again = run(ERROR + FIR.replace("8}", "8}") + f"limits: {{samples: {result['samples'] + 500}}}\n")
+    assert again["cost"] * 500 == pytest.approx(0.4 * objective["value"], rel=1e-6)
+
+
+def test_smallest_factor():
+    """Half the power that the accuracy needs: r_u is at least sqrt(2) times what is admissible."""
+    least = run(ERROR + FIR)["cost"]
+    result = run(ERROR + FIR + f"objective: best_accuracy\nlimits: {{input_power: {least / 2}}}\n")
+    assert result["objective"]["kind"] == "accuracy_factor"
+    assert result["objective"]["value"] == pytest.approx(np.sqrt(2), rel=1e-6)
+    assert result["model_error"]["worst_ratio"] == pytest.approx(np.sqrt(2), rel=1e-6)
+    assert result["limits"][0]["binding"]
+
+
+@pytest.mark.parametrize(("letter", "measure"), [
+    ("D", lambda M: np.linalg.slogdet(M)[1]),
+    ("A", lambda M: -np.trace(np.linalg.inv(M))),
+    ("E", lambda M: np.linalg.eigvalsh(M)[0]),
+    ("T", np.trace),
+])  # fmt: skip
+@pytest.mark.parametrize("scale", ["absolute", "relative"])
+def test_criteria_are_those_of_the_reported_matrix(letter, measure, scale):
+    result = run(f"accuracy: {{criterion: {letter}, scale: {scale}}}\nlimits: {{input_power: 1}}\n" + FIR)
+    M = np.asarray(result["information"]["matrix"])
+    if scale == "relative":
+        theta = np.array([3.6, -0.9, -0.7])
+        M = theta[:, None] * M * theta
+    objective = result["objective"]
+    assert objective["kind"] == letter
+    assert objective["value"] == pytest.approx(measure(M), rel=1e-8)
+    assert objective["value"] <= objective["upper_bound"] + 1e-9 * abs(objective["value"])
+    assert objective["relative_gap"] <= 1e-6
+    assert objective["any_spectrum_bound"] >= objective["value"] * (1 - 1e-9 * np.sign(objective["value"]))
+
+
+def test_an_earlier_record_is_prior_information(tmp_path):
+    """The record of half the experiment, applied before, halves what is left to do (nearly: one record)."""
+    plain = solve(parse_spec(PLANT + ERROR + FIR))
+    w = 0.155 * np.arange(4000)
+    record = tmp_path / "u.csv"
+    power = 0.5 * plain.result["objective"]["any_spectrum_bound"] * 500 / 4000
+    samples = np.sqrt(2 * power) * np.cos(w)
+    record.write_text("time_s,u1\n" + "".join(f"{i},{u:.17g}\n" for i, u in enumerate(samples)))
+    spec = PLANT.replace("samples: 500", f"samples: 500, prior: {{information: {record}}}")
+    free = solve(parse_spec(spec + ERROR + "spectrum: {type: free}\n")).result
+    assert free["cost"] == pytest.approx(0.5 * 0.1925467, rel=1e-2)
+
+
+def test_relative_criteria_do_not_depend_on_units():
+    """u measured in thousandths: b scales, relative A-optimality does not."""
+    accuracy = "accuracy: {criterion: A, scale: relative}\n"
+    plain = run(accuracy + "limits: {input_power: 1}\n" + FIR)
+    spec = PLANT.replace("3.6", "0.0036") + accuracy + "limits: {input_power: 1.0e+6}\n" + FIR
+    milli = solve(parse_spec(spec)).result
+    assert milli["objective"]["value"] == pytest.approx(plain["objective"]["value"], rel=1e-6)
+
+
+def test_standard_deviations_are_reached():
+    result = run("accuracy: {standard_deviation: {b1: 0.01, f1: 0.002}}\n" + FIR)
+    sd = result["information"]["standard_deviation"]
+    assert sd["b1"] <= 0.01 * (1 + 1e-7)
+    assert sd["f1"] <= 0.002 * (1 + 1e-7)
+    assert max(sd["b1"] / 0.01, sd["f1"] / 0.002) == pytest.approx(1.0, abs=1e-6)
+    assert [r["name"] for r in result["requirements"]] == [
+        "standard_deviation of b1",
+        "standard_deviation of f1",
+    ]
+
+
+def test_information_target_by_name_in_any_order():
+    by_name = run(
+        "accuracy: {information: {matrix: [[1.0e+6, 0], [0, 1.0e+4]], parameters: [f1, b1]}}\n" + FIR
+    )
+    M = np.asarray(by_name["information"]["matrix"])
+    slack = np.linalg.eigvalsh(M - np.diag([1e4, 0.0, 1e6]))
+    assert slack[0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_requirements_combine():
+    """Both hold, and together they cost at least as much as each alone."""
+    sd = "standard_deviation: {b1: 0.008}"
+    alone = run(f"accuracy: {{{sd}}}\n" + FIR)["cost"]
+    error = run(ERROR + FIR)["cost"]
+    both = run(f"accuracy: {{model_error: {{relative: 0.01, alpha: 2.45}}, {sd}}}\n" + FIR)
+    assert both["cost"] >= max(alone, error) * (1 - 1e-7)
+    assert all(r["worst_ratio"] <= 1 + 1e-7 for r in both["requirements"])
+
+
+def test_a_weight_in_s_is_sampled():
+    """A first-order lag with a zero-order hold is (1 - a) q^-1 / (1 - a q^-1), a = exp(-T / tau)."""
+    continuous = "{continuous: {numerator: [1], denominator: [2, 1]}, sample: zoh}"
+    a = np.exp(-0.5)
+    discrete = f"{{numerator: [0, {1 - a:.17g}], denominator: [1, {-a:.17g}]}}"
+    costs = [
+        run(f"accuracy: {{model_error: {{absolute: 0.05, weight: {weight}}}}}\n" + FIR)["cost"]
+        for weight in (continuous, discrete)
+    ]
+    assert costs[0] == pytest.approx(costs[1], rel=1e-9)
+
+
+def test_band_of_a_multisine():
+    result = run(ERROR + "spectrum: {type: multisine, lines: 60}\nlimits: {band: [0.3, 1.0]}\n")
+    frequencies = np.asarray(result["spectrum"]["frequencies"])
+    assert np.all((frequencies >= 0.3) & (frequencies <= 1.0))
+    free = run(ERROR + "spectrum: {type: free}\nlimits: {band: [0.3, 1.0]}\n")
+    assert free["cost"] <= result["cost"] * (1 + 1e-6)
+    assert free["cost"] > 0.1925467
+    assert np.min(free["spectrum"]["frequencies"]) >= 0.3 - 1e-12
+
+
+def test_density_limits_from_numbers_tables_and_filters(tmp_path):
+    """The same level in three forms gives the same design, which keeps to it everywhere."""
+    loose = ERROR.replace("0.01", "0.015")
+    unlimited = solve(parse_spec(PLANT + loose + FIR))
+    level = 0.8 * unlimited.tables["spectrum"].columns["phi"].max()
+    table = tmp_path / "level.csv"
+    table.write_text(f"frequency,phi\n0,{level:.17g}\n3.2,{level:.17g}\n", encoding="utf-8")
+    root = f"{np.sqrt(level):.17g}"
+    forms = [f"{level:.17g}", f"{{max: {{table: {table}}}}}", f"{{max: {{numerator: [{root}]}}}}"]
+    results = [solve(parse_spec(PLANT + loose + FIR + f"limits: {{spectrum: {form}}}\n")) for form in forms]
+    costs = [outcome.result["cost"] for outcome in results]
+    assert costs[1] == pytest.approx(costs[0], rel=1e-6)
+    assert costs[2] == pytest.approx(costs[0], rel=1e-6)
+    assert costs[0] > unlimited.result["cost"]
+    for outcome in results:
+        assert outcome.tables["spectrum"].columns["phi"].max() <= level * (1 + 1e-6)
+        assert outcome.result["limits"][-1]["binding"]
+
+
+# --- what cannot be had ----------------------------------------------------------------------------------
+
+
+def test_infeasible_limits_are_explained():
+    least = run(ERROR + FIR)["cost"]
+    diagnostic = complaint_of(ERROR + FIR + "limits: {input_power: 0.2}\n", InfeasibleError)
+    assert (diagnostic.code, diagnostic.key) == ("infeasible", "limits.input_power")
+    assert diagnostic.location is not None
+    needed = float(diagnostic.message.split(">= ")[1].split(",")[0])
+    assert least <= needed <= least * (1 + 1e-4)
+    factor = float(diagnostic.hint.split("than ")[1].split(" times")[0])
+    assert factor == pytest.approx(np.sqrt(least / 0.2), rel=1e-3)
+    assert "type: free" in diagnostic.hint  # 0.1925 is enough for one sinusoid
+    # What the message promises is true.
+    assert run(ERROR + FIR + f"limits: {{input_power: {needed * (1 + 1e-6)}}}\n")["cost"] <= needed
+
+
+def test_infeasible_without_a_way_out_by_one_limit():
+    limits = "limits: {input_power: 0.01, output_power: 0.1}\n"
+    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
+    assert "no change of a single limit is enough" in diagnostic.message
+    times = float(diagnostic.message.split("have to be ")[1].split(" times")[0])
+    # What the message promises is true, and no overstatement.
+    raised = (
+        f"limits: {{input_power: {0.01 * times * (1 + 1e-4)}, output_power: {0.1 * times * (1 + 1e-4)}}}\n"
+    )
+    assert run(ERROR + FIR + raised)["status"] == "optimal"
+    lowered = (
+        f"limits: {{input_power: {0.01 * times * (1 - 1e-3)}, output_power: {0.1 * times * (1 - 1e-3)}}}\n"
+    )
+    assert complaint_of(ERROR + FIR + lowered, InfeasibleError).code == "infeasible"
+
+
+def test_a_density_that_is_too_low_is_told_its_factor():
+    # A flat spectrum needs 1.705495; below that level no spectrum has more at any frequency.
+    diagnostic = complaint_of(ERROR + FIR + "limits: {spectrum: 1.5}\n", InfeasibleError)
+    times = float(diagnostic.message.split("limits.spectrum would have to be ")[1].split(" times")[0])
+    assert times == pytest.approx(1.705495 / 1.5, rel=1e-4)
+
+
+def test_contradictory_limits():
+    limits = "limits: {input_power: 0.3, output_power: {min: 300}}\n"
+    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
+    assert diagnostic.code == "contradictory-limits"
+    assert "output_power" in diagnostic.message
+    assert "input_power" in diagnostic.message
+
+
+def test_too_long():
+    limits = "objective: shortest_experiment\nlimits: {input_power: 0.2, samples: 400}\n"
+    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
+    assert (diagnostic.code, diagnostic.key) == ("too-long", "limits.samples")
+
+
+TWO = "{frequencies: [0.1], type: multisine}"
+BAD = [
+    ("accuracy: {standard_deviation: {b7: 1}}\n" + FIR, "unknown-parameter", "accuracy.standard_deviation"),
+    ("accuracy: {application: {parameters: [b1, x], hessian: [[1, 0], [0, 1]], gamma: 1}}\n" + FIR,
+     "unknown-parameter", "accuracy.application"),
+    ("accuracy: {information: [[1, 0], [0, 1]]}\n" + FIR, "wrong-shape", "accuracy.information"),
+    (ERROR + FIR + "limits: {band: [0, 1]}\n", "bad-limit", "limits.band"),
+    (ERROR + "spectrum: {type: free}\nlimits: {spectrum: 3}\n", "bad-limit", "limits.spectrum"),
+    (ERROR + "spectrum: {type: multisine, lines: 3}\nlimits: {band: [0.1, 0.2]}\n", "too-few-lines",
+     "spectrum.lines"),
+    (ERROR + FIR + "limits: {spectrum: {max: 1, min: {numerator: [1.5]}}}\n", "bad-limit", "limits.spectrum"),
+    ("accuracy: {weighted_variance: {weight: {continuous: {numerator: [1], denominator: [1, 1]}}, max: 1}}\n"
+     + FIR, "not-sampled", "accuracy.weighted_variance.weight"),
+    ("accuracy: {weighted_variance: {max: 1, relative: perhaps}}\n" + FIR, "unknown-word",
+     "accuracy.weighted_variance.relative"),
+    (ERROR + FIR + "objective: best_accuracy\n", "needs-limits", "accuracy.model_error"),
+    (ERROR + FIR + "solver: {method: lmi}\nlimits: {input_power: 1}\n", "not-supported", "solver.method"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "code", "key"), BAD, ids=[f"{c}-{k}" for _, c, k in BAD])
+def test_bad_specs_name_the_key(text, code, key):
+    diagnostic = complaint_of(text, verb=validate)
+    assert (diagnostic.code, diagnostic.key) == (code, key)
+    assert diagnostic.location is not None
+
+
+def test_a_table_of_levels_must_be_in_order(tmp_path):
+    table = tmp_path / "level.csv"
+    table.write_text("frequency,phi\n1,1\n0,1\n", encoding="utf-8")
+    text = ERROR + FIR + f"limits: {{spectrum: {{max: {{table: {table}}}}}}}\n"
+    diagnostic = complaint_of(text, DataError, validate)
+    assert diagnostic.code == "bad-table"
+
+
+def test_free_power_near_dc_is_noted(flexible):
+    """With an integrator in the loop the free optimum has free power at DC: said, and mended by a cap."""
+    from inputdesign_cli import load_spec
+
+    path, free = "specs/flexible_transmission.yaml", "spectrum={type: free}"
+    design = solve(load_spec(path, [free]))
+    assert design.result["cost"] == pytest.approx(6.556636, rel=1e-5)
+    assert any("ill defined" in note for note in design.result["notes"])
+    capped = solve(load_spec(path, [free, "limits.excitation_power=20"])).result
+    assert "notes" not in capped
+    assert capped["power"]["excitation"][0] <= 20 * (1 + 1e-9)
+    assert capped["cost"] == pytest.approx(6.556636, rel=2e-2)
+
+
+def test_what_only_noise_tells_is_out_of_reach_of_any_power():
+    """Of y = G u + (1 - 0.5 q^-1) e the variance of c1 is (1 - 0.5^2) / N, whatever u is."""
+    spec = parse_spec(
+        "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.5], variance: 1.0}\n"
+        "experiment: {samples: 500}\naccuracy: {standard_deviation: {c1: 0.01}}\n"
+        "spectrum: {type: fir, order: 3}\n"
+    )
+    with pytest.raises(InfeasibleError) as caught:
+        solve(spec)
+    (diagnostic,) = caught.value.diagnostics
+    ratio = np.sqrt((1 - 0.25) / 500) / 0.01
+    assert f"{ratio:.6g} times what is asked" in diagnostic.message
+    assert f"{ratio**2:.4g} times as many samples" in diagnostic.hint
+
+
+@pytest.mark.parametrize(
+    ("spec", "overrides", "said"),
+    [
+        (
+            "first_order",
+            ["experiment.prior={information: [[1e9,0,0],[0,1e9,0],[0,0,1e9]]}"],
+            "experiment.prior",
+        ),
+        ("flexible_transmission", ["accuracy={model_error: {relative: 1000}}"], "noise in normal operation"),
+    ],
+)
+def test_what_is_known_already_may_be_enough(spec, overrides, said):
+    result = solve(load_spec(f"specs/{spec}.yaml", [*overrides, "spectrum.order=3"])).result
+    assert (result["status"], result["cost"]) == ("nothing_needed", 0.0)
+    assert said in result["notes"][0]
+    assert "times as much" not in summary(result, "s", [Path("spec.yaml")])
