@@ -22,7 +22,7 @@ from inputdesign_cli.monte_carlo.arx import ArxStudy
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, multiply
-from inputdesign_cli.signal.line_powers import noise_drive, roots_of, shaped_noise
+from inputdesign_cli.signal.tabulated_multisine import noise_drive, roots_of, shaped_noise
 
 # Batches stay in the cache of the processor.
 _BATCH_SAMPLES = 200_000

@@ -14,7 +14,7 @@ from inputdesign_cli.monte_carlo.arx import ArxStudy
 from inputdesign_cli.monte_carlo.loop_error import LossStudy, closed_loop_study
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.results import LossCurves, Results
-from inputdesign_cli.signal.line_powers import lines_of
+from inputdesign_cli.signal.tabulated_multisine import lines_of
 from inputdesign_cli.specification import Simulation, Spec
 from inputdesign_cli.tasks.build.loop_error_problem import KEY, true_plant
 from inputdesign_cli.tasks.loop_error import loss_entry, outcome_of

@@ -11,7 +11,7 @@ from inputdesign_cli.design.loop_error.closed_form import error_of
 from inputdesign_cli.errors import Diagnostic, InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.signal.line_powers import lines_of, masses_of_density, masses_on_record
+from inputdesign_cli.signal.tabulated_multisine import lines_of, masses_of_density, masses_on_record
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.loop_error_problem import build_problem
 

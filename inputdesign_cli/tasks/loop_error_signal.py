@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.line_powers import lines_of, matrix_multisine, periodogram_masses
 from inputdesign_cli.signal.matrix_factor import matrix_factor
 from inputdesign_cli.signal.rational import rational_filter
+from inputdesign_cli.signal.tabulated_multisine import lines_of, matrix_multisine, periodogram_masses
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.loop_error_design import ClosedLoopDesign
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from asymptotic.column import random_complex, random_plant
 
 from inputdesign_cli.design.loop_error import InternalModel, MatrixTransfer, MinimumVariance, ModelReference
 from inputdesign_cli.design.loop_error.laws import propagation
 from inputdesign_cli.design.loop_error.transfer import sampled
+from loop_error.column import random_complex, random_plant
 
 W = np.array([0.1, 0.7, 1.9, 3.0])
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from asymptotic.column import adjoint, column, random_complex, random_hermitian
 
 from inputdesign_cli.design.loop_error import PowerLimit, design_within
 from inputdesign_cli.design.loop_error.closed_form import error_of, power_of
+from loop_error.column import adjoint, column, random_complex, random_hermitian
 
 
 def case(n, K, seed):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from asymptotic.column import adjoint, column, random_hermitian, random_plant
 
 from inputdesign_cli.design.loop_error import (
     ClosedLoopProblem,
@@ -14,6 +13,7 @@ from inputdesign_cli.design.loop_error import (
 )
 from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
+from loop_error.column import adjoint, column, random_hermitian, random_plant
 
 W = np.array([0.05, 0.4, 1.3, 2.8])
 

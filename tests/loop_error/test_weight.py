@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from asymptotic.column import adjoint, column, random_complex, random_hermitian
 
 from inputdesign_cli.design.loop_error import MatrixTransfer, ModelReference
 from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
 from inputdesign_cli.design.loop_error.weight import general_weight, reference_weight, weight
+from loop_error.column import adjoint, column, random_complex, random_hermitian
 
 W = np.linspace(0.05, 3.0, 40)
 

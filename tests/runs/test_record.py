@@ -11,8 +11,8 @@ from importlib import metadata
 import numpy as np
 import pytest
 
-from inputdesign_cli.runs import run_directory as record
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.runs import run_directory as record
 from inputdesign_cli.runs.results import OptimalityCurves, Results, SignalCurves, Table
 
 
