@@ -9,14 +9,13 @@ from inputdesign_cli.tasks.analysis import analyse_given
 from inputdesign_cli.tasks.assessment import assess as assess
 from inputdesign_cli.tasks.build.channel_task import build_channel_task
 from inputdesign_cli.tasks.build.channels import has_channels
-from inputdesign_cli.tasks.build.loop_error_problem import build_problem
+from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
 from inputdesign_cli.tasks.build.regression_task import build_regression
 from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.channel_analysis import analyse_channels, build_channel_analysis
 from inputdesign_cli.tasks.channel_design import solve_channels
 from inputdesign_cli.tasks.design import solve_convex
 from inputdesign_cli.tasks.identification import identify as identify
-from inputdesign_cli.tasks.loop_error import solve_closed_loop_error
 from inputdesign_cli.tasks.regression import solve_regression
 
 
@@ -34,7 +33,7 @@ def solve(spec: Spec) -> Results:
         if isinstance(spec.plant, RegressionPlant):
             return solve_regression(spec)
         if spec.accuracy.closed_loop_error is not None:
-            return solve_closed_loop_error(spec)
+            return build_loop_error_task(spec).solve()
         return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
     except IdesignError as error:
         raise spec.place(error) from error
@@ -61,7 +60,7 @@ def validate(spec: Spec) -> None:
         elif isinstance(spec.plant, RegressionPlant):
             build_regression(spec)
         elif spec.accuracy.closed_loop_error is not None:
-            build_problem(spec)
+            build_loop_error_task(spec).check()
         elif has_channels(spec):
             build_channel_task(spec)
         else:
