@@ -11,7 +11,8 @@ from inputdesign_cli.plant.polynomial import Array, roots_in_z
 
 def caused_by_inputs(model: PolynomialChannels, u: Array) -> Array:
     """(.., n, p): G u for samples u (.., n, r)."""
-    y = np.zeros((*u.shape[:-1], model.outputs))
+    # Channels come first in memory: a filter passes over one of them at a time.
+    y = np.moveaxis(np.zeros((model.outputs, *u.shape[:-1])), 0, -1)
     for i in range(model.outputs):
         for j in range(model.inputs):
             if np.any(model.B[i][j]):
@@ -22,7 +23,7 @@ def caused_by_inputs(model: PolynomialChannels, u: Array) -> Array:
 
 def caused_by_noise(model: PolynomialChannels, e: Array) -> Array:
     """(.., n, p): H e for samples e (.., n, p)."""
-    v = np.empty(e.shape)
+    v = np.moveaxis(np.empty((model.outputs, *e.shape[:-1])), 0, -1)
     for i in range(model.outputs):
         below = np.convolve(_one(model.A, i), _one(model.D, i))
         v[..., i] = scipy.signal.lfilter(_one(model.C, i), below, e[..., i])

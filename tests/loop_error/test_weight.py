@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import MatrixTransfer, ModelReference
+from inputdesign_cli.design.loop_error import ModelReference
 from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
 from inputdesign_cli.design.loop_error.weight import general_weight, reference_weight, weight
-from loop_error.column import adjoint, column, random_complex, random_hermitian
+from inputdesign_cli.plant import TransferMatrix
+from loop_error.column import GAINS, adjoint, column, random_complex, random_hermitian
 
 W = np.linspace(0.05, 3.0, 40)
 
@@ -16,7 +17,7 @@ def random_case(n, seed=0):
     rng = np.random.default_rng(seed)
     G = random_complex(rng, W.size, n, n)
     law = ModelReference(
-        MatrixTransfer.build(
+        TransferMatrix.build(
             [[[0.0, *(0.3 * rng.standard_normal(2))] for _ in range(n)] for _ in range(n)],
             [[[1.0, -0.6]] * n] * n,
         )
@@ -89,8 +90,6 @@ def test_the_spectrum_of_the_column_is_the_matrix_root_times_s2():
 
 
 def test_the_printed_matrix_is_the_elementwise_root():
-    from asymptotic.column import GAINS
-
     K = np.linalg.inv(GAINS)
     gram = K @ K.T
     printed = np.array([[50.86022, 50.81780], [50.81780, 50.78046]])
