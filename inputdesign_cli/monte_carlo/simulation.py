@@ -8,6 +8,7 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import RegressionPlant, Spec
 from inputdesign_cli.tasks.build.channels import has_channels
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
+from inputdesign_cli.tasks.build.regression import build_regression_task
 
 
 def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
@@ -22,9 +23,7 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
     """
     try:
         if isinstance(spec.plant, RegressionPlant):
-            from inputdesign_cli.monte_carlo.regression import simulate_regression
-
-            return simulate_regression(spec, executor=executor)
+            return build_regression_task(spec).simulate(executor)
         if spec.accuracy.closed_loop_error is not None and spec.designs:
             return build_loop_error_task(spec).simulate(executor)
         if has_channels(spec):

@@ -10,13 +10,12 @@ from inputdesign_cli.tasks.assessment import assess as assess
 from inputdesign_cli.tasks.build.channel_task import build_channel_task
 from inputdesign_cli.tasks.build.channels import has_channels
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
-from inputdesign_cli.tasks.build.regression_task import build_regression
+from inputdesign_cli.tasks.build.regression import build_regression_task
 from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.channel_analysis import analyse_channels, build_channel_analysis
 from inputdesign_cli.tasks.channel_design import solve_channels
 from inputdesign_cli.tasks.design import solve_convex
 from inputdesign_cli.tasks.identification import identify as identify
-from inputdesign_cli.tasks.regression import solve_regression
 
 
 def solve(spec: Spec) -> Results:
@@ -31,7 +30,7 @@ def solve(spec: Spec) -> Results:
         return analyse(spec)
     try:
         if isinstance(spec.plant, RegressionPlant):
-            return solve_regression(spec)
+            return build_regression_task(spec).solve()
         if spec.accuracy.closed_loop_error is not None:
             return build_loop_error_task(spec).solve()
         return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
@@ -58,7 +57,7 @@ def validate(spec: Spec) -> None:
         if not spec.designs:
             build_channel_analysis(spec) if has_channels(spec) else build_analysis(spec)
         elif isinstance(spec.plant, RegressionPlant):
-            build_regression(spec)
+            build_regression_task(spec).check()
         elif spec.accuracy.closed_loop_error is not None:
             build_loop_error_task(spec).check()
         elif has_channels(spec):
