@@ -46,15 +46,6 @@ def difference(function, G, step=1e-6):
 
 
 @pytest.mark.parametrize(("n", "name"), CASES)
-def test_the_jacobian_is_that_of_finite_differences_on_complex_data(n, name):
-    law = laws(n)[name]
-    G = random_complex(np.random.default_rng(7), W.size, n, n) + 2 * np.eye(n)
-    expected = difference(lambda X: law.controller(X, W), G)
-    scale = np.abs(expected).max()
-    np.testing.assert_allclose(law.jacobian(G, W), expected, rtol=1e-6, atol=1e-7 * scale)
-
-
-@pytest.mark.parametrize(("n", "name"), CASES)
 def test_propagation_is_the_derivative_of_the_true_loop(n, name):
     law = laws(n)[name]
     G = random_complex(np.random.default_rng(8), W.size, n, n) + 2 * np.eye(n)

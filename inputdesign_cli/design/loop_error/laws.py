@@ -42,10 +42,6 @@ class ControlLaw(Protocol):
         """C(G)."""
         ...
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """d vec C / d vec G: (K, n^2, n^2)."""
-        ...
-
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
         """d vec C / d vec H: (K, n^2, n^2); None where C ignores the noise model."""
         ...
@@ -130,10 +126,6 @@ class ModelReference(_FixedLoop):
         T = self.target.at(w)
         return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        return -kronecker(_transposed(self.controller(G, w)), np.linalg.inv(G))
-
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""
         check_model_reference(plant, self.target, key=key)
@@ -165,15 +157,6 @@ class InternalModel(_FixedLoop):
         """See `ControlLaw`."""
         Q = np.linalg.inv(G) @ self.target.at(w)
         return np.asarray(np.linalg.inv(sensitivity(Q @ G)) @ Q)
-
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        # dC = (I - Q G)^-1 [dQ (I + G C) + Q dG C] with dQ = -G^-1 dG Q.
-        inverse = np.linalg.inv(G)
-        Q, C = inverse @ self.target.at(w), self.controller(G, w)
-        outer = np.linalg.inv(sensitivity(Q @ G))
-        from_filter = -kronecker(_transposed(Q @ sensitivity(-G @ C)), outer @ inverse)
-        return from_filter + kronecker(_transposed(C), outer @ Q)
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""
@@ -212,10 +195,6 @@ class MinimumVariance:
         """See `ControlLaw`."""
         X = -sensitivity(self.plant.noise_at(w) @ np.linalg.inv(self.unavoidable(w)))
         return np.asarray(np.linalg.inv(G) @ X)
-
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        return -kronecker(_transposed(self.controller(G, w)), np.linalg.inv(G))
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
         """d vec C / d vec H with E held: its few terms are known far better than H pointwise."""
