@@ -196,11 +196,12 @@ def _white_cost(experiment: Experiment, task: Task) -> float:
 def check_excites(spec: Spec, experiment: Experiment | ChannelExperiment, information: Array) -> None:
     """Raise `SpecError` (`not-exciting`) when the information matrix is singular to working precision."""
     eigenvalues, vectors = np.linalg.eigh(information)
-    if eigenvalues[0] > _TOO_FAINT * eigenvalues[-1]:
+    faint = eigenvalues <= _TOO_FAINT * eigenvalues[-1]
+    if not faint.any():
         return
     raise spec.complain(
         "not-exciting",
-        f"this excitation tells nothing about {experiment.unexcited(vectors[:, 0])}: infinite variance",
+        f"this excitation tells nothing about {experiment.unexcited(vectors[:, faint])}: infinite variance",
         hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
         key="spectrum.given",
     )
