@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import RegressionPlant, Spec
 from inputdesign_cli.tasks.analysis import analyse_given
-from inputdesign_cli.tasks.assessment import assess as assess
+from inputdesign_cli.tasks.assessment import Assessment
+from inputdesign_cli.tasks.assessment import assess as assess_record
 from inputdesign_cli.tasks.build.channel_task import build_channel_task
 from inputdesign_cli.tasks.build.channels import has_channels
+from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.loop_error_problem import build_problem
 from inputdesign_cli.tasks.build.regression_task import build_regression
 from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.channel_analysis import analyse_channels, build_channel_analysis
 from inputdesign_cli.tasks.channel_design import solve_channels
 from inputdesign_cli.tasks.design import solve_convex
-from inputdesign_cli.tasks.identification import identify as identify
+from inputdesign_cli.tasks.identification import identify as identify_record
 from inputdesign_cli.tasks.loop_error import solve_closed_loop_error
 from inputdesign_cli.tasks.regression import solve_regression
 
@@ -35,9 +39,13 @@ def solve(spec: Spec) -> Results:
             return solve_regression(spec)
         if spec.accuracy.closed_loop_error is not None:
             return solve_closed_loop_error(spec)
-        return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
+        return _designed(spec)
     except IdesignError as error:
         raise spec.place(error) from error
+
+
+def _designed(spec: Spec) -> Results:
+    return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
 
 
 def analyse(spec: Spec) -> Results:
@@ -66,5 +74,34 @@ def validate(spec: Spec) -> None:
             build_channel_task(spec)
         else:
             build_task(spec)
+    except IdesignError as error:
+        raise spec.place(error) from error
+
+
+def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
+
+    Raises:
+        SpecError: the plant is not supported.
+        DataError: the file cannot be used, or the data do not determine the parameters.
+    """
+    try:
+        task = build_identification(spec, _designed)
+        return identify_record(task, Path(data), remove_means=remove_means)
+    except IdesignError as error:
+        raise spec.place(error) from error
+
+
+def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
+    """Identify the model from a real experiment, compare what the data buy with what is asked, and top up.
+
+    Raises:
+        SpecError: nothing is asked that data could meet; see `identify` and `solve`.
+        DataError: the file cannot be used.
+        InfeasibleError, InaccurateError: of the top-up.
+    """
+    try:
+        task = build_identification(spec, _designed)
+        return assess_record(task, Path(data), remove_means=remove_means)
     except IdesignError as error:
         raise spec.place(error) from error

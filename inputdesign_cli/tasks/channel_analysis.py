@@ -36,6 +36,7 @@ from inputdesign_cli.tasks.build.channels import (
     record_step,
 )
 from inputdesign_cli.tasks.build.given_limits import broken_limits, check_given_limits
+from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import model_error_alpha
 from inputdesign_cli.tasks.build.task import Task
 from inputdesign_cli.tasks.channel_record import record_sizes
@@ -96,9 +97,10 @@ def analyse_channels(spec: Spec) -> Results:
     result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
-    bound = bound_curves_of(spec, requirements, information, flat)
+    units = build_units(spec)
+    bound = bound_curves_of(units, requirements, information, flat)
     tables["bound"], curves["bound"] = bound or entry_bound_curves(
-        spec, unstated_errors(spec, experiment), information, flat, stated=False
+        units, unstated_errors(spec, experiment), information, flat, stated=False
     )
     if isinstance(excitation.basis, DirectedLines):
         tables["spectrum"], curves["spectrum"] = line_curves(spec, excitation.basis, _x(excitation))

@@ -16,6 +16,7 @@ from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import DirectedLines, LinesBasis
 from inputdesign_cli.tasks.build.channel_task import build_channel_task
 from inputdesign_cli.tasks.build.channels import record_step
+from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.channel_record import (
     channel_generator,
     channel_signal_entry,
@@ -104,7 +105,7 @@ def _illustrate(
     if record is not None and np.isfinite(record.worst_ratio):
         known = channel_record_information(experiment, record.samples, record_step(spec))
     bound = bound_curves_of(
-        spec, (*problem.requirements, *problem.side), found.information, white, record=known
+        build_units(spec), (*problem.requirements, *problem.side), found.information, white, record=known
     )
     if bound is not None:
         tables["bound"], curves["bound"] = bound

@@ -20,6 +20,7 @@ from inputdesign_cli.runs.results import (
     SpectrumCurves,
     Table,
 )
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import PolynomialSpectrum
 from inputdesign_cli.spectrum import (
@@ -86,7 +87,7 @@ def line_curves(
 
 
 def bound_curves_of(
-    spec: Spec,
+    units: Units,
     requirements: Sequence[Requirement],
     information: Array,
     white: Array | None,
@@ -100,15 +101,15 @@ def bound_curves_of(
     """
     entries = [r for r in requirements if isinstance(r, EntryOfPlant)]
     if entries:
-        return entry_bound_curves(spec, entries, information, white, label=label, record=record)
+        return entry_bound_curves(units, entries, information, white, label=label, record=record)
     for requirement in requirements:
         if isinstance(requirement, NormError):
-            return _norm_bound_curves(spec, requirement, information, white, label, record)
+            return _norm_bound_curves(units, requirement, information, white, label, record)
     return None
 
 
 def _norm_bound_curves(
-    spec: Spec,
+    units: Units,
     requirement: NormError,
     information: Array,
     white: Array | None,
@@ -118,14 +119,14 @@ def _norm_bound_curves(
     w = _bound_axis([requirement], information)
     r_u, r_adm = requirement.error_bound(information, w), requirement.admissible.at(w)
     G = np.linalg.norm(requirement.experiment.model.plant_at(w), axis=(1, 2))
-    columns = {frequency_header(spec): w / frequency_unit(spec), "r_u": r_u, "r_adm": r_adm, "G_abs": G}
+    columns = {units.frequency_header: w / units.frequency, "r_u": r_u, "r_adm": r_adm, "G_abs": G}
     compared = None if white is None else requirement.error_bound(white, w)
     if compared is not None:
         columns["r_u_white"] = compared
     applied = None if record is None else requirement.error_bound(record, w)
     if applied is not None:
         columns["r_u_record"] = applied
-    w = w / frequency_unit(spec)
+    w = w / units.frequency
     panel = BoundPanel(w, r_u, G, r_adm, compared, label=label, r_u_record=applied)
     return Table(columns), BoundCurves((panel,))
 
@@ -139,7 +140,7 @@ def _bound_axis(requirements: Sequence[EntryOfPlant | NormError], information: A
 
 
 def entry_bound_curves(
-    spec: Spec,
+    units: Units,
     requirements: Sequence[EntryOfPlant],
     information: Array,
     white: Array | None,
@@ -154,25 +155,35 @@ def entry_bound_curves(
     the information of the record to be applied.
     """
     w = _bound_axis(requirements, information)
-    frequency = w / frequency_unit(spec)
-    columns: dict[str, Array] = {frequency_header(spec): frequency}
+    frequency = w / units.frequency
+    columns: dict[str, Array] = {units.frequency_header: frequency}
     panels = []
     for requirement in requirements:
         i, j = requirement.output, requirement.input
+        suffix = units.suffix(i, j)
         r_u = requirement.error_bound(information, w)
         r_adm = requirement.admissible.at(w) if stated else None
         G = np.abs(requirement.experiment.model.plant_at(w)[:, i, j])
         for name, values in (("r_u", r_u), ("r_adm", r_adm), ("G_abs", G)):
             if values is not None:
-                columns[f"{name}_{i + 1}{j + 1}"] = values
+                columns[name + suffix] = values
         compared = None if white is None else requirement.error_bound(white, w)
         if compared is not None:
-            columns[f"r_u_white_{i + 1}{j + 1}"] = compared
+            columns["r_u_white" + suffix] = compared
         applied = None if record is None else requirement.error_bound(record, w)
         if applied is not None:
-            columns[f"r_u_record_{i + 1}{j + 1}"] = applied
+            columns["r_u_record" + suffix] = applied
         panels.append(
-            BoundPanel(frequency, r_u, G, r_adm, compared, label=label, r_u_record=applied, entry=(i, j))
+            BoundPanel(
+                frequency,
+                r_u,
+                G,
+                r_adm,
+                compared,
+                label=label,
+                r_u_record=applied,
+                entry=None if units.single else (i, j),
+            )
         )
     return Table(columns), BoundCurves(tuple(panels))
 
