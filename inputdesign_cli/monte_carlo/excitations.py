@@ -1,39 +1,171 @@
-"""The excitations of a Monte Carlo study: one row a run, each with a realisation of its own."""
+"""The excitations of a Monte Carlo study: a record for each run, and what it tells in theory."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
 import numpy as np
 
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import SignalSettings, record_information
-from inputdesign_cli.signal.generator import SignalGenerator
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from inputdesign_cli.signal import (
+    ChannelPhases,
+    ChannelSignalGenerator,
+    Lines,
+    channel_record_information,
+    in_phase_record,
+    multisine_record,
+)
+from inputdesign_cli.signal.levels import pseudo_random, register_length, signs
+from inputdesign_cli.spectrum import TabulatedChannels
+
+FlatKind = Literal["white", "prbs", "binary"]
+_LINES_AT_ONCE = 64
+
+
+class Excitation(Protocol):
+    """What the runs apply."""
+
+    @property
+    def name(self) -> str: ...
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records (runs, samples, r), each a realisation of its own."""
+        ...
+
+    def information(self, experiment: ChannelExperiment) -> Array:
+        """What it tells in theory, (k, k) in raw parameters, prior information included."""
+        ...
 
 
 @dataclass(frozen=True)
-class Excitation:
-    """A spectrum that every run realises anew by `recipe`, or one `record` (samples,) that all runs apply."""
+class Recorded:
+    """One record (samples, r), `step` apart, that all runs apply."""
 
     name: str
-    basis: FirBasis | LinesBasis = field(default_factory=lambda: FirBasis(0))
-    x: Array = field(default_factory=lambda: np.ones(1))
-    recipe: SignalSettings = field(default_factory=SignalSettings)
-    record: Array | None = None
+    record: Array
+    step: float
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """(runs, samples): records, each scaled to the power of the spectrum exactly."""
-        if self.record is not None:
-            return np.broadcast_to(self.record, (runs, self.record.size))
-        drawer = SignalGenerator(self.basis, self.x, self.recipe, samples)
-        rows = np.stack([np.repeat(drawer.values(rng), self.recipe.hold) for _ in range(runs)])
-        return rows * np.sqrt(drawer.total / np.mean(rows**2, axis=1, keepdims=True))
+        """The same record for each run."""
+        return np.broadcast_to(self.record, (runs, *self.record.shape))
 
-    def information(self, experiment: Experiment) -> Array:
-        """(k, k) in raw parameters: what this excitation tells in theory, prior information included."""
-        if self.record is not None:
-            return record_information(experiment, self.record)
-        maps = self.basis.integrals(experiment.information_density, experiment.singularities)
-        return experiment.baseline_information + np.tensordot(self.x, maps, axes=1)
+    def information(self, experiment: ChannelExperiment) -> Array:
+        """Of the samples themselves."""
+        return channel_record_information(experiment, self.record, self.step)
+
+
+@dataclass(frozen=True)
+class Redrawn:
+    """Records of the designed spectrum, drawn anew in each run and scaled to its power exactly."""
+
+    name: str
+    generator: ChannelSignalGenerator
+    power: float
+    step: float
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records of the generator's kind of signal."""
+        values = np.stack([self.generator.values(rng) for _ in range(runs)])
+        return _scaled(np.repeat(values, self.generator.recipe.hold, axis=1), self.power)
+
+    def information(self, experiment: ChannelExperiment) -> Array:
+        """Of the sinusoids that stand for the spectrum."""
+        generator = self.generator
+        lines = generator.lines if generator.recipe.block == 1 else generator.design(generator.samples, 1)
+        total = float(np.trace(lines.powers.sum(axis=0)).real)
+        return _line_information(experiment, lines.scaled(self.power / total), self.step)
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """Sinusoids of new phases in each run, scaled to their power exactly; frequencies are in rad per step."""
+
+    name: str
+    lines: Lines
+    phases: ChannelPhases
+    step: float
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records of random phases."""
+        drawn = np.stack([multisine_record(self.lines, samples, rng, self.phases) for _ in range(runs)])
+        return _scaled(drawn, float(np.trace(self.lines.powers.sum(axis=0)).real))
+
+    def information(self, experiment: ChannelExperiment) -> Array:
+        """Of the sinusoids."""
+        return _line_information(experiment, self.lines, self.step)
+
+
+@dataclass(frozen=True)
+class InPhase:
+    """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels."""
+
+    name: str
+    frequencies: Array
+    amplitudes: Array
+    step: float
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records of random phases."""
+        return np.stack(
+            [in_phase_record(self.frequencies, self.amplitudes, samples, rng) for _ in range(runs)]
+        )
+
+    def information(self, experiment: ChannelExperiment) -> Array:
+        """Of the sinusoids."""
+        constant = (self.frequencies <= 0.0) | (self.frequencies >= np.pi)
+        powers = np.einsum("la,lb->lab", self.amplitudes, self.amplitudes).astype(complex)
+        powers *= np.where(constant, 1.0, 0.5)[:, None, None]
+        return _line_information(experiment, Lines(self.frequencies, powers), self.step)
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Independent signals of one kind and of these powers (r,), each of a flat spectrum in discrete time.
+
+    White noise is Gaussian, a binary signal takes its signs, prbs is a maximum length sequence.
+    """
+
+    name: str
+    powers: Array
+    kind: FlatKind
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records scaled to their powers exactly."""
+        # Parts of one long sequence: two sequences of a shift register are delays of each other.
+        channels = self.powers.size
+        length = samples * channels
+        if self.kind == "prbs":
+            bits = register_length(length)
+            whole = np.stack([pseudo_random(bits, length, rng) for _ in range(runs)])
+        else:
+            noise = rng.standard_normal((runs, length))
+            whole = noise if self.kind == "white" else signs(noise)
+        parts = whole.reshape(runs, channels, samples).swapaxes(1, 2)
+        return parts * np.sqrt(self.powers / np.mean(parts**2, axis=1, keepdims=True))
+
+    def information(self, experiment: ChannelExperiment) -> Array:
+        """Of the flat spectrum."""
+        basis = TabulatedChannels.white(self.powers, (0.0, np.pi))
+        maps = basis.integrals(experiment.information_density, experiment.singularities)
+        return np.asarray(experiment.baseline_information + maps[0])
+
+
+def _scaled(records: Array, power: float) -> Array:
+    """Records (runs, samples, r) of this power in all channels together."""
+    found = np.mean(records**2, axis=1, keepdims=True).sum(axis=2, keepdims=True)
+    return np.asarray(records * np.sqrt(power / found))
+
+
+def _line_information(experiment: ChannelExperiment, lines: Lines, step: float) -> Array:
+    """M0 + sum over lines of tr(D P), D the information density."""
+    total = experiment.baseline_information.copy()
+    w = lines.frequencies / (step if experiment.model.continuous else 1.0)
+    for start in range(0, w.size, _LINES_AT_ONCE):
+        part = slice(start, start + _LINES_AT_ONCE)
+        density = experiment.information_density(w[part])
+        if experiment.inputs == 1:
+            density = density[..., None, None]
+        total += np.einsum("nklab,nba->kl", density, lines.powers[part], optimize=True).real
+    return total

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import RegressionPlant, Spec
@@ -15,13 +16,17 @@ from inputdesign_cli.tasks.build.channels import has_channels
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.loop_error_problem import build_problem
 from inputdesign_cli.tasks.build.regression_task import build_regression
+from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.channel_analysis import analyse_channels, build_channel_analysis
-from inputdesign_cli.tasks.channel_design import solve_channels
+from inputdesign_cli.tasks.channel_design import designed_channels, solve_channels
 from inputdesign_cli.tasks.design import solve_convex
 from inputdesign_cli.tasks.identification import identify as identify_record
 from inputdesign_cli.tasks.loop_error import solve_closed_loop_error
 from inputdesign_cli.tasks.regression import solve_regression
+from inputdesign_cli.tasks.result.signal_files import deviations
+from inputdesign_cli.tasks.simulation import Delivered
+from inputdesign_cli.tasks.simulation import simulate as simulate_experiment
 
 
 def solve(spec: Spec) -> Results:
@@ -46,6 +51,34 @@ def solve(spec: Spec) -> Results:
 
 def _designed(spec: Spec) -> Results:
     return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
+
+
+def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
+    """Design the experiment and try it on the true system: the outcome of `solve` with `simulation`.
+
+    Args:
+        executor: where the runs are computed, batch by batch (default: in this process); the result does
+            not depend on it.
+
+    Raises:
+        SpecError: what this version does not simulate, and all that `solve` raises.
+    """
+    try:
+        if isinstance(spec.plant, RegressionPlant):
+            from inputdesign_cli.monte_carlo.regression import simulate_regression
+
+            return simulate_regression(spec, executor=executor)
+        if spec.accuracy.closed_loop_error is not None and spec.designs:
+            from inputdesign_cli.monte_carlo.loop_error_study import simulate_closed_loop_error
+
+            return simulate_closed_loop_error(spec, executor=executor)
+        plan = build_simulation(spec)
+        results, generator = designed_channels(spec) if spec.designs else (analyse(spec), None)
+        table = results.tables.get("signal")
+        record = None if table is None else deviations(spec, table)
+        return simulate_experiment(plan, Delivered(results, record, generator), executor)
+    except IdesignError as error:
+        raise spec.place(error) from error
 
 
 def analyse(spec: Spec) -> Results:

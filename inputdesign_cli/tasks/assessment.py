@@ -93,8 +93,7 @@ def _evaluated(
 ) -> tuple[bool, list[dict[str, Any]]]:
     """Whether the information of the data meets what is asked, and each requirement with its worst ratio."""
     listed: list[dict[str, Any]] = []
-    for make in question.requirements():
-        requirement = make(question.experiment)
+    for requirement in question.requirements():
         violation = worst_violation(requirement, information)
         entry: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
         if violation.frequency is not None:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from inputdesign_cli.accuracy import EntryError, Requirement
-from inputdesign_cli.design.convex.problem import RequirementFactory
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification import identify as estimate_model
 from inputdesign_cli.information import ChannelExperiment
@@ -39,7 +38,7 @@ class ModelQuestion:
     alpha: float
     errors: Sequence[Requirement]
     entries: Sequence[EntryError]
-    requirements: Callable[[], list[RequirementFactory]]
+    requirements: Callable[[], list[Requirement]]
     top_up: Callable[[Array], Results] | None
 
 

@@ -12,14 +12,13 @@ from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, PowerKin
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     Lines,
-    blocks_of,
     channel_inputs,
     channel_outputs,
     channel_record_information,
-    grid_lines,
     in_phase_record,
     multisine_record,
 )
+from inputdesign_cli.signal.density_lines import density_lines
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
@@ -189,13 +188,7 @@ def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
 def given_lines(spec: Spec, excitation: ChannelExcitation, samples: int) -> Lines | None:
     """The sinusoids that stand for a given density; None for another excitation, or a record too short."""
     basis = excitation.basis
-    blocks = blocks_of(channel_phases(spec), spec.plant.inputs)
-    if not isinstance(basis, TabulatedChannels) or samples < _SHORTEST * blocks:
+    if not isinstance(basis, TabulatedChannels):
         return None
-    period, step = samples // blocks, record_step(spec)
-    w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
-    lines = grid_lines(basis.density(np.ones(1), w), period, step)
-    total = float(np.trace(lines.powers.sum(axis=0)).real)
-    if total == 0.0:  # the band lies between two lines of the record
-        return None
-    return lines.scaled(sum(excitation.power["excitation"]) / total)
+    powers = np.array(excitation.power["excitation"])
+    return density_lines(basis, powers, samples, record_step(spec), channel_phases(spec))

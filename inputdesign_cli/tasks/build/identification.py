@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import ChannelModel
@@ -61,7 +62,8 @@ def _question(spec: Spec, samples: int, design: Callable[[Spec], Results]) -> Mo
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
     """
-    experiment = replace(with_prior(spec, channel_experiment(spec)), samples=samples)
+    # Any: requirements ask for no more than both kinds of experiments have.
+    experiment: Any = replace(with_prior(spec, channel_experiment(spec)), samples=samples)
     errors = build_entry_errors(spec, experiment)
 
     def topped_up(information: Array) -> Results:
@@ -83,6 +85,6 @@ def _question(spec: Spec, samples: int, design: Callable[[Spec], Results]) -> Mo
         alpha=model_error_alpha(spec, experiment),
         errors=errors,
         entries=unstated_errors(spec, experiment),
-        requirements=lambda: channel_requirements(spec, experiment),
+        requirements=lambda: [make(experiment) for make in channel_requirements(spec, experiment)],
         top_up=topped_up if spec.designs else None,
     )

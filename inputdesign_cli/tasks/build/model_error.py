@@ -18,7 +18,7 @@ from inputdesign_cli.accuracy import (
 )
 from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import ChannelExperiment, Experiment
 from inputdesign_cli.plant import Loop, Rational
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
@@ -77,7 +77,7 @@ def no_feedback(spec: Spec, key: str) -> SpecError:
     )
 
 
-def model_error_alpha(spec: Spec, experiment: Experiment) -> float:
+def model_error_alpha(spec: Spec, experiment: Experiment | ChannelExperiment) -> float:
     """alpha as given, or from the confidence and the number of parameters of G."""
     error = spec.accuracy.model_error
     if error is not None and error.alpha is not None:
