@@ -45,6 +45,8 @@ def run_batches(
     Args:
         function: importable by name; it draws all that is random from `rng`, and does not change `job`.
         job: what all batches share; it can be pickled.
+        runs: how many in all; `size` of them are one batch.
+        seed: of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 
     Raises:
