@@ -21,7 +21,11 @@ class InformationTarget(OneCondition):
     """M >= `target` (k, k, symmetric), in the coordinates of the experiment."""
 
     target: Array
-    name: str = "information"
+    label: str = "information"
+
+    @property
+    def name(self) -> str:
+        return self.label
 
     def ratio(self, information: Array) -> float:
         """sqrt of the largest eigenvalue of the target relative to M."""

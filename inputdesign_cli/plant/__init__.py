@@ -1,6 +1,7 @@
 """Plants: G, H, their parameter gradients and the loop around them, at any frequencies."""
 
 from inputdesign_cli.plant.channel_loop import ChannelLoop as ChannelLoop
+from inputdesign_cli.plant.channel_loop import close_loop as close_loop
 from inputdesign_cli.plant.channel_model import ChannelModel as ChannelModel
 from inputdesign_cli.plant.channel_simulation import caused_by_inputs as caused_by_inputs
 from inputdesign_cli.plant.channel_simulation import caused_by_noise as caused_by_noise

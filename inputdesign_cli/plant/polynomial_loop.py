@@ -9,8 +9,9 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_loop import ChannelLoop
+from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
 from inputdesign_cli.plant.channels import PolynomialChannels
+from inputdesign_cli.plant.matrix_controller import MatrixController
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -99,3 +100,8 @@ class PolynomialLoop(ChannelLoop):
             for lag, block in enumerate(back[:t], start=1):
                 found[..., t, :] -= found[..., t - lag, :] @ block
         return found[..., : m.outputs], found[..., m.outputs :]
+
+
+@close_loop.register
+def _(model: PolynomialChannels, controller: MatrixController) -> PolynomialLoop:
+    return PolynomialLoop(model, controller)

@@ -1,4 +1,4 @@
-"""Hermitian spectra over frequency: prices per direction, and integrals against tables of functions."""
+"""Spectra over frequency: prices per direction of the channels, and integrals against tables of functions."""
 
 from __future__ import annotations
 
@@ -42,11 +42,15 @@ def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
     Returns:
         The ratios (n,) and unit directions (n, r).
     """
-    P, V = matrices(price), matrices(value)
-    r = P.shape[-1]
-    P = P + _SINGULAR * np.eye(r) * np.einsum("naa->na", P).real.max(axis=0, initial=0.0)
+    if price.ndim == 1:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quotient = value / price
+        # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
+        return np.where(price > 0, quotient, -np.inf), np.ones((price.size, 1), dtype=complex)
+    r = price.shape[-1]
+    P = price + _SINGULAR * np.eye(r) * np.einsum("naa->na", price).real.max(axis=0, initial=0.0)
     inverse = np.linalg.inv(np.linalg.cholesky(P))
-    ratios, vectors = np.linalg.eigh(inverse @ V @ inverse.conj().swapaxes(1, 2))
+    ratios, vectors = np.linalg.eigh(inverse @ value @ inverse.conj().swapaxes(1, 2))
     directions = (inverse.conj().swapaxes(1, 2) @ vectors[..., -1:])[..., 0]
     return ratios[:, -1], directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
