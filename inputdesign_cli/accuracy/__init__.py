@@ -6,7 +6,6 @@ from inputdesign_cli.accuracy.admissible import Relative as Relative
 from inputdesign_cli.accuracy.admissible import Sensitivity as Sensitivity
 from inputdesign_cli.accuracy.admissible import Table as Table
 from inputdesign_cli.accuracy.admissible import Weighted as Weighted
-from inputdesign_cli.accuracy.continuous_weight import ContinuousWeight as ContinuousWeight
 from inputdesign_cli.accuracy.criteria import Criterion as Criterion
 from inputdesign_cli.accuracy.cuts import Cut as Cut
 from inputdesign_cli.accuracy.cuts import CutBlock as CutBlock

@@ -13,8 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.accuracy.continuous_weight import ContinuousWeight, weight_singularities
-from inputdesign_cli.plant import ChannelLoop, ChannelModel, Rational
+from inputdesign_cli.plant import ChannelLoop, ChannelModel, ScalarTransfer
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _NOWHERE = np.zeros(0)
@@ -102,12 +101,12 @@ class Sensitivity:
     """
 
     loop: ChannelLoop
-    weight: Rational
+    weight: ScalarTransfer
     knots = _NOWHERE
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        return np.concatenate([self.loop.singularities, weight_singularities(self.weight)])
+        return np.concatenate([self.loop.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
         S, applied = self.loop.sensitivity(w)
@@ -120,7 +119,7 @@ class Weighted:
     """r_adm / |W|, so that |W| r_u stays below r_adm."""
 
     inner: AdmissibleError
-    weight: Rational | ContinuousWeight
+    weight: ScalarTransfer
 
     @property
     def knots(self) -> Array:
@@ -128,7 +127,7 @@ class Weighted:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        return np.concatenate([self.inner.singularities, weight_singularities(self.weight)])
+        return np.concatenate([self.inner.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
         return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)

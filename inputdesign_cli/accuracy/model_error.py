@@ -27,7 +27,7 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 @dataclass(frozen=True, kw_only=True)
 class OnModelError(OverFrequency):
-    """What requirements on a model error share: r_adm, the confidence factor alpha, and r_u to first order."""
+    """What requirements on a model error share: r_adm, the confidence factor alpha, r_u to first order."""
 
     admissible: AdmissibleError
     alpha: float

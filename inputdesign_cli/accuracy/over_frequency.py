@@ -55,7 +55,7 @@ class OverFrequency(Requirement):
         """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1."""
 
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """Real and imaginary parts of the gradient of the entry (n, 2, k), or of all entries (n, 2 p r, k)."""
+        """Real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k)."""
         gradient = self.experiment.plant_gradient(w)
         if self.entry is not None:
             return real_rows(gradient[:, :, self.entry[0], self.entry[1]])

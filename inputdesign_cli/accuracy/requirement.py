@@ -27,7 +27,7 @@ class Violation:
 
 
 class BoundedError(Protocol):
-    """A model error r_u(w) that is held below an admissible one, r_adm(w); see `Requirement.bounded_error`."""
+    """A model error r_u(w) that is held below an admissible one; see `Requirement.bounded_error`."""
 
     @property
     def entry(self) -> Entry | None:

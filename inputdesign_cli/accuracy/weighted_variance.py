@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.continuous_weight import ContinuousWeight, weight_singularities
 from inputdesign_cli.accuracy.cuts import Cut, MatrixCut, VarianceCut
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.plant import Rational
+from inputdesign_cli.plant import ScalarTransfer
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _REAL = 1e-12
@@ -27,7 +26,7 @@ class WeightedVariance(OverFrequency):
     With `relative` the variance is that of G relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
     """
 
-    weight: Rational | ContinuousWeight
+    weight: ScalarTransfer
     limit: float
     relative: bool = False
 
@@ -37,7 +36,7 @@ class WeightedVariance(OverFrequency):
 
     @property
     def own_singularities(self) -> ComplexArray:
-        return weight_singularities(self.weight)
+        return self.weight.singularities
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, 2, k): |W| / sqrt(max) times the real and imaginary parts of Lambda."""

@@ -136,7 +136,7 @@ class ChannelLoop(ABC):
 
 
 @singledispatch
-def close_loop(model: ChannelModel, controller: MatrixController) -> ChannelLoop:
+def close_loop(model: ChannelModel, controller: TransferMatrix) -> ChannelLoop:
     """The loop of a model under a controller; each kind of plant that has one registers its own.
 
     Raises:

@@ -195,7 +195,11 @@ class PolynomialChannels(Parametrised):
         noise = {
             (letter, i): (factor[:, None] * source[:, i])
             for i in range(self.outputs)
-            for letter, factor, source in (("a", -D[i] / C[i], y), ("c", 1.0 / C[i], e), ("d", -1.0 / D[i], e))
+            for letter, factor, source in (
+                ("a", -D[i] / C[i], y),
+                ("c", 1.0 / C[i], e),
+                ("d", -1.0 / D[i], e),
+            )
         }
         plant: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:

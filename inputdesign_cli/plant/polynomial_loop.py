@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
 from inputdesign_cli.plant.channels import PolynomialChannels
-from inputdesign_cli.plant.matrix_controller import MatrixController
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -21,6 +20,7 @@ from inputdesign_cli.plant.polynomial import (
     unit_circle,
 )
 from inputdesign_cli.plant.polynomial_matrix import at, stack
+from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
@@ -103,5 +103,5 @@ class PolynomialLoop(ChannelLoop):
 
 
 @close_loop.register
-def _(model: PolynomialChannels, controller: MatrixController) -> PolynomialLoop:
+def _(model: PolynomialChannels, controller: TransferMatrix) -> PolynomialLoop:
     return PolynomialLoop(model, controller)

@@ -10,9 +10,9 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
-from inputdesign_cli.plant.matrix_controller import MatrixController
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.sampled import SampledChannels
+from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
@@ -80,5 +80,5 @@ class SampledLoop(ChannelLoop):
 
 
 @close_loop.register
-def _(model: SampledChannels, controller: MatrixController) -> SampledLoop:
+def _(model: SampledChannels, controller: TransferMatrix) -> SampledLoop:
     return SampledLoop(model, controller)

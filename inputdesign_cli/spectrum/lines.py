@@ -131,9 +131,7 @@ class LinesBasis:
         best = np.argsort(-heights)[:_MOST_NEW]
         return Pricing(scale, np.column_stack([where[best], directions[best]]))
 
-    def enlarge(
-        self, face: Face, y: Array, directions: Array, price: Functional
-    ) -> tuple[LinesBasis, Face]:
+    def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
         """The atoms so far and the new ones; x of the old basis is the head of x of the new."""
         rows = [*directions, *self._around(y, directions)]
         fresh = [row for row in rows if self._is_new(float(row[0].real), row[1:])]

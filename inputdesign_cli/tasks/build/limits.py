@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from inputdesign_cli.accuracy.continuous_weight import weight_singularities
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.information import POWER_KINDS, ChannelExperiment
@@ -98,7 +97,7 @@ def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array]
         frequency, value = _table(spec, curve.table, key)
         return lambda w: np.interp(w, frequency, value), frequency, smooth
     W = build_weight(spec, curve, key)
-    return lambda w: np.abs(W.at(w)) ** 2, nowhere, weight_singularities(W)
+    return lambda w: np.abs(W.at(w)) ** 2, nowhere, W.singularities
 
 
 def _table(spec: Spec, name: str, key: str) -> tuple[Array, Array]:

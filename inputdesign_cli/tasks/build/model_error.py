@@ -97,9 +97,7 @@ def _on_entry(
     alpha = model_error_alpha(spec, experiment.model)
     made: OnModelError
     if error.region == "first_order":
-        made = ModelError(
-            experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha
-        )
+        made = ModelError(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
     else:
         _check_fraction(spec, experiment.model, entry)
         made = EllipsoidError(

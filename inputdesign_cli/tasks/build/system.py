@@ -13,13 +13,13 @@ from inputdesign_cli.plant import (
     ChannelLoop,
     ChannelModel,
     ContinuousChannels,
-    MatrixController,
     PolynomialChannels,
     SampledChannels,
+    TransferMatrix,
     close_loop,
 )
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import channel_record_information
+from inputdesign_cli.signal.channel_information import channel_record_information
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.experiment import NoiseShape
@@ -35,6 +35,7 @@ from inputdesign_cli.specification.models.transfer import DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.tasks.build.weights import rational
 
 _PRIOR = "experiment.prior.information"
 
@@ -108,9 +109,9 @@ def build_loop(model: ChannelModel, controller: DiscreteTransfer | ControllerMat
     """
     match controller:
         case ControllerMatrix():
-            C = MatrixController.build(controller.numerator_matrix, controller.denominator_matrix)
+            C = TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
         case _:
-            C = MatrixController.build([[controller.numerator]], [[controller.denominator_polynomial]])
+            C = TransferMatrix.diagonal(rational(controller), 1)
     loop = close_loop(model, C)
     loop.check_stability()
     return loop
@@ -214,9 +215,7 @@ def record_step(spec: Spec) -> float:
     return spec.sample_time
 
 
-def embedded(
-    spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str
-) -> Array:
+def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
     """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
 
     Raises:

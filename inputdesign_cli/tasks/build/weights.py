@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ContinuousWeight
-from inputdesign_cli.plant import Rational, zero_order_hold
+from inputdesign_cli.plant import ContinuousRational, Rational, ScalarTransfer, zero_order_hold
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
 
@@ -17,7 +16,7 @@ def rational(transfer: DiscreteTransfer) -> Rational:
 
 def build_weight(
     spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer | None, key: str
-) -> Rational | ContinuousWeight:
+) -> ScalarTransfer:
     """A weight of the spec, one where none is given.
 
     Raises:
@@ -38,7 +37,7 @@ def build_weight(
             )
         case ContinuousTransfer() if not spec.plant.sampled:
             ratio = transfer.continuous
-            return ContinuousWeight(np.array(ratio.numerator), np.array(ratio.denominator_polynomial))
+            return ContinuousRational(np.array(ratio.numerator), np.array(ratio.denominator_polynomial))
         case ContinuousTransfer() if transfer.sample is None:
             raise spec.complain(
                 "not-sampled",
