@@ -13,7 +13,8 @@ from inputdesign_cli.accuracy import Requirement, worst
 from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results, SpectrumCurves, Table
-from inputdesign_cli.signal import Record, input_and_output, record_information
+from inputdesign_cli.signal import DesignedSpectrum, Record
+from inputdesign_cli.signal.single import as_channels, input_and_output, record_information
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
@@ -26,8 +27,10 @@ from inputdesign_cli.spectrum import FirBasis, LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.experiment import read_excitation_record
 from inputdesign_cli.tasks.build.given_limits import broken_limits, check_given_limits
 from inputdesign_cli.tasks.build.given_table import bad_table, read_spectrum_table
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.task import Task, build_analysis
-from inputdesign_cli.tasks.record import given_record, signal_entry, worst_ratio
+from inputdesign_cli.tasks.record import RecordRequest, given_record, worst_ratio
 from inputdesign_cli.tasks.result.curves import (
     axis,
     bound_curves,
@@ -36,7 +39,7 @@ from inputdesign_cli.tasks.result.curves import (
 )
 from inputdesign_cli.tasks.result.ellipses import experiment_ellipses
 from inputdesign_cli.tasks.result.result import information_entry, requirements_entry
-from inputdesign_cli.tasks.result.signal_files import other_files, signal_curves
+from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 
 _TOO_FAINT = 1e-13
 
@@ -93,13 +96,13 @@ def analyse_given(spec: Spec) -> Results:
     drawn = _spectrum(spec, excitation, level)
     if drawn is not None:
         tables["spectrum"], curves["spectrum"] = drawn
-    record = _record(spec, experiment, excitation, worst_ratio(requirements))
+    request, units = build_record_request(spec), build_units(spec)
+    record = _record(request, experiment, excitation, worst_ratio(requirements))
     files: dict[str, bytes] = {}
     if record is not None:
-        result["signal"] = signal_entry(spec, experiment, record, requirements)
-        given = record.method == "given"
-        tables["signal"], curves["signal"] = signal_curves(spec, record.samples, given=given)
-        files = other_files(spec, record.samples, given=given)
+        result["signal"] = signal_entry(request, units, as_channels(experiment), record, requirements)
+        tables["signal"], curves["signal"] = signal_curves(request, units, record)
+        files = other_files(request, units, record)
     notes = broken_limits(spec, experiment.samples, excitation.power, result.get("signal", {}))
     if notes:
         result["notes"] = notes
@@ -227,11 +230,12 @@ def _spectrum(spec: Spec, excitation: Excitation, white: float) -> tuple[Table, 
 
 
 def _record(
-    spec: Spec, experiment: Experiment, excitation: Excitation, ratio: Callable[[Array], float]
+    request: RecordRequest, experiment: Experiment, excitation: Excitation, ratio: Callable[[Array], float]
 ) -> Record | None:
     """The signal as given, or one record of the given spectrum (a table gives none)."""
     if excitation.samples is not None:
-        return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
+        return Record(excitation.samples[:, None], "given", ratio(excitation.information(experiment)))
     if not isinstance(excitation.basis, FirBasis | LinesBasis) or excitation.x is None:
         return None
-    return given_record(spec, experiment, excitation.basis, excitation.x, ratio)
+    spectrum = DesignedSpectrum.of(excitation.basis, excitation.x)
+    return given_record(request, as_channels(experiment), spectrum, ratio)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.design.convex.designs import Question
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.signal import channel_record_information
+from inputdesign_cli.signal import Record
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import DirectedLines, FlatBasis, TabulatedChannels
 from inputdesign_cli.tasks.analysis import check_excites, given_result
@@ -24,22 +24,23 @@ from inputdesign_cli.tasks.build.channel_given import (
 )
 from inputdesign_cli.tasks.build.channel_requirements import unstated_errors
 from inputdesign_cli.tasks.build.channel_task import (
-    channel_cost,
     channel_requirements,
     check_channels_supported,
     check_given_signal,
     with_prior,
 )
 from inputdesign_cli.tasks.build.channels import (
+    build_cost,
     channel_experiment,
     frequency_unit,
     record_step,
 )
 from inputdesign_cli.tasks.build.given_limits import broken_limits, check_given_limits
+from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import model_error_alpha
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.task import Task
-from inputdesign_cli.tasks.channel_record import record_sizes
-from inputdesign_cli.tasks.record import applied_entry, worst_ratio
+from inputdesign_cli.tasks.record import worst_ratio
 from inputdesign_cli.tasks.result.channel_curves import (
     bound_curves_of,
     density_curves,
@@ -48,7 +49,7 @@ from inputdesign_cli.tasks.result.channel_curves import (
     plain_complex,
 )
 from inputdesign_cli.tasks.result.ellipses import check_pairs, experiment_ellipses
-from inputdesign_cli.tasks.result.signal_files import other_files, signal_curves
+from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 
 
 def build_channel_analysis(spec: Spec) -> Task:
@@ -67,7 +68,7 @@ def build_channel_analysis(spec: Spec) -> Task:
     experiment.whitened(1.0)  # says which parameters cannot be told apart
     check_pairs(spec, model.names)
     question = Question(experiment, FlatBasis(model.inputs, band), "cost", requirements)
-    return Task(question, experiment, channel_cost(spec), model_error_alpha(spec, experiment), None)  # type: ignore[arg-type]
+    return Task(question, experiment, build_cost(spec), model_error_alpha(spec, experiment), None)  # type: ignore[arg-type]
 
 
 def analyse_channels(spec: Spec) -> Results:
@@ -88,8 +89,8 @@ def analyse_channels(spec: Spec) -> Results:
     information = excitation.information(experiment)
     check_excites(spec, experiment, information)
     requirements = tuple(make(experiment) for make in task.question.requirements)
-    cost, white = excitation.cost(channel_cost(spec)), _even(raw, 1.0)
-    level = cost / white.cost(channel_cost(spec))
+    cost, white = excitation.cost(build_cost(spec)), _even(raw, 1.0)
+    level = cost / white.cost(build_cost(spec))
     flat = _even(raw, level).information(experiment)
     result = given_result(spec, task, experiment, information, requirements)
     result |= {"cost": cost, "power": excitation.power, "spectrum": _entry(spec, excitation)}
@@ -109,16 +110,14 @@ def analyse_channels(spec: Spec) -> Results:
         curves["ellipses"] = ellipses
     samples, files = channel_samples(spec, excitation), {}
     if samples is not None:
-        given = excitation.samples is not None
-        result["signal"] = {"type": "given" if given else "multisine"}
-        result["signal"] |= record_sizes(spec, experiment, samples) | applied_entry(
-            spec, samples, given=given
+        request, units = build_record_request(spec), build_units(spec)
+        reached = FiniteRecord(experiment, len(samples), record_step(spec)).information(samples)
+        record = Record(
+            samples, "multisine" if excitation.samples is None else "given", _ratio(requirements, reached)
         )
-        if requirements:
-            reached = channel_record_information(experiment, samples, record_step(spec))
-            result["signal"]["worst_ratio"] = _ratio(requirements, reached)
-        tables["signal"], curves["signal"] = signal_curves(spec, samples, given=given)
-        files = other_files(spec, samples, given=given)
+        result["signal"] = signal_entry(request, units, experiment, record, requirements)
+        tables["signal"], curves["signal"] = signal_curves(request, units, record)
+        files = other_files(request, units, record)
     notes = broken_limits(spec, experiment.samples, excitation.power, result.get("signal", {}))
     if notes:
         result["notes"] = notes
@@ -137,12 +136,12 @@ def _x(excitation: ChannelExcitation) -> Array:
     return excitation.x
 
 
-def _ratio(requirements: tuple[Any, ...], information: Array) -> float | None:
-    """The worst ratio of a record; None when it is too short to excite every parameter."""
+def _ratio(requirements: tuple[Any, ...], information: Array) -> float:
+    """The worst ratio of a record; infinite when it is too short to excite every parameter."""
     try:
         return worst_ratio(requirements)(information)
     except np.linalg.LinAlgError:
-        return None
+        return np.inf
 
 
 def _entry(spec: Spec, excitation: ChannelExcitation) -> dict[str, Any]:

@@ -9,21 +9,18 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.signal import ChannelSignalGenerator, Record, channel_record_information
+from inputdesign_cli.signal import Record, SignalGenerator
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import DirectedLines, LinesBasis
 from inputdesign_cli.tasks.build.channel_task import build_channel_task
 from inputdesign_cli.tasks.build.channels import record_step
-from inputdesign_cli.tasks.channel_record import (
-    channel_generator,
-    channel_signal_entry,
-    make_channel_record,
-)
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.design import by_exchange, check_length, plain_errors
 from inputdesign_cli.tasks.factor_columns import restrict_columns
-from inputdesign_cli.tasks.record import record_notes
+from inputdesign_cli.tasks.record import designed_spectrum, make_record, record_notes, redrawn
 from inputdesign_cli.tasks.result.channel_curves import (
     bound_curves_of,
     channel_optimality_curves,
@@ -33,7 +30,7 @@ from inputdesign_cli.tasks.result.channel_curves import (
 )
 from inputdesign_cli.tasks.result.ellipses import experiment_ellipses
 from inputdesign_cli.tasks.result.result import design_result, experiment_of
-from inputdesign_cli.tasks.result.signal_files import other_files, signal_curves
+from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 
 
 def solve_channels(spec: Spec) -> Results:
@@ -41,8 +38,8 @@ def solve_channels(spec: Spec) -> Results:
     return designed_channels(spec)[0]
 
 
-def designed_channels(spec: Spec) -> tuple[Results, ChannelSignalGenerator | None]:
-    """The same, and what draws other records of the spectrum, if there is one; see `channel_generator`.
+def designed_channels(spec: Spec) -> tuple[Results, SignalGenerator | None]:
+    """The same, and what draws other records of the spectrum, if there is one; see `redrawn`.
 
     Raises:
         SpecError, DataError: the spec cannot be used.
@@ -66,22 +63,31 @@ def designed_channels(spec: Spec) -> tuple[Results, ChannelSignalGenerator | Non
     assert isinstance(experiment, ChannelExperiment)
     tables: dict[str, Any] = {}
     curves: dict[str, Any] = {}
-    record = make_channel_record(spec, design, experiment)
+    request, units = build_record_request(spec), build_units(spec)
+    record = make_record(request, design, experiment)
     _illustrate(spec, design, experiment, record, tables, curves)
     files: dict[str, bytes] = {}
     if record is not None:
-        result["signal"] = channel_signal_entry(spec, design, experiment, record)
-        tables["signal"], curves["signal"] = signal_curves(spec, record.samples)
+        result["signal"] = signal_entry(
+            request,
+            units,
+            experiment,
+            record,
+            design.problem.requirements,
+            designed=design.result.information,
+            spectrum=designed_spectrum(request, design, experiment.inputs),
+        )
+        tables["signal"], curves["signal"] = signal_curves(request, units, record)
         tables["spectrum"], curves["spectrum"] = with_channel_periodograms(
             tables["spectrum"], curves["spectrum"], spec, record.samples
         )
-        files = other_files(spec, record.samples)
-        notes = record_notes(spec, experiment.samples, record)
+        files = other_files(request, units, record)
+        notes = record_notes(request, experiment.samples, record)
         if notes:
             result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
-    redrawn = None if record is None else channel_generator(spec, design, len(record.samples))
-    return Results(result, spec.to_yaml(), spec.time_unit, tables, curves, files), redrawn
+    other = None if record is None else redrawn(request, design, record)
+    return Results(result, spec.to_yaml(), spec.time_unit, tables, curves, files), other
 
 
 def _illustrate(
@@ -102,7 +108,8 @@ def _illustrate(
     white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
     known = None
     if record is not None and np.isfinite(record.worst_ratio):
-        known = channel_record_information(experiment, record.samples, record_step(spec))
+        plant = FiniteRecord(experiment, len(record.samples), record_step(spec))
+        known = plant.information(record.samples)
     bound = bound_curves_of(
         spec, (*problem.requirements, *problem.side), found.information, white, record=known
     )

@@ -16,10 +16,13 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.runs.results import Results
+from inputdesign_cli.signal.single import as_channels
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from inputdesign_cli.spectrum import FirBasis
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.task import Task, build_task, lines_of_the_grid
-from inputdesign_cli.tasks.record import make_record, record_notes, signal_entry
+from inputdesign_cli.tasks.record import designed_spectrum, make_record, record_notes
 from inputdesign_cli.tasks.result.curves import (
     bound_curves,
     optimality_curves,
@@ -27,13 +30,9 @@ from inputdesign_cli.tasks.result.curves import (
 )
 from inputdesign_cli.tasks.result.ellipses import experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
+from inputdesign_cli.tasks.result.periodogram import with_periodogram, with_record
 from inputdesign_cli.tasks.result.result import design_result, experiment_of
-from inputdesign_cli.tasks.result.signal_files import (
-    other_files,
-    signal_curves,
-    with_periodogram,
-    with_record,
-)
+from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
@@ -58,14 +57,19 @@ def solve_convex(spec: Spec) -> Results:
     check_length(spec, result)
     solved = time.perf_counter()
     experiment = experiment_of(task, design)
-    record = make_record(spec, task, design, experiment)
+    request, units, channel = build_record_request(spec), build_units(spec), as_channels(experiment)
+    record = make_record(request, design, channel)
     if record is not None:
-        basis = design.result.basis
-        assert isinstance(basis, FirBasis | LinesBasis)
         result["signal"] = signal_entry(
-            spec, experiment, record, design.problem.requirements, (basis, design.result.x)
+            request,
+            units,
+            channel,
+            record,
+            design.problem.requirements,
+            designed=design.result.information,
+            spectrum=designed_spectrum(request, design, 1),
         )
-        notes = record_notes(spec, experiment.samples, record)
+        notes = record_notes(request, experiment.samples, record)
         if notes:
             result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
@@ -92,12 +96,12 @@ def solve_convex(spec: Spec) -> Results:
         if optimality is not None:
             curves["optimality"] = optimality
     if record is not None:
-        tables["signal"], curves["signal"] = signal_curves(spec, record.samples)
+        tables["signal"], curves["signal"] = signal_curves(request, units, record)
         tables["spectrum"], curves["spectrum"] = with_periodogram(
-            tables["spectrum"], curves["spectrum"], spec, record.samples
+            tables["spectrum"], curves["spectrum"], spec, record.samples[:, 0]
         )
-        curves["bound"] = with_record(curves["bound"], spec, experiment, task.alpha, record.samples)
-    files = {} if record is None else other_files(spec, record.samples)
+        curves["bound"] = with_record(curves["bound"], spec, experiment, task.alpha, record.samples[:, 0])
+    files = {} if record is None else other_files(request, units, record)
     return Results(result, spec.to_yaml(), spec.time_unit, tables, curves, files)
 
 

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.design.convex.problem import Weight, weights_of
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, PowerKind
+from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     Lines,
+    LineVectors,
     blocks_of,
-    channel_inputs,
-    channel_outputs,
-    channel_record_information,
     grid_lines,
     in_phase_record,
     multisine_record,
@@ -33,7 +31,6 @@ from inputdesign_cli.spectrum import DirectedLines, TabulatedChannels
 from inputdesign_cli.tasks.build.channels import excitation_symbol, frequency_unit, record_step
 from inputdesign_cli.tasks.build.given_table import bad_table, read_spectrum_table
 from inputdesign_cli.tasks.build.tables import read_columns
-from inputdesign_cli.tasks.channel_record import channel_phases
 
 _SHORTEST = 8  # samples a period
 _NEGATIVE = -1e-9
@@ -133,13 +130,11 @@ def _recorded(spec: Spec, experiment: ChannelExperiment, given: GivenSignal) -> 
     path, step = spec.resolve_path(given.signal), record_step(spec)
     columns = read_columns(path, {name: name for name in names}, key="spectrum.given.signal")
     samples = np.stack([columns[name] for name in names], axis=1)
-    r = np.mean(samples**2, axis=0).tolist()
-    u = np.mean(channel_inputs(experiment, samples, step) ** 2, axis=0).tolist()
-    y = np.mean(channel_outputs(experiment, samples, step) ** 2, axis=0).tolist()
+    plant = FiniteRecord(experiment, len(samples), step)
     return ChannelExcitation(
         "signal",
-        {"input": u, "output": y, "excitation": r},
-        lambda coordinates: channel_record_information(coordinates, samples, step),
+        {kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS},
+        lambda coordinates: FiniteRecord(coordinates, len(samples), step).information(samples),
         samples=samples,
     )
 
@@ -169,6 +164,11 @@ def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedChannels:
     return TabulatedChannels(np.minimum(frequency, np.pi) if spec.plant.sampled else frequency, phi)
 
 
+def line_vectors(spec: Spec) -> LineVectors:
+    """How the vectors of a multisine are chosen over the inputs."""
+    return "random" if spec.signal.phases == "random" else "orthogonal"
+
+
 def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
     """The record as given, or one of the given spectrum (n, r); None for a record too short."""
     if excitation.samples is not None:
@@ -183,13 +183,13 @@ def channel_samples(spec: Spec, excitation: ChannelExcitation) -> Array | None:
         frequencies, amplitudes = given_sinusoids(spec, spec.spectrum.given)
         return in_phase_record(frequencies * step, amplitudes, samples, rng)
     lines = given_lines(spec, excitation, samples)
-    return None if lines is None else multisine_record(lines, samples, rng, channel_phases(spec))
+    return None if lines is None else multisine_record(lines, samples, rng, line_vectors(spec))
 
 
 def given_lines(spec: Spec, excitation: ChannelExcitation, samples: int) -> Lines | None:
     """The sinusoids that stand for a given density; None for another excitation, or a record too short."""
     basis = excitation.basis
-    blocks = blocks_of(channel_phases(spec), spec.plant.inputs)
+    blocks = blocks_of(line_vectors(spec), spec.plant.inputs)
     if not isinstance(basis, TabulatedChannels) or samples < _SHORTEST * blocks:
         return None
     period, step = samples // blocks, record_step(spec)

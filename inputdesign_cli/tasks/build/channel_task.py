@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.design.convex.designs import Question
-from inputdesign_cli.design.convex.problem import Goal, RequirementFactory, Weight
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.design.convex.problem import Goal, RequirementFactory
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import channel_record_information
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, PolynomialSpectrum
 from inputdesign_cli.spectrum import PolynomialBasis
 from inputdesign_cli.tasks.build.channel_requirements import build_entry_errors, build_entry_variances
 from inputdesign_cli.tasks.build.channels import (
+    build_cost,
     channel_experiment,
     excitation_symbol,
     record_step,
@@ -57,7 +57,7 @@ def build_channel_task(spec: Spec) -> Task:
     basis = spectrum_basis(spec, experiment.inputs, band)
     _check_columns(spec, basis)
     check_has_density(spec, basis)
-    cost = channel_cost(spec)
+    cost = build_cost(spec)
     question = Question(
         experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
         basis=basis,
@@ -121,19 +121,9 @@ def channel_prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
             spec.resolve_path(prior.information), {name: name for name in channels}, key=key
         )
         record = np.stack([columns[name] for name in channels], axis=1)
-        return channel_record_information(replace(experiment, samples=len(record)), record, step)
+        return FiniteRecord(replace(experiment, samples=len(record)), len(record), step).information(record)
     matrix = np.array(prior.information, dtype=float)
     return embedded(spec, experiment.model.names, matrix, prior.parameters, key)
-
-
-def channel_cost(spec: Spec) -> dict[PowerKind, Weight]:
-    """Weights of the powers: of the sum over the channels, or one a channel."""
-    weights: dict[PowerKind, Weight] = {
-        "input": spec.cost.input_power,
-        "output": spec.cost.output_power,
-        "excitation": spec.cost.excitation_power,
-    }
-    return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
 
 
 # Keys of signals that mean something for a record that the tool makes.

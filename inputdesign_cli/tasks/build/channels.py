@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.information import ChannelExperiment, PowerKind
 from inputdesign_cli.plant import (
     ChannelLoop,
     ChannelModel,
@@ -236,6 +237,16 @@ def stable_loop(model: ChannelModel, controller: DiscreteTransfer | ControllerMa
         loop = PolynomialLoop(model, C)
     loop.check_stability()
     return loop
+
+
+def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
+    """Weights of the powers: of the sum over the channels, or one a channel."""
+    weights: dict[PowerKind, Weight] = {
+        "input": spec.cost.input_power,
+        "output": spec.cost.output_power,
+        "excitation": spec.cost.excitation_power,
+    }
+    return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
 
 
 def frequency_unit(spec: Spec) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import Loop, PolynomialModel, Rational, zero_order_hold
-from inputdesign_cli.signal import record_information
+from inputdesign_cli.signal.single import record_information
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.plant import PolynomialPlant

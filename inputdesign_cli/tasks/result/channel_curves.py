@@ -33,7 +33,7 @@ from inputdesign_cli.spectrum import (
 )
 from inputdesign_cli.tasks.build.channels import excitation_band, excitation_symbol, frequency_unit
 from inputdesign_cli.tasks.result.curves import distinct, frequency_header
-from inputdesign_cli.tasks.result.signal_files import smoothed_periodogram, with_periodogram
+from inputdesign_cli.tasks.result.periodogram import smoothed_periodogram, with_periodogram
 
 _POINTS = 1000
 _CARRIES = 1e-9
