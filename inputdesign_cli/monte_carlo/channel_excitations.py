@@ -7,15 +7,14 @@ from typing import Protocol
 
 import numpy as np
 
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
-    ChannelPhases,
-    ChannelSignalGenerator,
     Lines,
+    LineVectors,
+    SignalGenerator,
     SignalSettings,
-    channel_record_information,
     in_phase_record,
     multisine_record,
 )
@@ -51,7 +50,7 @@ class Recorded:
         return np.broadcast_to(self.record, (runs, *self.record.shape))
 
     def information(self, experiment: ChannelExperiment) -> Array:
-        return channel_record_information(experiment, self.record, self.step)
+        return FiniteRecord(experiment, len(self.record), self.step).information(self.record)
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Multisine:
 
     name: str
     lines: Lines
-    phases: ChannelPhases
+    phases: LineVectors
     step: float
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
@@ -76,17 +75,17 @@ class Drawn:
     """Records of the designed spectrum, drawn anew in each run and scaled to its power exactly."""
 
     name: str
-    drawer: ChannelSignalGenerator
+    drawer: SignalGenerator
     power: float
     step: float
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
         values = np.stack([self.drawer.values(rng) for _ in range(runs)])
-        return _scaled(np.repeat(values, self.drawer.recipe.hold, axis=1), self.power)
+        return _scaled(np.repeat(values, self.drawer.settings.hold, axis=1), self.power)
 
     def information(self, experiment: ChannelExperiment) -> Array:
-        single = self.drawer.recipe.block == 1
-        lines = self.drawer.lines if single else self.drawer.design(self.drawer.samples, 1)
+        single = self.drawer.settings.block == 1
+        lines = self.drawer.lines if single else self.drawer.spectrum.lines(self.drawer.samples)
         total = float(np.trace(lines.powers.sum(axis=0)).real)
         return _line_information(experiment, lines.scaled(self.power / total), self.step)
 

@@ -14,17 +14,21 @@ from inputdesign_cli.monte_carlo.channel_excitations import (
     Recorded,
 )
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.signal import ChannelSignalGenerator, SignalSettings
+from inputdesign_cli.signal import SignalGenerator, SignalSettings
 from inputdesign_cli.signal.settings import Method
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.specification.models.spectrum import GivenMultisine, GivenSpectrum
 from inputdesign_cli.spectrum import TabulatedChannels
-from inputdesign_cli.tasks.build.channel_given import given_lines, given_sinusoids, read_channel_excitation
+from inputdesign_cli.tasks.build.channel_given import (
+    given_lines,
+    given_sinusoids,
+    line_vectors,
+    read_channel_excitation,
+)
 from inputdesign_cli.tasks.build.channel_given import spectral as spectral_excitation
 from inputdesign_cli.tasks.build.channels import record_step
-from inputdesign_cli.tasks.channel_record import channel_phases
-from inputdesign_cli.tasks.result.signal_files import deviations
+from inputdesign_cli.tasks.build.signal_settings import deviations
 
 # Inputs to compare with have a flat spectrum; white noise is Gaussian.
 _METHODS: dict[str, Method] = {"white": "filtered_noise", "prbs": "prbs", "binary": "binary"}
@@ -35,7 +39,7 @@ def study_excitations(
     study: Simulation,
     experiment: ChannelExperiment,
     outcome: Results,
-    drawer: ChannelSignalGenerator | None,
+    drawer: SignalGenerator | None,
 ) -> list[ChannelExcitation]:
     """The design, what `compare` names at equal power, and white noise of the power that it would need.
 
@@ -81,7 +85,7 @@ def _redrawn(spec: Spec, experiment: ChannelExperiment, record: Recorded) -> Cha
         return InPhase("design", frequencies * record.step, amplitudes, record.step)
     excitation = read_channel_excitation(spec, experiment)
     found = given_lines(spec, excitation, len(record.record))
-    return None if found is None else Multisine("design", found, channel_phases(spec), record.step)
+    return None if found is None else Multisine("design", found, line_vectors(spec), record.step)
 
 
 def _flat(
@@ -108,4 +112,4 @@ def _flat(
     basis = TabulatedChannels.white(powers, experiment.band)
     lines = given_lines(spec, spectral_excitation("white", basis, np.ones(1), experiment), samples)
     assert lines is not None
-    return Multisine(name, lines, channel_phases(spec), record_step(spec))
+    return Multisine(name, lines, line_vectors(spec), record_step(spec))

@@ -28,8 +28,8 @@ from inputdesign_cli.runs.results import BoundCurves, Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.tasks.build.channel_requirements import build_entry_errors, unstated_errors
-from inputdesign_cli.tasks.build.channel_task import channel_cost, with_prior
-from inputdesign_cli.tasks.build.channels import channel_experiment, frequency_unit, record_step
+from inputdesign_cli.tasks.build.channel_task import with_prior
+from inputdesign_cli.tasks.build.channels import build_cost, channel_experiment, frequency_unit, record_step
 from inputdesign_cli.tasks.build.model_error import model_error_alpha
 from inputdesign_cli.tasks.build.true_system import true_channel_experiment
 from inputdesign_cli.tasks.channel_analysis import analyse_channels
@@ -75,7 +75,7 @@ def simulate_channels(spec: Spec, *, executor: Executor | None = None) -> Result
         excitations=excitations,
         promise=_promise(spec, nominal, outcome, excitations[0].information(nominal)),
         tried=tried,
-        cost=channel_cost(spec),
+        cost=build_cost(spec),
         variance=true.model.covariance,
         loop=None if true.loop is None else _response(true.loop),
     )

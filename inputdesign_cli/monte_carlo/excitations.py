@@ -8,8 +8,8 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import SignalSettings, record_information
-from inputdesign_cli.signal.generator import SignalGenerator
+from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings
+from inputdesign_cli.signal.single import record_information
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 
@@ -27,9 +27,9 @@ class Excitation:
         """(runs, samples): records, each scaled to the power of the spectrum exactly."""
         if self.record is not None:
             return np.broadcast_to(self.record, (runs, self.record.size))
-        drawer = SignalGenerator(self.basis, self.x, self.recipe, samples)
-        rows = np.stack([np.repeat(drawer.values(rng), self.recipe.hold) for _ in range(runs)])
-        return rows * np.sqrt(drawer.total / np.mean(rows**2, axis=1, keepdims=True))
+        generator = SignalGenerator(DesignedSpectrum.of(self.basis, self.x), self.recipe, samples)
+        rows = np.stack([np.repeat(generator.values(rng)[:, 0], self.recipe.hold) for _ in range(runs)])
+        return rows * np.sqrt(generator.spectrum.power / np.mean(rows**2, axis=1, keepdims=True))
 
     def information(self, experiment: Experiment) -> Array:
         """(k, k) in raw parameters: what this excitation tells in theory, prior information included."""

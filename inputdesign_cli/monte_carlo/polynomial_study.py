@@ -24,16 +24,16 @@ from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.monte_carlo.trials import PolynomialTrials, TrialJob, joined, run_job
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.signal import SignalSettings, input_and_output
+from inputdesign_cli.signal import SignalSettings
 from inputdesign_cli.signal.settings import Method
+from inputdesign_cli.signal.single import input_and_output
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 from inputdesign_cli.tasks import solve
 from inputdesign_cli.tasks.build.experiment import build_cost, build_experiment
-from inputdesign_cli.tasks.build.signal_settings import build_signal_settings
+from inputdesign_cli.tasks.build.signal_settings import build_signal_settings, deviations
 from inputdesign_cli.tasks.build.true_system import true_experiment
-from inputdesign_cli.tasks.result.signal_files import deviations
 
 # Inputs to compare with have a flat spectrum; white noise is Gaussian.
 _METHODS: dict[str, Method] = {

@@ -25,7 +25,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.evaluation import PredictedError, Trials
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import input_and_output
+from inputdesign_cli.signal.single import input_and_output
 
 AnyTrials = TypeVar("AnyTrials", bound=Trials)
 # Complex numbers of frequency responses held at a time.

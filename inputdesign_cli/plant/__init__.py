@@ -24,5 +24,4 @@ from inputdesign_cli.plant.sampling import zero_order_hold as zero_order_hold
 from inputdesign_cli.plant.transfer import ContinuousRational as ContinuousRational
 from inputdesign_cli.plant.transfer import Rational as Rational
 from inputdesign_cli.plant.transfer import ScalarTransfer as ScalarTransfer
-from inputdesign_cli.plant.transfer import TransferMatrix as MatrixController
 from inputdesign_cli.plant.transfer import TransferMatrix as TransferMatrix

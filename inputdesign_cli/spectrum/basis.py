@@ -131,6 +131,10 @@ class Basis(Protocol):
         """The family for channels of these units (r,); only where that changes where a design begins."""
         ...
 
+    def moving_average(self, x: Array) -> Array | None:
+        """c_0 .. c_m of one input, where a moving average has this spectrum; else None."""
+        ...
+
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
         ...
@@ -186,6 +190,10 @@ class DensityFamily:
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
         """None: there are no sinusoids."""
         return np.zeros(0), np.zeros((0, self.inputs, self.inputs), dtype=complex)
+
+    def moving_average(self, x: Array) -> Array | None:
+        """None: no finite one."""
+        return None
 
     def in_units(self, units: Array) -> Self:
         """Itself: units do not matter."""

@@ -1,4 +1,4 @@
-"""FIR spectra of one input: Phi(w) = c_0 + 2 sum_{r=1..m} c_r cos(r w), the c_r autocovariances of the excitation.
+"""FIR spectra of one input: Phi(w) = c_0 + 2 sum_{t=1..m} c_t cos(t w), c_t the autocovariances.
 
 [bombois-least-costly], (14); m = 0 is white noise. The fast path of `matrix_fir` for one input.
 """
@@ -52,6 +52,10 @@ class FirBasis(DensityFamily):
         flat = np.zeros(self.size)
         flat[0] = powers[0]
         return flat
+
+    def moving_average(self, x: Array) -> Array | None:
+        """The autocovariances themselves."""
+        return x
 
     def functions(self, w: ArrayLike) -> Array:
         """(n, m + 1): the basis functions 1, 2 cos w, .., 2 cos m w."""

@@ -28,6 +28,10 @@ class FlatBasis(DensityFamily):
         """(1,): their sum; what a channel has alone is not of this family."""
         return np.array([np.sum(powers)])
 
+    def moving_average(self, x: Array) -> Array | None:
+        """White noise of one input over the whole circle; otherwise there is none."""
+        return x if self.inputs == 1 and self.band == (0.0, np.pi) else None
+
     @property
     def level(self) -> float:
         """Each diagonal entry of Phi at power one."""

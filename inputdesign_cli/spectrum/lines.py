@@ -183,6 +183,10 @@ class LinesBasis:
         size = np.linalg.norm(one, axis=1) * np.linalg.norm(other)
         return np.abs(one.conj() @ other / size) ** 2
 
+    def moving_average(self, x: Array) -> Array | None:
+        """None: sinusoids have no density."""
+        return None
+
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
         """Frequencies (number,) with power, ascending, and their power matrices (number, r, r)."""
         w, inverse = np.unique(self.frequencies, return_inverse=True)

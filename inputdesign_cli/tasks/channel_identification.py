@@ -14,6 +14,7 @@ import numpy as np
 from inputdesign_cli.accuracy import worst_violation
 from inputdesign_cli.design.convex.problem import RequirementFactory
 from inputdesign_cli.identification import ChannelEstimate
+from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.runs.results import (
     BoundCurves,
@@ -23,7 +24,6 @@ from inputdesign_cli.runs.results import (
     Results,
     Table,
 )
-from inputdesign_cli.signal import channel_outputs
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.channel_requirements import build_entry_errors, unstated_errors
 from inputdesign_cli.tasks.build.channel_task import channel_requirements, with_prior
@@ -139,7 +139,8 @@ def _data_curves(spec: Spec, found: ChannelIdentified) -> tuple[dict[str, Table]
     predicted = y - estimate.errors
     stable = [fit is not None for fit in estimate.fit]
     open_loop = replace(found.experiment, loop=None)
-    simulated = channel_outputs(open_loop, u, record_step(spec)) if any(stable) else None
+    plant = FiniteRecord(open_loop, len(u), record_step(spec))
+    simulated = plant.signals("output", u) if any(stable) else None
     columns = {f"time_{spec.time_unit}": instants, **_columns("u{}", u), **_columns("y{}", y)}
     columns |= _columns("y{}_predicted", predicted)
     outputs = []

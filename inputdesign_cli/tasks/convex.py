@@ -1,9 +1,9 @@
-"""Convex designs: the least cost, the best accuracy or the shortest experiment, with proof, signal and curves."""
+"""Convex designs: least cost, best accuracy, shortest experiment, with proof, signal and curves."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -16,16 +16,26 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Results, Table
 from inputdesign_cli.runs.units import Header
+from inputdesign_cli.signal import Record, SignalGenerator
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
+from inputdesign_cli.tasks.record import (
+    RecordRequest,
+    designed_spectrum,
+    make_record,
+    record_notes,
+    redrawn,
+)
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
-from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves
+from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
+from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
@@ -45,6 +55,7 @@ class ConvexTask:
 
     `experiment` is of the length that the spec states (in `question` it has one sample where the length is
     sought). `alpha` sizes the confidence region of r_u, `most_samples` is the longest experiment allowed.
+    `unstated` are errors of the entries of G that have r_u where no requirement bounds it.
     """
 
     header: Header
@@ -57,6 +68,8 @@ class ConvexTask:
     ellipses: Pairs | None
     grid: GridMethod | None
     columns: FewColumns | None
+    record: RecordRequest
+    unstated: Sequence[ModelError] = ()
 
     def check(self) -> None:
         """Nothing: building has checked all."""
@@ -68,13 +81,35 @@ class ConvexTask:
             InfeasibleError: nothing within the limits meets the requirements.
             InaccurateError: the proof did not close.
         """
+        return self.delivered()[0]
+
+    def delivered(self) -> tuple[Results, SignalGenerator | None]:
+        """The same, and what generates other records of the spectrum, if there is one.
+
+        Raises:
+            InfeasibleError, InaccurateError: see `solve`.
+        """
         started = time.perf_counter()
         done, how = self.designed()
         result = design_result(done, how, self.tolerance)
         if self.columns is not None:
             result["spectrum"] |= {"factor_columns": self.columns.columns}
         self._check_length(result)
-        return self._illustrated(done, result)
+        solved = time.perf_counter()
+        record = make_record(self.record, done.design, done.experiment)
+        tables, curves = self._illustrations(done, record)
+        files: dict[str, bytes] = {}
+        if record is not None:
+            result["signal"] = self._signal_entry(done, record)
+            tables["signal"], curves["signal"] = signal_curves(self.record, self.header.units, record)
+            files = other_files(self.record, self.header.units, record)
+            notes = record_notes(self.record, done.experiment.samples, record)
+            if notes:
+                result["notes"] = [*result.get("notes", []), *notes]
+        result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
+        units = self.header.units
+        results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        return results, None if record is None else redrawn(self.record, done.design, record)
 
     def designed(self) -> tuple[Designed, dict[str, Any]]:
         """The design with its experiment, its status and what the solver did.
@@ -156,32 +191,61 @@ class ConvexTask:
             )
         )
 
-    def _illustrated(self, done: Designed, result: dict[str, Any]) -> Results:
-        """The result with its tables and curves."""
+    def _signal_entry(self, done: Designed, record: Record) -> dict[str, Any]:
+        design = done.design
+        return signal_entry(
+            self.record,
+            self.header.units,
+            done.experiment,
+            record,
+            design.problem.requirements,
+            designed=design.result.information,
+            spectrum=designed_spectrum(self.record, design, done.experiment.inputs),
+        )
+
+    def _illustrations(
+        self, done: Designed, record: Record | None
+    ) -> tuple[dict[str, Table], dict[str, Curves]]:
+        """Tables and curves of the spectrum, of r_u and of the proof."""
         design, units = done.design, self.header.units
         found, problem = design.result, design.problem
-        tables: dict[str, Table] = {}
-        curves: dict[str, Curves] = {}
         level = design.white_power if units.inputs == 1 else None
-        tables["spectrum"], curves["spectrum"] = spectrum_curves(
-            units, found.basis, found.x, problem.experiment.band, white=level
-        )
-        if found.x.any():
-            white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
-            errors = [r.bounded_error for r in (*problem.requirements, *problem.side)]
-            bounded = [error for error in errors if error is not None]
-            if bounded:
-                tables["bound"], curves["bound"] = bound_curves(
-                    units, bounded, found.information, white=white, active=found.active_frequencies
-                )
-            optimality = optimality_curves(units, design)
-            if optimality is not None:
-                curves["optimality"] = optimality
-            shown = white if problem.needs_definite else None
-            ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
-            if ellipses is not None:
-                curves["ellipses"] = ellipses
-        return Results(result, self.header.resolved_spec, units.time_unit, tables, curves)
+        spectrum = spectrum_curves(units, found.basis, found.x, problem.experiment.band, white=level)
+        if record is not None:
+            spectrum = with_periodogram(units, *spectrum, record.samples)
+        tables: dict[str, Table] = {"spectrum": spectrum[0]}
+        curves: dict[str, Curves] = {"spectrum": spectrum[1]}
+        if not found.x.any():
+            return tables, curves
+        white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
+        stated = [r.bounded_error for r in (*problem.requirements, *problem.side)]
+        errors = [error for error in stated if error is not None]
+        unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
+        if errors or problem.needs_definite:
+            tables["bound"], curves["bound"] = bound_curves(
+                units,
+                errors or unstated,
+                found.information,
+                white=white,
+                record=self._known(done, record),
+                stated=bool(errors),
+                active=found.active_frequencies,
+            )
+        optimality = optimality_curves(units, design)
+        if optimality is not None:
+            curves["optimality"] = optimality
+        shown = white if problem.needs_definite else None
+        ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
+        if ellipses is not None:
+            curves["ellipses"] = ellipses
+        return tables, curves
+
+    def _known(self, done: Designed, record: Record | None) -> Array | None:
+        """The information (k, k) of the record; None where it leaves a parameter undetermined."""
+        if record is None or not np.isfinite(record.worst_ratio):
+            return None
+        plant = FiniteRecord(done.experiment, len(record.samples), self.record.step)
+        return plant.information(record.samples)
 
 
 @contextmanager

@@ -13,9 +13,10 @@ from inputdesign_cli.spectrum import Basis, PolynomialBasis
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits
-from inputdesign_cli.tasks.build.model_error import model_error_alpha
+from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.spectra import build_basis
 from inputdesign_cli.tasks.build.system import build_cost, build_experiment
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
@@ -61,6 +62,8 @@ def build_convex(spec: Spec) -> ConvexTask:
         ellipses=spec.report.ellipses,
         grid=_grid_method(spec),
         columns=_few_columns(spec, basis),
+        record=build_record_request(spec),
+        unstated=unstated_errors(spec, experiment),
     )
 
 

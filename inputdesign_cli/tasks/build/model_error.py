@@ -56,7 +56,7 @@ def required_band(
 
 
 def build_model_errors(spec: Spec, experiment: ChannelExperiment) -> list[OnModelError]:
-    """`accuracy.model_error` in raw coordinates: one requirement an entry of G that is not zero, or one of all.
+    """`accuracy.model_error` in raw coordinates: one an entry of G that is not zero, or one of the norm.
 
     Empty when it is not asked for.
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.design.convex.problem import Weight
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
     ChannelLoop,
     ChannelModel,
@@ -19,7 +19,6 @@ from inputdesign_cli.plant import (
     close_loop,
 )
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.channel_information import channel_record_information
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.experiment import NoiseShape
@@ -175,8 +174,8 @@ def _prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
         return None
     if isinstance(prior.information, str):
         record = read_excitation_record(spec, prior.information, _PRIOR)
-        step = record_step(spec)
-        return channel_record_information(replace(experiment, samples=len(record)), record, step)
+        earlier = replace(experiment, samples=len(record))
+        return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
     matrix = np.array(prior.information, dtype=float)
     return embedded(spec, experiment.model.names, matrix, prior.parameters, _PRIOR)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,34 @@ def spectrum_curves(
         frequency, values, white=white, lines=not basis.has_density, symbol=units.excitation
     )
     return table, curves
+
+
+def with_periodogram(
+    units: Units, table: Table, curves: MatrixSpectrumCurves, samples: Array
+) -> tuple[Table, MatrixSpectrumCurves]:
+    """The spectrum with the smoothed periodogram of each channel of the record (n, r) over it.
+
+    Lines are left as they are.
+    """
+    if curves.lines:
+        return table, curves
+    shown, columns = [], {}
+    for a, column in enumerate(samples.T):
+        w, smooth = _smoothed_periodogram(column, units.sample_time)
+        # Per rad/sample in discrete time, per rad per time unit in continuous time, as the design.
+        density = smooth * (1.0 if units.sampled else units.sample_time)
+        shown.append(np.interp(curves.frequency, w, density))
+        columns[f"phi_record{f'_{a + 1}{a + 1}' if units.inputs > 1 else ''}"] = shown[-1]
+    return Table({**table.columns, **columns}), replace(curves, record=np.stack(shown, axis=1))
+
+
+def _smoothed_periodogram(samples: Array, step: float) -> tuple[Array, Array]:
+    """Frequencies in rad per unit of the `step`, and the smoothed periodogram there of samples (n,)."""
+    periodogram = np.abs(np.fft.rfft(samples)) ** 2 / samples.size
+    reach = int(samples.size**0.4 / 4)
+    window = np.ones(2 * reach + 1) / (2 * reach + 1)
+    smooth = np.convolve(np.pad(periodogram, reach, mode="reflect"), window, mode="valid")
+    return 2 * np.pi * np.arange(periodogram.size) / samples.size / step, smooth
 
 
 def optimality_curves(units: Units, design: Design) -> OptimalityCurves | None:

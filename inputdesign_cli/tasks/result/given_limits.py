@@ -3,49 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.information import PowerKind
-from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.channels import has_channels
-from inputdesign_cli.tasks.build.limits import build_power_limits
 
 _ROUNDING = 1e-9
 
 
-def check_given_limits(spec: Spec) -> None:
-    """Whether every limit can be compared with the excitation.
+@dataclass(frozen=True)
+class StatedLimits:
+    """What the experiment may not exceed: powers, single samples (a number or one a channel), its length."""
 
-    Raises:
-        SpecError: `not-supported`.
-    """
-    refused = ("spectrum", "energy") if has_channels(spec) else ("spectrum", "energy", "band")
-    for name in refused:
-        if getattr(spec.limits, name) is not None:
-            raise spec.complain(
-                "not-supported",
-                f"this version does not compare a given excitation with limits.{name}",
-                hint="remove it",
-                key=f"limits.{name}",
-            )
+    powers: tuple[PowerLimit, ...]
+    input: ArrayLike | None
+    output: ArrayLike | None
+    rate: ArrayLike | None
+    samples: int | None
 
 
 def broken_limits(
-    spec: Spec, samples: int, power: Mapping[PowerKind, list[float]], signal: Mapping[str, Any]
+    limits: StatedLimits, samples: int, power: Mapping[PowerKind, list[float]], signal: Mapping[str, Any]
 ) -> list[str]:
     """A note for each limit that the excitation does not keep.
 
     Args:
+        samples: the length of the experiment.
         power: of the excitation, by channel.
         signal: what `result.json` says of its record; empty without one.
     """
-    return [*_powers(spec, power), *_single_samples(spec, signal), *_length(spec, samples)]
+    return [*_powers(limits, power), *_single_samples(limits, signal), *_length(limits, samples)]
 
 
-def _powers(spec: Spec, power: Mapping[PowerKind, list[float]]) -> Iterator[str]:
-    for limit in build_power_limits(spec):
+def _powers(limits: StatedLimits, power: Mapping[PowerKind, list[float]]) -> Iterator[str]:
+    for limit in limits.powers:
         value, of = sum(power[limit.kind]), str(limit.kind)
         if limit.channel is not None:
             value, of = power[limit.kind][limit.channel], f"{limit.kind} {limit.channel + 1}"
@@ -55,12 +50,11 @@ def _powers(spec: Spec, power: Mapping[PowerKind, list[float]]) -> Iterator[str]
             yield f"{limit.key} is not kept: the power of {of} is {value:.6g}, {side} {limit.bound:.6g}"
 
 
-def _single_samples(spec: Spec, signal: Mapping[str, Any]) -> Iterator[str]:
-    amplitude = spec.limits.amplitude
+def _single_samples(limits: StatedLimits, signal: Mapping[str, Any]) -> Iterator[str]:
     stated = (
-        ("limits.amplitude.input", None if amplitude is None else amplitude.input, "input_peak"),
-        ("limits.amplitude.output", None if amplitude is None else amplitude.output, "output_peak"),
-        ("limits.rate", spec.limits.rate, "input_move"),
+        ("limits.amplitude.input", limits.input, "input_peak"),
+        ("limits.amplitude.output", limits.output, "output_peak"),
+        ("limits.rate", limits.rate, "input_move"),
     )
     for key, bound, name in stated:
         if bound is None or name not in signal:
@@ -73,7 +67,7 @@ def _single_samples(spec: Spec, signal: Mapping[str, Any]) -> Iterator[str]:
                 yield f"{key} is not kept: the record reaches {value:.6g}{where}, above {most:.6g}"
 
 
-def _length(spec: Spec, samples: int) -> Iterator[str]:
-    most = spec.limits.samples
-    if most is not None and samples > most:
+def _length(limits: StatedLimits, samples: int) -> Iterator[str]:
+    if limits.samples is not None and samples > limits.samples:
+        most = limits.samples
         yield f"limits.samples is not kept: the experiment has {samples} samples, more than {most}"
