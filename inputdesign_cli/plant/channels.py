@@ -20,6 +20,7 @@ from inputdesign_cli.plant.polynomial import (
     roots_in_z,
     unit_circle,
 )
+from inputdesign_cli.plant.simulation import caused_by_inputs, caused_by_noise
 
 Rows = tuple[tuple[Array, ...], ...]
 
@@ -237,3 +238,17 @@ class PolynomialChannels(Parametrised):
             tuple(rows["d"]),
             self.covariance if covariance is None else covariance,
         )
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        A, C, D = (self.per_output(rows) for rows in (self.A, self.C, self.D))
+        return caused_by_inputs(A, self.B, self.F, u), caused_by_noise(A, C, D, e)
+
+    @property
+    def stable_outputs(self) -> tuple[bool, ...]:
+        """Output by output, whether its row of G is stable."""
+        rows = [
+            [a, *(f for b, f in zip(bs, fs, strict=True) if np.any(b))]
+            for a, bs, fs in zip(self.per_output(self.A), self.B, self.F, strict=True)
+        ]
+        return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)

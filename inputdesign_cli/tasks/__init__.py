@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.assessment import Assessment
+from inputdesign_cli.tasks.assessment import assess as assess_record
 from inputdesign_cli.tasks.build.given import build_given
+from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.identification import identify as identify_record
 
 
 def solve(spec: Spec) -> Results:
@@ -38,6 +43,29 @@ def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing."""
     with _placed(spec):
         build_task(spec).check()
+
+
+def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
+
+    Raises:
+        SpecError: the plant is not supported.
+        DataError: the file cannot be used, or the data do not determine the parameters.
+    """
+    with _placed(spec):
+        return identify_record(build_identification(spec), Path(data), remove_means=remove_means)
+
+
+def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
+    """Identify the model from a real experiment, compare what the data buy with what is asked, and top up.
+
+    Raises:
+        SpecError: nothing is asked that data could meet; see `identify` and `solve`.
+        DataError: the file cannot be used.
+        InfeasibleError, InaccurateError: of the top-up.
+    """
+    with _placed(spec):
+        return assess_record(build_identification(spec), Path(data), remove_means=remove_means)
 
 
 @contextmanager

@@ -190,10 +190,11 @@ def _check_excites(problem: Problem, start: Array) -> None:
     if not problem.needs_definite:
         return
     eigenvalues, vectors = np.linalg.eigh(problem.information(start))
-    if eigenvalues[0] > _UNEXCITED * eigenvalues[-1]:
+    faint = eigenvalues <= _UNEXCITED * eigenvalues[-1]
+    if not faint.any():
         _check_reachable(problem, start)
         return
-    names = problem.experiment.unexcited(vectors[:, 0])
+    names = problem.experiment.unexcited(vectors[:, faint])
     raise bad_spec(
         "too-few-lines",
         f"these lines cannot tell the parameters apart: nothing is learnt about {names}",

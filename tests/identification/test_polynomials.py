@@ -6,11 +6,11 @@ from channel_plants import arrays, arx, box_jenkins
 from channel_records import shifted, simulated
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification import Structure, fit_channel_batch, identify, identify_channels
-from inputdesign_cli.identification.channel_structure import ChannelStructure
+from inputdesign_cli.identification import fit_batch, identify, identify_polynomials
+from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.plant import PolynomialChannels, PolynomialModel
+from inputdesign_cli.plant import PolynomialChannels
 from inputdesign_cli.spectrum import MatrixFirBasis
 
 
@@ -22,12 +22,6 @@ def theory(model, samples):
     densities = np.array([basis.density(unit, np.zeros(1))[0].real.ravel() for unit in np.eye(len(maps))])
     x = np.linalg.lstsq(densities.T, np.eye(model.inputs).ravel(), rcond=None)[0]
     return experiment.baseline_information + np.tensordot(x, maps, axes=1)
-
-
-def single(model: PolynomialModel) -> PolynomialChannels:
-    return PolynomialChannels(
-        arrays([[model.B]]), (model.A,), arrays([[model.F]]), (model.C,), (model.D,), np.array([[1.0]])
-    )
 
 
 def stacked(model, u, y):
@@ -44,7 +38,7 @@ def stacked(model, u, y):
 
 def test_names_and_places_are_those_of_the_model():
     for model in (arx(), arx(per_output=False), box_jenkins()):
-        structure = ChannelStructure.of(model)
+        structure = Structure.of(model)
         assert structure.names == model.names
         assert structure.in_plant + structure.in_noise == len(model.names)
         for i, (row, place) in enumerate(zip(structure.rows, structure.places, strict=True)):
@@ -70,7 +64,7 @@ def test_a_model_takes_other_parameters():
 @pytest.mark.parametrize("known", [True, False])
 def test_cost_and_gradient_are_those_of_finite_differences(runs, known):
     model, rng = box_jenkins(), np.random.default_rng(1)
-    structure = ChannelStructure.of(model)
+    structure = Structure.of(model)
     u, y = simulated(model, 80, rng, runs)
     problem = structure.problem(u, y, model.covariance if known else None)
     theta = model.theta * (1 + 0.03 * rng.standard_normal((runs, structure.size)))
@@ -87,7 +81,7 @@ def test_cost_and_gradient_are_those_of_finite_differences(runs, known):
 def test_prediction_errors_at_the_truth_are_the_noise():
     model, rng = box_jenkins(), np.random.default_rng(2)
     u, y = simulated(model, 3000, rng)
-    structure = ChannelStructure.of(model)
+    structure = Structure.of(model)
     S = structure.problem(u, y).sums(model.theta[None]).errors[0] / 3000
     np.testing.assert_allclose(S, model.covariance, atol=6 * np.max(model.covariance) / np.sqrt(3000))
 
@@ -96,7 +90,7 @@ def test_arx_with_a_common_a_is_stacked_least_squares():
     model = arx(per_output=False)
     u, y = (x[0] for x in simulated(model, 300, np.random.default_rng(3)))
     phi = stacked(model, u, y).reshape(600, 10)
-    found = identify_channels(model, u, y, noise=np.eye(2))
+    found = identify_polynomials(model, u, y, noise=np.eye(2))
     expected = np.linalg.lstsq(phi, y.reshape(600), rcond=None)[0]
     np.testing.assert_allclose(found.theta, expected, atol=1e-9)
     np.testing.assert_allclose(found.information, phi.T @ phi, rtol=1e-9, atol=1e-6)
@@ -108,7 +102,7 @@ def test_with_a_known_covariance_it_is_generalised_least_squares():
     root = np.linalg.inv(np.linalg.cholesky(model.covariance))
     phi = np.einsum("pq,nqk->npk", root, stacked(model, u, y)).reshape(600, 10)
     expected = np.linalg.lstsq(phi, (y @ root.T).reshape(600), rcond=None)[0]
-    found = identify_channels(model, u, y, noise=model.covariance)
+    found = identify_polynomials(model, u, y, noise=model.covariance)
     np.testing.assert_allclose(found.theta, expected, atol=1e-9)
     np.testing.assert_allclose(found.covariance, np.linalg.inv(phi.T @ phi), rtol=1e-7, atol=1e-12)
 
@@ -125,7 +119,7 @@ def test_an_unknown_covariance_is_that_of_the_residuals():
         theta = np.linalg.lstsq(whitened, (y @ root.T).reshape(600), rcond=None)[0]
         left = y - phi @ theta
         covariance = left.T @ left / 300
-    found = identify_channels(model, u, y)
+    found = identify(model, u, y)
     assert found.converged
     np.testing.assert_allclose(found.theta, theta, atol=1e-8)
     np.testing.assert_allclose(found.errors, left, atol=1e-7)
@@ -133,31 +127,15 @@ def test_an_unknown_covariance_is_that_of_the_residuals():
     np.testing.assert_allclose(found.noise, covariance * 300 / (300 - 5), rtol=1e-6)
 
 
-@pytest.mark.parametrize("orders", [{"a": 2, "b": 2}, {"b": 2, "c": 1, "d": 1, "f": 2}])
-def test_one_channel_is_the_scalar_estimate(orders):
-    structure = Structure(**orders)
-    theta = {4: [-1.5, 0.7, 1.0, 0.5], 6: [1.0, 0.5, 0.6, -0.8, -1.5, 0.7]}[structure.size]
-    model = single(structure.model(np.array(theta), 0.5))
-    u, y = simulated(model, 400, np.random.default_rng(6))
-    alone = identify(structure, u[0, :, 0], y[0, :, 0])
-    found = identify_channels(model, u[0], y[0])
-    np.testing.assert_allclose(found.theta, alone.theta, atol=1e-6)
-    np.testing.assert_allclose(found.covariance, alone.covariance, rtol=1e-4)
-    assert found.noise[0, 0] == pytest.approx(alone.variance, rel=1e-6)
-    assert found.fit[0] == pytest.approx(alone.fit, abs=1e-4)
-    assert found.whiteness.statistic == pytest.approx(alone.whiteness.statistic, rel=1e-4)
-    assert found.independence.statistic == pytest.approx(alone.independence.statistic, rel=1e-4)
-
-
 def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone():
     model = replace(box_jenkins(), A=(np.ones(1),), D=(np.ones(1),), covariance=np.diag([1.0, 4.0]))
     u, y = (x[0] for x in simulated(model, 600, np.random.default_rng(7)))
-    both = identify_channels(model, u, y, noise=model.covariance)
+    both = identify_polynomials(model, u, y, noise=model.covariance)
     for i in range(2):
         own = PolynomialChannels(
             model.B[i : i + 1], model.A, model.F[i : i + 1], (model.C[i],), model.D, np.eye(1)
         )
-        alone = identify_channels(own, u, y[:, i : i + 1])
+        alone = identify(own, u, y[:, i : i + 1])
         mine = [k for k, p in enumerate(model.parameters) if p.places[0][0] == i]
         np.testing.assert_allclose(both.theta[mine], alone.theta, atol=1e-5)
 
@@ -165,7 +143,7 @@ def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone(
 @pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
 def test_known_parameters_are_recovered_without_a_start(model):
     u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))
-    found = identify_channels(model, u, y)
+    found = identify(model, u, y)
     assert found.converged
     off, k = found.theta - model.theta, len(found.names)
     # Mahalanobis distance: chi-squared with k degrees of freedom.
@@ -179,8 +157,8 @@ def test_known_parameters_are_recovered_without_a_start(model):
 def test_units_of_the_channels_do_not_matter():
     model = arx(per_output=False)
     u, y = (x[0] for x in simulated(model, 400, np.random.default_rng(9)))
-    plain = identify_channels(model, u, y)
-    scaled = identify_channels(model, u * [1e4, 1e-3], y * [1e-5, 1e6])
+    plain = identify(model, u, y)
+    scaled = identify(model, u * [1e4, 1e-3], y * [1e-5, 1e6])
     assert scaled.converged
     np.testing.assert_allclose(scaled.theta[:2], plain.theta[:2], atol=1e-7)
     assert scaled.whiteness.statistic == pytest.approx(plain.whiteness.statistic, rel=1e-5)
@@ -189,14 +167,14 @@ def test_units_of_the_channels_do_not_matter():
 def test_a_batch_reaches_the_covariance_of_theory():
     model, runs = arx(), 200
     u, y = simulated(model, 1000, np.random.default_rng(10), runs)
-    found = fit_channel_batch(model, u, y, start=model.theta)
+    found = fit_batch(model, u, y, start=model.theta)
     assert np.all(found.converged)
     information = theory(model, 1000)
     eigenvalues = whitened_eigenvalues(found.theta, information)
     low, high = wishart_range(10, runs, np.random.default_rng(11))
     assert low < eigenvalues.min() <= eigenvalues.max() < high
     np.testing.assert_allclose(found.noise.mean(axis=0), model.covariance, atol=0.02)
-    alone = identify_channels(model, u[3], y[3], start=model.theta)
+    alone = identify(model, u[3], y[3], start=model.theta)
     np.testing.assert_allclose(found.theta[3], alone.theta, atol=1e-7)
     np.testing.assert_allclose(found.information[3], alone.information, rtol=1e-6, atol=1e-6)
 
@@ -204,7 +182,7 @@ def test_a_batch_reaches_the_covariance_of_theory():
 def test_residual_tests_are_as_often_significant_as_they_should():
     model = arx()
     u, y = simulated(model, 400, np.random.default_rng(12), 40)
-    tests = [identify_channels(model, u[i], y[i], start=model.theta) for i in range(40)]
+    tests = [identify(model, u[i], y[i], start=model.theta) for i in range(40)]
     for probabilities in (
         [t.whiteness.probability for t in tests],
         [t.independence.probability for t in tests],
@@ -219,7 +197,7 @@ def test_a_model_that_is_too_small_fails_the_residual_tests():
     small = PolynomialChannels(
         arrays([[[0, 1.0]] * 3] * 2), one, arrays([[[1.0]] * 3] * 2), one, one, np.eye(2)
     )
-    found = identify_channels(small, u, y)
+    found = identify(small, u, y)
     assert found.whiteness.probability < 1e-6
     assert found.independence.probability < 1e-6
 
@@ -243,7 +221,7 @@ def _channel(x, index, values):
 def test_bad_data_is_refused_and_the_channel_named(change, code, named):
     u, y = (x[0] for x in simulated(arx(), 300, np.random.default_rng(14)))
     with pytest.raises(SpecError) as caught:
-        identify_channels(arx(), *change(u, y))
+        identify(arx(), *change(u, y))
     assert caught.value.diagnostics[0].code == code
     assert named in caught.value.diagnostics[0].message
 
@@ -252,14 +230,14 @@ def test_outputs_of_the_same_noise_are_refused():
     same = replace(arx(per_output=False), B=(arx().B[0],) * 2)
     u, y = (x[0] for x in simulated(same, 300, np.random.default_rng(15)))
     with pytest.raises(SpecError, match="y1 and y2"):
-        identify_channels(same, u, np.stack([y[:, 0], 2.0 * y[:, 0]], axis=1))
+        identify(same, u, np.stack([y[:, 0], 2.0 * y[:, 0]], axis=1))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
 def test_estimates_reach_the_cramer_rao_bound(model):
     u, y = simulated(model, 3000, np.random.default_rng(16), 500)
-    found = fit_channel_batch(model, u, y, start=model.theta)
+    found = fit_batch(model, u, y, start=model.theta)
     assert np.all(found.converged)
     information = theory(model, 3000)
     # The mean square in units of the bound, over all directions: its own error is sqrt(2 / (500 k)).
