@@ -7,6 +7,7 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import RegressionPlant, Spec
 from inputdesign_cli.tasks.build.channels import has_channels
+from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
 
 
 def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
@@ -25,9 +26,7 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
 
             return simulate_regression(spec, executor=executor)
         if spec.accuracy.closed_loop_error is not None and spec.designs:
-            from inputdesign_cli.monte_carlo.loop_error_study import simulate_closed_loop_error
-
-            return simulate_closed_loop_error(spec, executor=executor)
+            return build_loop_error_task(spec).simulate(executor)
         if has_channels(spec):
             from inputdesign_cli.monte_carlo.channel_monte_carlo import simulate_channels
 

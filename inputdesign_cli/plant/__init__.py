@@ -23,3 +23,5 @@ from inputdesign_cli.plant.transfer import ContinuousRational as ContinuousRatio
 from inputdesign_cli.plant.transfer import Rational as Rational
 from inputdesign_cli.plant.transfer import ScalarTransfer as ScalarTransfer
 from inputdesign_cli.plant.transfer import TransferMatrix as TransferMatrix
+
+MatrixController = TransferMatrix
