@@ -51,7 +51,7 @@ def golden_file(name: str) -> Path:
     return DOCS.parent / "golden" / f"{name}.yaml"
 
 
-def outcomes_of(golden: Golden) -> dict[str, Results]:
+def results_of(golden: Golden) -> dict[str, Results]:
     """Every run of a golden file."""
     found = {}
     for run in golden.runs:
@@ -105,10 +105,10 @@ def page(*, images: bool) -> str:
     parts = [INTRODUCTION]
     for name, text in sections().items():
         golden = load_golden(golden_file(name))
-        outcomes = outcomes_of(golden)
-        rows = compare(golden, {run: outcome.result for run, outcome in outcomes.items()})
+        results = results_of(golden)
+        rows = compare(golden, {run: found.result for run, found in results.items()})
 
-        def fill(match: re.Match[str], name=name, golden=golden, outcomes=outcomes, rows=rows) -> str:
+        def fill(match: re.Match[str], name=name, golden=golden, results=results, rows=rows) -> str:
             kind, run, what = match.groups()
             if kind == "table":
                 return table(rows)
@@ -116,7 +116,7 @@ def page(*, images: bool) -> str:
             if images:
                 IMAGES.mkdir(parents=True, exist_ok=True)
                 if kind == "figure":
-                    draw_figure(outcomes[run], what, file)
+                    draw_figure(results[run], what, file)
                 else:
                     draw_sweep(golden, run, what, file)
             return f"![{run}: {what}]({file.relative_to(DOCS).as_posix()})\n"
@@ -130,11 +130,11 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.strip().lower()).strip("-")
 
 
-def draw_figure(outcome: Results, stem: str, file: Path) -> None:
+def draw_figure(results: Results, stem: str, file: Path) -> None:
     """A figure of a run."""
     from inputdesign_cli.figures.plots import draw
 
-    file.write_bytes(draw(outcome.curves[stem], outcome.time_unit))
+    file.write_bytes(draw(results.curves[stem], results.time_unit))
 
 
 def draw_sweep(golden: Golden, name: str, setting: str, file: Path) -> None:

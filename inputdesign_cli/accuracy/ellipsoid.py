@@ -3,7 +3,7 @@
 For every theta with (theta - theta_0)^T M (theta - theta_0) <= alpha^2, at every frequency of a band:
 |W (G(theta) - G_0) / G(theta)| <= bound ("relative"), or |G(theta) - G_0| <= r_adm ("absolute"). With
 G = B / D both are |z^T d| <= |c_0 + c^T d| in d = theta - theta_0, an indefinite quadratic inequality,
-and the S-procedure turns it into one matrix inequality without loss.
+and the S-procedure turns it into one matrix inequality without loss ([polik-terlaky-2007]).
 """
 
 from __future__ import annotations

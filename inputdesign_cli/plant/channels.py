@@ -1,4 +1,7 @@
-"""Polynomial plants with several inputs and outputs: G, H and their gradients."""
+"""Polynomial plants with several inputs and outputs: G, H and their gradients.
+
+The five-polynomial form A y = (B/F) u + (C/D) e ([ljung-1999], Section 4.2) with a matrix of B and F.
+"""
 
 from __future__ import annotations
 

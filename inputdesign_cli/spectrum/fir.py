@@ -29,7 +29,7 @@ _SINGULAR_PRICE = 1e-10
 class FirBasis(DensityFamily):
     """The unknowns are c_0 .. c_m (m = `order`); the cone is that of nonnegative cosine polynomials.
 
-    Each of those is a sum of |v_i(e^{jw})|^2, v_i polynomials of degree m (Fejer, Riesz). With the
+    Each of those is a sum of |v_i(e^{jw})|^2, v_i polynomials of degree m ([fejer-riesz-1916]). With the
     v_i in the span of the columns of V (m + 1, q) it is v(w)^* Q v(w), Q >= 0 of order q: this is a
     face, and its generators are V. The full Gram matrix has order m + 1, but the optimal one is of
     low rank, so a few generators, found by pricing, reach the optimum.
@@ -95,7 +95,7 @@ class FirBasis(DensityFamily):
         """The largest s with price - s value >= 0 on every spectrum of this basis.
 
         A linear functional of c_0 .. c_m is nonnegative on all nonnegative cosine polynomials exactly
-        when its Toeplitz matrix is positive semidefinite (Caratheodory, Toeplitz): a generalised
+        when its Toeplitz matrix is positive semidefinite ([caratheodory-1911]): a generalised
         eigenvalue, whose leading eigenvectors are the spectra |v|^2 that pay best. Where the price
         itself nearly vanishes, rounding spoils that eigenvalue, and the pointwise ratio, which is
         valid too, stands in.

@@ -21,7 +21,7 @@ class MatrixFirBasis(GramBasis):
     """The unknowns are the upper triangle of c_0 by columns, then c_1 .. c_m (r, r) row by row.
 
     `inputs` r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with
-    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 (matrix Fejer, Riesz); c_t is the sum of the
+    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 ([dritschel-rovnyak-2010]); c_t is the sum of the
     blocks (s + t, s) of Q.
     """
 

@@ -48,8 +48,8 @@ def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | 
 class Problem:
     """A design problem, for one of three goals.
 
-    "cost": the least cost; `cost` weighs the powers of input, output and excitation (least-costly
-    paper, (18)).
+    "cost": the least cost; `cost` weighs the powers of input, output and excitation
+    ([bombois-least-costly], (18)).
 
     "factor": the least s such that s M(x) meets the requirements, x within the limits: the best
     accuracy (s is the square of the ratio r_u / r_adm, or the inverse of a criterion). In

@@ -1,8 +1,9 @@
 """The papers' own program: one LMI per grid frequency, positivity by a Gram matrix or the KYP lemma, cvxpy.
 
-Least-costly paper, (13) and (19) with footnote 2. It guarantees nothing between the grid frequencies;
-its multipliers still prove a lower bound for the problem at every frequency, of which the grid is a
-relaxation. Whitened coordinates are kept: in raw parameters no solver survives a resonant plant.
+[bombois-least-costly], (13) and (19) with footnote 2; the lemma: [rantzer-1996]. It guarantees nothing
+between the grid frequencies; its multipliers still prove a lower bound for the problem at every frequency,
+of which the grid is a relaxation. Whitened coordinates are kept: in raw parameters no solver survives a
+resonant plant.
 """
 
 from __future__ import annotations
