@@ -25,7 +25,7 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.specification.models.plant import with_paths
+from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.tasks.result.estimates import Blocks
 
 

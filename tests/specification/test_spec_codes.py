@@ -13,20 +13,22 @@ from inputdesign_cli.error_codes import CODES, explanation
 from inputdesign_cli.errors import SpecError
 
 PACKAGE = Path(inputdesign_cli.__file__).parent
-MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "fail", "Finding", "stop", "_error"}
+MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "PathDiagnostic", "stop", "_error"}
 CODE = re.compile(r"[a-z]+(-[a-z]+)*")
 
 
 def codes_in(source: str) -> set[str]:
-    """The string literals that stand for a code: in calls that make diagnostics, and the codes that
-    `why_not_number` and `findings.add` are given."""
+    """The string literals that stand for a code: in calls that make diagnostics, and first of the three
+    texts that a function returns as code, message and hint."""
     found = set()
     for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and len(node.value.elts) == 3:
+            first = node.value.elts[0]
+            found |= {first.value} if isinstance(first, ast.Constant) and "-" in str(first.value) else set()
         if not isinstance(node, ast.Call):
             continue
         called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        is_add = called == "add" and "findings" in ast.unparse(node.func)
-        if called not in MAKERS and not is_add:
+        if called not in MAKERS:
             continue
         arguments = [*node.args, *(k.value for k in node.keywords if k.arg == "code")]
         candidates = arguments[:1] if called != "_complain" else arguments[:2]
