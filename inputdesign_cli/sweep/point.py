@@ -21,7 +21,7 @@ from inputdesign_cli.errors import (
 )
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.text_formats import json_text
-from inputdesign_cli.specification import Draft
+from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweep.layout import Layout, at_work
 
 STATUS = {EXIT_BAD_INPUT: "invalid", EXIT_INFEASIBLE: "infeasible", EXIT_INACCURATE: "inaccurate"}
@@ -39,7 +39,7 @@ class PointTask:
 
     index: int
     key: str
-    draft: Draft
+    draft: SpecTemplate
     overrides: tuple[str, ...]
     verb: str
     figures: bool

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from inputdesign_cli.specification.models.findings import Finding, show
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import RegressionPlant
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.spectrum import (
@@ -16,13 +16,14 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
 )
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.specification.wording import show
 from inputdesign_cli.specification.yaml.places import Path
 
 ROUNDING = 1e-4
 """3.1416 is meant as pi."""
 
 
-def channels(spec: Spec) -> Iterator[Finding]:
+def channels(spec: Spec) -> Iterator[PathDiagnostic]:
     """A list per channel is as long as there are inputs or outputs."""
     inputs, outputs = spec.plant.inputs, spec.plant.outputs
     if isinstance(spec.plant, RegressionPlant):
@@ -63,7 +64,7 @@ def channels(spec: Spec) -> Iterator[Finding]:
         sized.append((error.reference.variance, where, outputs, "outputs"))
     for value, path, size, noun in sized:
         if isinstance(value, tuple) and len(value) != size:
-            yield Finding(
+            yield PathDiagnostic(
                 "wrong-shape",
                 f"{{key}} has {len(value)} {'entry' if len(value) == 1 else 'entries'}; "
                 f"the plant's number of {noun} is {size}",
@@ -72,7 +73,7 @@ def channels(spec: Spec) -> Iterator[Finding]:
             )
 
 
-def bands(spec: Spec) -> Iterator[Finding]:
+def bands(spec: Spec) -> Iterator[PathDiagnostic]:
     """Bands end at pi/sample_time."""
     accuracy = spec.accuracy
     found: list[tuple[tuple[float, float] | None, Path]] = [(spec.limits.band, ("limits", "band"))]
@@ -87,7 +88,7 @@ def bands(spec: Spec) -> Iterator[Finding]:
             yield _beyond(spec, band[1], path)
 
 
-def frequencies(spec: Spec) -> Iterator[Finding]:
+def frequencies(spec: Spec) -> Iterator[PathDiagnostic]:
     """Given frequencies lie below pi/sample_time and within limits.band."""
     listed: tuple[float, ...] | None = None
     path: Path = ("spectrum", "frequencies")
@@ -103,7 +104,7 @@ def frequencies(spec: Spec) -> Iterator[Finding]:
     low, high = spec.limits.band or (0.0, math.inf)
     for i, w in enumerate(listed):
         if not low * (1 - ROUNDING) <= w <= high * (1 + ROUNDING):
-            yield Finding(
+            yield PathDiagnostic(
                 "bad-band",
                 f"{{key}} is {show(w)}, outside limits.band [{show(low)}, {show(high)}]",
                 "remove the frequency or widen the band",
@@ -112,8 +113,8 @@ def frequencies(spec: Spec) -> Iterator[Finding]:
             return
 
 
-def _beyond(spec: Spec, frequency: float, path: Path) -> Finding:
-    return Finding(
+def _beyond(spec: Spec, frequency: float, path: Path) -> PathDiagnostic:
+    return PathDiagnostic(
         "beyond-nyquist",
         f"{{key}} reaches {show(frequency)}, beyond the Nyquist frequency "
         f"{show(spec.nyquist)} rad/{spec.time_unit}",

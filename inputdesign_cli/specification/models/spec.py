@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr
 
@@ -68,6 +68,8 @@ class Spec(Section):
     simulation: Simulation | None = Field(default=None, description="Monte Carlo study on the true system.")
     report: Report = Field(default=Report(), description="What the figures show.")
     sweep: Sweep | None = Field(default=None, description="What `idesign sweep` varies.")
+
+    phrase: ClassVar[str] = "a spec"
 
     _source: Source = PrivateAttr(default_factory=Source)
 

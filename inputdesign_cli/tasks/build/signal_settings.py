@@ -70,7 +70,7 @@ def build_signal_settings(spec: Spec) -> SignalSettings:
     return SignalSettings(
         method=method,
         phases=phases,
-        lines=signal.lines,  # type: ignore[arg-type]
+        lines=signal.lines,
         periods=signal.periods or 1,
         hold=signal.hold or 1,
         ramp=signal.ramp or 0,

@@ -5,27 +5,26 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
 from pydantic import ValidationError
 
-from inputdesign_cli.errors import Diagnostic, SpecError
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification.loading import parse_spec
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
-from inputdesign_cli.specification.models.translate import translate
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import apply_overrides, compose
-from inputdesign_cli.specification.yaml.places import Places, format_key
+from inputdesign_cli.specification.yaml.places import Places
 from inputdesign_cli.specification.yaml.reader import Tree, read
 from inputdesign_cli.specification.yaml.writer import fingerprint
 
 
 @dataclass(frozen=True)
-class Draft:
+class SpecTemplate:
     """The text of a spec, where it came from, the overrides that hold for all variants, and their data."""
 
     text: str
@@ -35,16 +34,19 @@ class Draft:
     data: dict[str, Any]
 
     def spec(self, overrides: Sequence[str]) -> Spec:
-        """The checked spec of one variant, without the `sweep` block. Raises `SpecError` as `load_spec`."""
+        """The checked spec of one variant, without the `sweep` block.
+
+        Raises:
+            SpecError: As `load_spec`.
+        """
         every = [*self.overrides, *overrides, "sweep=null"]
         return parse_spec(self.text, self.file, every, folder=self.folder)
 
     def variant(self, overrides: Sequence[str]) -> dict[str, Any]:
         """The plain data of one variant, without the `sweep` block; nothing is checked but the overrides.
 
-        Raises
-        ------
-        SpecError : an override that cannot be applied.
+        Raises:
+            SpecError: An override that cannot be applied.
         """
         tree = Tree(_copy(self.data), Places())
         apply_overrides(tree, [*overrides, "sweep=null"])
@@ -66,33 +68,28 @@ class Draft:
         return sorted({name for name in _texts(data) if (self.folder / name).is_file()})
 
     def sweep(self) -> Sweep | None:
-        """The `sweep` block, checked. Raises `SpecError` with the place of what is wrong in it."""
+        """The `sweep` block, checked; None where there is none.
+
+        Raises:
+            SpecError: With the place of all that is wrong in the block.
+        """
         if "sweep" not in self.data:
             return None
-        readers: dict[int, type[Section]] = {}
-        block = {"sweep": self.data["sweep"]}
         try:
-            return Sweep.model_validate(block["sweep"], context=readers)
+            return Sweep.model_validate(self.data["sweep"])
         except ValidationError as error:
-            found = translate(error.errors(include_url=False), block["sweep"], readers)
+            found = translate(error, self.data["sweep"], Sweep)
             places = read(self.text, self.file).places
-            diagnostics = []
-            for finding in found:
-                path = ("sweep", *finding.path)
-                key = format_key(path)
-                location = places.location(places.mark(path, at_key=finding.at_key))
-                message, hint = (part.replace("{key}", key) for part in (finding.message, finding.hint))
-                diagnostics.append(Diagnostic(finding.code, message, hint, key, location))
-            raise SpecError(diagnostics) from None
+            absolute = [replace(one, path=("sweep", *one.path)) for one in found]
+            raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
 
 
-def read_draft(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Draft:
-    """Read a spec file as a draft with `overrides` applied.
+def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> SpecTemplate:
+    """Read a spec file with `overrides` applied, and check nothing yet.
 
-    Raises
-    ------
-    SpecError : the file cannot be read, is not a mapping in YAML, or an override cannot be applied, or a
-        file cannot be included.
+    Raises:
+        SpecError: The file cannot be read or is no mapping in YAML, an override cannot be applied, or a
+            file cannot be included.
     """
     text, file = read_text(path), os.fspath(path)
     tree = read(text, file)
@@ -101,7 +98,7 @@ def read_draft(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> D
     compose(tree, FilePath(path).parent, overrides)
     if tree.diagnostics:
         raise SpecError(tree.diagnostics)
-    return Draft(text, file, FilePath(path).parent, tuple(overrides), tree.data)
+    return SpecTemplate(text, file, FilePath(path).parent, tuple(overrides), tree.data)
 
 
 def _copy(value: Any) -> Any:
