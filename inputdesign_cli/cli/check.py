@@ -35,7 +35,9 @@ def check(
     Runs the specs that the golden files name. Prints computed and expected values with their deviation,
     tolerance and source; exits with 1 if a value lies outside its tolerance.
     """
-    from inputdesign_cli.runs.golden import compare, execute, load_golden
+    from inputdesign_cli.runs.golden import compare
+    from inputdesign_cli.runs.golden_file import load_golden
+    from inputdesign_cli.sweep.golden_runs import execute
 
     rows: list[Row] = []
     for golden in [load_golden(path) for path in files or _default_files()]:

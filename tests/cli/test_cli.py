@@ -12,6 +12,7 @@ import pytest
 import typer
 
 import inputdesign_cli
+from inputdesign_cli import specification, tasks
 from inputdesign_cli.cli import app, main
 from inputdesign_cli.cli.init import Kind
 from inputdesign_cli.cli.terminal import aligned, colourful, status
@@ -79,13 +80,14 @@ def verbs(monkeypatch):
         calls.append((path, overrides))
         return path
 
-    def outcome(spec):
+    def results(spec):
         return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
-    monkeypatch.setitem(vars(inputdesign_cli), "load_spec", load_spec)
+    monkeypatch.setattr(specification, "load_spec", load_spec)
+    monkeypatch.setattr("inputdesign_cli.sweep.golden_runs.load_spec", load_spec)
     for verb in ("solve", "analyse"):
-        monkeypatch.setitem(vars(inputdesign_cli), verb, outcome)
-    monkeypatch.setitem(vars(inputdesign_cli), "validate", lambda spec: None)
+        monkeypatch.setattr(tasks, verb, results)
+    monkeypatch.setattr(tasks, "validate", lambda spec: None)
     return calls
 
 
@@ -95,7 +97,7 @@ def failing(monkeypatch, verbs):
         def fail(spec):
             raise error
 
-        monkeypatch.setitem(vars(inputdesign_cli), verb, fail)
+        monkeypatch.setattr(tasks, verb, fail)
 
     return install
 
@@ -139,7 +141,7 @@ def test_quiet_prints_nothing(run, verbs):
 
 def test_the_summary_of_a_result_with_nothing_in_it(run, verbs, monkeypatch):
     bare = Results({"format": 1, "objective": {"kind": "D", "value": 59.2, "upper_bound": 59.3}}, "")
-    monkeypatch.setitem(vars(inputdesign_cli), "solve", lambda spec: bare)
+    monkeypatch.setattr(tasks, "solve", lambda spec: bare)
     code, out, err = run("solve", "a.yaml")
     assert (code, err) == (0, "")
     assert "log det M" in out
@@ -288,7 +290,7 @@ def test_validate_reports_all_files_at_once(run, verbs, monkeypatch):
         if spec.stem != "good":
             raise SpecError(diagnostic(spec.stem))
 
-    monkeypatch.setitem(vars(inputdesign_cli), "validate", validate)
+    monkeypatch.setattr(tasks, "validate", validate)
     code, out, err = run("validate", "bad.yaml", "good.yaml", "worse.yaml")
     assert code == 2
     assert out == "good.yaml: valid\n"

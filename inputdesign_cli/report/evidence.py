@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
-from inputdesign_cli.report.render import shown
-
-Result = Mapping[str, Any]
+from inputdesign_cli.report.numbers import Fact, Rows, shown, spoken
+from inputdesign_cli.runs.results import Result
 
 _SPREAD = "{:.4g} ± {:.2g}"
-
-
-@dataclass(frozen=True)
-class Rows:
-    """A table: the first column holds names, the others numbers, what follows a line break being a remark."""
-
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
 
 
 def estimate_table(result: Result) -> Rows | None:
@@ -31,7 +20,7 @@ def estimate_table(result: Result) -> Rows | None:
     return Rows(("parameter", "estimate", "standard deviation"), rows)
 
 
-def estimate_facts(result: Result) -> Iterator[tuple[str, str, str]]:
+def estimate_facts(result: Result) -> Iterator[Fact]:
     """How well the estimate explains the data."""
     found = result.get("identification", {})
     if "variance" in found:
@@ -88,14 +77,14 @@ def simulation_table(result: Result) -> Rows | None:
     inputs = result.get("simulation", {}).get("inputs", {})
     if any("loss" in entry for entry in inputs.values()):
         rows = tuple(
-            (_plain(name), _mean(entry.get("loss")), _mean(entry.get("theory", {}).get("loss")))
+            (spoken(name), _mean(entry.get("loss")), _mean(entry.get("theory", {}).get("loss")))
             for name, entry in inputs.items()
         )
         return Rows(("input", "loss", "theory"), rows)
     if any("mse" in entry for entry in inputs.values()):
         rows = tuple(
             (
-                _plain(name),
+                spoken(name),
                 _SPREAD.format(entry["mse"], entry.get("mse_standard_error", 0.0)),
                 shown(entry["theory"]["mse"]) if "theory" in entry else "",
             )
@@ -116,34 +105,12 @@ def simulation_table(result: Result) -> Rows | None:
         return None
     each = zip(*shown_columns.values(), strict=True)
     return Rows(
-        ("input", *shown_columns), tuple((_plain(n), *cells) for n, cells in zip(inputs, each, strict=True))
+        ("input", *shown_columns), tuple((spoken(n), *cells) for n, cells in zip(inputs, each, strict=True))
     )
 
 
-def study_caption(stem: str) -> str | None:
-    """What a figure of data or of simulated runs shows; None for other figures."""
-    kind, _, name = stem.partition("_")
-    if kind in ("errors", "cloud", "disturbance") and name:
-        what = {
-            "errors": "The errors |G_hat - G_0| of the models of all runs, against r_u and r_adm",
-            "cloud": "The estimates of all runs, with the ellipses of theory",
-            "disturbance": "What the excitation alone does to the loop",
-        }[kind]
-        return f"{what}: {_plain(name)}."
-    return {
-        "fit": "The recorded outputs, predicted one step ahead, and simulated from the input alone.",
-        "residuals": "Correlations of the residuals with themselves and with past inputs; chance leaves them "
-        "within the grey.",
-        "bound": "The error r_u that these data leave, against the admitted error r_adm.",
-    }.get(stem.removeprefix("data_"))
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")
-
-
 def _named(entry: Result) -> str:
-    return " ".join(filter(None, (_plain(entry["name"]), entry.get("entry", ""))))
+    return " ".join(filter(None, (spoken(entry["name"]), entry.get("entry", ""))))
 
 
 def _reached(entry: Result) -> str:

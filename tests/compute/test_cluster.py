@@ -9,7 +9,7 @@ from pathlib import Path
 
 import jobs
 import pytest
-from conftest_study import SPEC, timeless_files, timeless_rows
+from sweep_files import SPEC, timeless_files, timeless_rows
 
 from inputdesign_cli import load_spec, simulate
 from inputdesign_cli.compute.cluster import Cluster
@@ -23,7 +23,7 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("default")
 
 SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-HERE = str(Path(__file__).parent)
+PATHS = os.pathsep.join(str(Path(__file__).parents[up]) for up in (0, 2))
 
 
 class Loopback:
@@ -31,7 +31,7 @@ class Loopback:
 
     def __init__(self, folder: Path) -> None:
         self.file = folder / "scheduler.json"
-        self.environment = {**os.environ, "PYTHONPATH": HERE, "OPENBLAS_NUM_THREADS": "1"}
+        self.environment = {**os.environ, "PYTHONPATH": PATHS, "OPENBLAS_NUM_THREADS": "1"}
         options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show", "--no-jupyter"]
         self.processes = [self.start("scheduler", *options, "--scheduler-file", str(self.file))]
         deadline = time.monotonic() + 30
@@ -84,7 +84,9 @@ def test_errors_come_back(loopback):
     assert done[4].answer == 4
 
 
-def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, spec, tmp_path):
+def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_path):
+    spec = tmp_path / "small.yaml"
+    spec.write_text(SPEC)
     settings = ["experiment.samples=60:71:1", "spectrum.order=1,-1"]
     here = tmp_path / "here"
     sweep(spec, settings, directory=here)

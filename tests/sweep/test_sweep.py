@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest_study import rows, timeless_files, timeless_rows
+from sweep_files import rows, timeless_files, timeless_rows
 
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import InfeasibleError, OutputError, SpecError
@@ -87,12 +87,10 @@ def test_failures_are_rows_with_reasons(spec, stub, tmp_path):
 def test_a_failure_that_is_mended_leaves_no_trace(spec, stub, tmp_path, monkeypatch):
     out = tmp_path / "out"
     sweep(spec, ["experiment.samples=6,7"], directory=out)
-    import inputdesign_cli
+    from inputdesign_cli import tasks
 
-    solve = inputdesign_cli.solve
-    monkeypatch.setitem(
-        vars(inputdesign_cli), "solve", lambda s: solve(s.model_copy(update={"experiment": six(s)}))
-    )
+    solve = tasks.solve
+    monkeypatch.setattr(tasks, "solve", lambda s: solve(s.model_copy(update={"experiment": six(s)})))
     assert sweep(spec, ["experiment.samples=6,7"], directory=out, rerun_failed=True).failures == 0
     assert list((out / "failures").iterdir()) == []
 

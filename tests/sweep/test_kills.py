@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from conftest_study import timeless_files, timeless_rows
+from sweep_files import timeless_files, timeless_rows
 
 
 def command(spec, out, points):
