@@ -27,6 +27,8 @@ def explain(
     from inputdesign_cli.error_codes import explanation, explanations
 
     if code is None:
-        typer.echo("\n".join(aligned([(name, known.title) for name, known in sorted(explanations().items())])))
+        typer.echo(
+            "\n".join(aligned([(name, known.title) for name, known in sorted(explanations().items())]))
+        )
     else:
         typer.echo(explanation(code))

@@ -35,8 +35,8 @@ class GivenExcitation:
     """What it is called, its powers by kind and channel, and the information matrix that it gives.
 
     `information` maps an experiment to M (k, k) in its coordinates. A recorded signal has `samples` (n, r),
-    the others a `basis` and the coefficients `x` on it; `sinusoids` are the amplitudes (L, r) of a
-    multisine, in phase over the channels.
+    the others a `basis` and the coefficients `x` on it; `sinusoids` are the frequencies (L,) and amplitudes
+    (L, r) of a multisine, in phase over the channels.
     """
 
     kind: str
@@ -44,7 +44,7 @@ class GivenExcitation:
     information: Callable[[ChannelExperiment], Array]
     basis: TabulatedSpectrum | LinesBasis | None = None
     x: Array | None = None
-    sinusoids: Array | None = None
+    sinusoids: tuple[Array, Array] | None = None
     samples: Array | None = None
 
     @classmethod
@@ -55,7 +55,7 @@ class GivenExcitation:
         x: Array,
         experiment: ChannelExperiment,
         *,
-        sinusoids: Array | None = None,
+        sinusoids: tuple[Array, Array] | None = None,
     ) -> GivenExcitation:
         """An excitation that is known by its spectrum."""
 
@@ -198,13 +198,13 @@ class GivenTask:
             return None
         several = experiment.inputs > 1
         if excitation.sinusoids is not None and several:
-            return self._in_phase(basis, excitation.sinusoids, experiment, ratio)
+            return self._in_phase(*excitation.sinusoids, experiment, ratio)
         spectrum = DesignedSpectrum.of(basis, x, inputs=experiment.inputs, step=request.step)
         return given_record(request, experiment, spectrum, ratio)
 
     def _in_phase(
         self,
-        basis: TabulatedSpectrum | LinesBasis,
+        frequencies: Array,
         amplitudes: Array,
         experiment: ChannelExperiment,
         ratio: Callable[[Array], float],
@@ -215,8 +215,7 @@ class GivenTask:
         if samples < least_period(1):
             return None
         rng = np.random.default_rng(request.settings.seed)
-        frequencies = basis.frequencies * request.step
-        record = in_phase_record(frequencies, amplitudes, samples, rng)
+        record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)
         return Record(record, "multisine", _ratio_of(request, experiment, record, ratio))
 
 

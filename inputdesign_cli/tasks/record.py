@@ -101,10 +101,12 @@ def make_record(request: RecordRequest, design: Design, experiment: ChannelExper
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
     def made(samples: int, candidates: int | None = None) -> Record:
-        count = {} if candidates is None else {"candidates": candidates, "most_candidates": candidates}
+        tried = settings
+        if candidates is not None:
+            tried = replace(settings, candidates=candidates, most_candidates=candidates)
         generator = SignalGenerator(
             spectrum,
-            replace(settings, **count),
+            tried,
             samples,
             request.band,
             partial(limited_responses, experiment, bounds, request.step, settings.hold),

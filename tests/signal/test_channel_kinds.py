@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 import scipy.signal
 from channel_plants import arx
+from inputdesign_cli.signal.channel_levels import few_levels
+from inputdesign_cli.signal.channels import gaussian_record
 
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.signal import (
@@ -17,8 +19,6 @@ from inputdesign_cli.signal import (
     grid_lines,
     realise_channels,
 )
-from inputdesign_cli.signal.channel_levels import few_levels
-from inputdesign_cli.signal.channels import gaussian_record
 from inputdesign_cli.signal.levels import two_level
 from inputdesign_cli.signal.sinusoids import Sinusoids
 

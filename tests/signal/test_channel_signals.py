@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from channel_plants import arrays, arx, paper_experiment
+from inputdesign_cli.signal.channels import orthogonal_columns
 
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import MatrixController, PolynomialChannels, PolynomialLoop
@@ -16,7 +17,6 @@ from inputdesign_cli.signal import (
     merged,
     multisine_record,
 )
-from inputdesign_cli.signal.channels import orthogonal_columns
 
 
 def hermitian_density(number, r, rng):

@@ -156,7 +156,8 @@ class InternalModel(_FixedLoop):
         outside = plant.zeros[np.abs(plant.zeros) > 1]
         if outside.size:
             # (q^-1 - 1/z0)*... of modulus one on the circle, poles at the mirrored zeros, gain one at DC.
-            below, blaschke = (np.poly(roots).real for roots in (1 / np.conj(outside), outside))
+            mirrored, blaschke = (np.poly(roots).real for roots in (1 / np.conj(outside), outside))
+            below = np.asarray(mirrored, dtype=float)
             above = product_of([above, np.sum(below) / np.sum(blaschke) * blaschke])
         return cls(TransferMatrix.diagonal(filter_, plant.outputs).scaled(Rational(above, (below,))))
 

@@ -116,7 +116,9 @@ def _excitation(spec: Spec, stated: GivenSpectrum, experiment: ChannelExperiment
             size = np.linalg.norm(amplitudes, axis=1)
             lines = LinesBasis(frequencies, amplitudes / size[:, None] + 0j, frequencies, np.ones(r))
             x = np.where(constant, 1.0, 0.5) * size**2
-            return GivenExcitation.spectral("multisine", lines, x, experiment, sinusoids=amplitudes)
+            return GivenExcitation.spectral(
+                "multisine", lines, x, experiment, sinusoids=(frequencies, amplitudes)
+            )
         case GivenTable() as given:
             return GivenExcitation.spectral("table", _table(spec, given, r), np.ones(1), experiment)
 

@@ -15,7 +15,7 @@ from inputdesign_cli.plant import Loop, hold_entries
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
-from inputdesign_cli.tasks.build.channels import build_channel_model, stable_loop
+from inputdesign_cli.tasks.build.system import build_loop, build_model
 
 
 def true_experiment(spec: Spec, nominal: Experiment, result: Mapping[str, Any]) -> Experiment:
@@ -76,11 +76,11 @@ def true_channel_experiment(
     plant, noise = changes.get("plant", spec.plant), changes.get("noise", spec.noise)
     if isinstance(spec.plant, PolynomialPlant) or noise.filters:
         changes["plant"] = _polynomials(spec, plant)
-    model, controller = build_channel_model(spec.model_copy(update=changes)), spec.experiment.controller
+    model, controller = build_model(spec.model_copy(update=changes)), spec.experiment.controller
     loop = None
     if controller is not None:
         with _told_of_truth(spec):
-            loop = stable_loop(model, controller)
+            loop = build_loop(model, controller)
     return replace(nominal, model=model, loop=loop, factor=None)
 
 

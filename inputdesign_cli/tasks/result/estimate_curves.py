@@ -76,9 +76,7 @@ def bound_of_data(
         if violation.frequency is not None:
             entry["worst_frequency"] = violation.frequency / units.frequency
     errors = [error for error in (r.bounded_error for r in bounding) if error is not None]
-    table, curves = bound_curves(
-        units, errors or entries, information, stated=bool(errors), label="data"
-    )
+    table, curves = bound_curves(units, errors or entries, information, stated=bool(errors), label="data")
     return table, curves, entry
 
 

@@ -16,7 +16,7 @@ from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.results import Curves, DirectionCurves, MatrixSpectrumCurves, Table
 from inputdesign_cli.runs.units import Header
-from inputdesign_cli.tasks.result.channel_curves import hermitian_columns
+from inputdesign_cli.tasks.result.spectrum import hermitian_columns
 
 # Frequencies of the plots, and what share of the band they reach down to.
 _POINTS = 800
