@@ -27,8 +27,7 @@ def explain(
     from inputdesign_cli.error_codes import explanation, explanations
 
     if code is None:
-        typer.echo(
-            "\n".join(aligned([(name, known.title) for name, known in sorted(explanations().items())]))
-        )
+        known = sorted(explanations().items())
+        typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known])))
     else:
         typer.echo(explanation(code))

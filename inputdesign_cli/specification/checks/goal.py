@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.plant import RegressionPlant
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.wording import choices
 
@@ -72,7 +71,7 @@ def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
         return
     if spec.goal == "best_accuracy" and (spec.accuracy.goals or spec.accuracy.requirements):
         asked = (*spec.accuracy.goals, *spec.accuracy.requirements)[0]
-        regression = isinstance(spec.plant, RegressionPlant)
+        regression = spec.plant.kind == "regression"
         key = "limits.energy" if regression else "limits.input_power"
         yield PathDiagnostic(
             "needs-limits",

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from inputdesign_cli.specification.models.control import ContinuousMatrixTransfer, DiscreteMatrix
 from inputdesign_cli.specification.models.controller import ControllerMatrix
-from inputdesign_cli.specification.models.experiment import NoiseShape
+from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.plant import (
-    ContinuousMatrix,
-    PolynomialPlant,
-    RegressionPlant,
-    TrueParameters,
-)
+from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, MomentsSpectrum
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import count
@@ -28,8 +21,8 @@ def stable_unless_controlled(spec: Spec) -> Iterator[PathDiagnostic]:
     yield from _stable_A(spec, spec.plant, ("plant",))
 
 
-def _stable_A(spec: Spec, plant: object, path: Path) -> Iterator[PathDiagnostic]:  # noqa: N802 (the paper's symbol)
-    if spec.closed_loop or not isinstance(plant, PolynomialPlant):
+def _stable_A(spec: Spec, plant: Plant, path: Path) -> Iterator[PathDiagnostic]:  # noqa: N802 (the paper's symbol)
+    if spec.closed_loop or plant.kind != "polynomial":
         return
     polynomials = plant.A_per_output if depth(plant.A) == 2 else plant.A_per_output[:1]
     for i, polynomial in enumerate(polynomials):
@@ -52,7 +45,7 @@ def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """So has the controller of a sensitivity that is to be kept."""
     error = spec.accuracy.model_error
-    if error is None or error.sensitivity is None or isinstance(spec.plant, RegressionPlant):
+    if error is None or error.sensitivity is None or spec.plant.kind == "regression":
         return
     if error.sensitivity.controller is not None:
         where = ("accuracy", "model_error", "sensitivity", "controller")
@@ -63,7 +56,7 @@ def _controller(
     spec: Spec, controller: DiscreteTransfer | ControllerMatrix, path: Path
 ) -> Iterator[PathDiagnostic]:
     plant = spec.plant
-    if isinstance(plant, RegressionPlant):
+    if plant.kind == "regression":
         yield PathDiagnostic(
             "unsuitable-key", "{key} does not go with a regression", "remove the controller", path
         )
@@ -74,10 +67,10 @@ def _controller(
             "add sample: zoh to the plant",
             path,
         )
-    if isinstance(plant, RegressionPlant):
+    if plant.kind == "regression":
         return
     channels = (plant.inputs, plant.outputs)
-    if not isinstance(controller, ControllerMatrix):
+    if controller.kind == "discrete":
         if channels != (1, 1):
             yield PathDiagnostic(
                 "wrong-shape",
@@ -117,15 +110,14 @@ def true_noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
         yield from _noise(spec, spec.simulation.noise, ("simulation", "noise"))
 
 
-def _noise(spec: Spec, noise: NoiseShape, path: Path) -> Iterator[PathDiagnostic]:
+def _noise(spec: Spec, noise: Noise | SimulationNoise, path: Path) -> Iterator[PathDiagnostic]:
     outputs = spec.plant.outputs
     kind = ""
-    if isinstance(spec.plant, RegressionPlant):
+    if spec.plant.kind == "regression":
         kind = "the noise of a regression is white"
     elif not spec.plant.sampled:
         kind = "the plant is not sampled"
-    for key in ("C", "D"):
-        value = getattr(noise, key)
+    for key, value in (("C", noise.C), ("D", noise.D)):
         if kind and key in noise.model_fields_set:
             yield PathDiagnostic(
                 "unsuitable-key",
@@ -140,7 +132,7 @@ def _noise(spec: Spec, noise: NoiseShape, path: Path) -> Iterator[PathDiagnostic
                 "write one polynomial for all outputs, or a list with one per output",
                 (*path, key),
             )
-    variance = getattr(noise, "variance", None)
+    variance = noise.variance
     if isinstance(variance, tuple) and len(variance) != outputs:
         yield PathDiagnostic(
             "wrong-shape",
@@ -156,9 +148,9 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     if true is None:
         return
     path, plant = ("simulation", "plant"), spec.plant
-    if isinstance(plant, RegressionPlant):
+    if plant.kind == "regression":
         size = plant.inputs
-        if not isinstance(true, TrueParameters):
+        if true.kind != "parameters":
             yield PathDiagnostic(
                 "regression-mismatch",
                 "{key} of a regression is a list of its true parameters",
@@ -174,7 +166,7 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
                 (*path, "parameters"),
             )
         return
-    if isinstance(true, TrueParameters | RegressionPlant):
+    if true.kind == "parameters" or true.kind == "regression":
         yield PathDiagnostic(
             "regression-mismatch",
             "{key} describes a regression, but the plant is not one",
@@ -205,17 +197,17 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 def spectrum_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """Moments are for regressions, a FIR spectrum for discrete time."""
     spectrum = spec.spectrum
-    regression = isinstance(spec.plant, RegressionPlant)
-    if spectrum is None or isinstance(spectrum, GivenSpectrum):
+    regression = spec.plant.kind == "regression"
+    if spectrum is None or spectrum.type == "given":
         return
-    if isinstance(spectrum, MomentsSpectrum) != regression:
+    if (spectrum.type == "moments") != regression:
         yield PathDiagnostic(
             "regression-mismatch",
             "a regression is designed by its moments" if regression else "moments are for a regression",
             "write spectrum: {type: moments}" if regression else "write spectrum: {type: fir, order: 20}",
             ("spectrum", "type"),
         )
-    elif isinstance(spectrum, FirSpectrum) and not spec.plant.sampled:
+    elif spectrum.type == "fir" and not spec.plant.sampled:
         yield PathDiagnostic(
             "unsuitable-key",
             "a fir spectrum is in discrete time, but the plant is not sampled",
@@ -228,7 +220,7 @@ def regression_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """A regression is designed for mean-squared error, and that error is one of regressions."""
     error, plant = spec.accuracy.mean_squared_error, spec.plant
     path = ("accuracy", "mean_squared_error")
-    if not isinstance(plant, RegressionPlant):
+    if plant.kind != "regression":
         if error is not None:
             yield PathDiagnostic(
                 "regression-mismatch",
@@ -263,7 +255,7 @@ def regression_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """The controller inverts the plant, so that plant and desired loop are square and of one size."""
     error, plant = spec.accuracy.closed_loop_error, spec.plant
-    if error is None or isinstance(plant, RegressionPlant):
+    if error is None or plant.kind == "regression":
         return
     if plant.inputs != plant.outputs:
         yield PathDiagnostic(
@@ -275,12 +267,11 @@ def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
         )
         return
     target = error.control.model_reference
-    inside = target.continuous if isinstance(target, ContinuousMatrixTransfer) else target
-    if not isinstance(inside, ContinuousMatrix | DiscreteMatrix):
+    if target is None or target.kind == "discrete" or target.kind == "continuous":
         return
-    rows = inside.numerator_matrix
+    rows = target.numerator if target.kind == "discrete_matrix" else target.continuous.numerator
     if (len(rows), len(rows[0])) != (plant.outputs, plant.outputs):
-        step = ("continuous",) if isinstance(target, ContinuousMatrixTransfer) else ()
+        step = ("continuous",) if target.kind == "continuous_matrix" else ()
         yield PathDiagnostic(
             "not-square",
             f"{{key}} is {len(rows)} x {len(rows[0])}: the loop from reference to output is square, "
@@ -295,16 +286,14 @@ def weights_fit(spec: Spec) -> Iterator[PathDiagnostic]:
     if spec.plant.sampled:
         return
     accuracy = spec.accuracy
-    places: list[tuple[object, Path]] = []
-    if accuracy.model_error is not None:
-        places.append((accuracy.model_error.weight, ("accuracy", "model_error", "weight")))
-    if accuracy.weighted_variance is not None:
-        places.append((accuracy.weighted_variance.weight, ("accuracy", "weighted_variance", "weight")))
-    for weight, path in places:
-        if isinstance(weight, DiscreteTransfer):
+    for name, given in (
+        ("model_error", accuracy.model_error),
+        ("weighted_variance", accuracy.weighted_variance),
+    ):
+        if given is not None and given.weight is not None and given.weight.kind == "discrete":
             yield PathDiagnostic(
                 "unsuitable-key",
                 "{key} is in q^-1, but the plant is not sampled",
                 "write {continuous: {numerator: [..], denominator: [..]}} in s",
-                path,
+                ("accuracy", name, "weight"),
             )

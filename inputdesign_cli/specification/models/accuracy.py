@@ -208,15 +208,13 @@ class Accuracy(Section):
     def requirements(self) -> tuple[str, ...]:
         """The keys of the requirements that are given, in the order of the contract."""
         names = ("model_error", "information", "application", "weighted_variance", "standard_deviation")
-        given = [n for n in names if getattr(self, n) is not None]
-        if self.mean_squared_error is not None and self.mean_squared_error.target is not None:
-            given.append("mean_squared_error")
-        return tuple(given)
+        error = self.mean_squared_error
+        bounded = error is not None and error.target is not None
+        return self.stated(*names) + (("mean_squared_error",) if bounded else ())
 
     @property
     def goals(self) -> tuple[str, ...]:
         """The keys that ask for the best that limits allow."""
-        given = [n for n in ("criterion", "closed_loop_error") if getattr(self, n) is not None]
-        if self.mean_squared_error is not None and self.mean_squared_error.target is None:
-            given.append("mean_squared_error")
-        return tuple(given)
+        error = self.mean_squared_error
+        unbounded = error is not None and error.target is None
+        return self.stated("criterion", "closed_loop_error") + (("mean_squared_error",) if unbounded else ())

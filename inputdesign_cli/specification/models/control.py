@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -26,6 +26,8 @@ from inputdesign_cli.specification.models.transfer import (
 class DiscreteMatrix(MatrixRatio, family="transfer", phrase="a transfer matrix in q^-1"):
     """A stable transfer matrix in the delay operator, rows are outputs."""
 
+    kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
+
     def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
         """Its poles lie inside the unit circle; `path` leads to the matrix."""
         yield from check_factors(self.denominator, check_delay_stable, *path)
@@ -39,6 +41,8 @@ class ContinuousTarget(ContinuousMatrix):
 
 class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):
     """A transfer matrix in s, sampled with a zero-order hold."""
+
+    kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
 
     continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = Field(default=None, description="How it is sampled: zoh.")

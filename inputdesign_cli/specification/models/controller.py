@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -41,6 +41,8 @@ class MatrixRatio(Section):
 
 class ControllerMatrix(MatrixRatio, family="transfer", phrase="a controller of several channels"):
     """C of u = r - C y: rows are inputs of the plant, columns its outputs."""
+
+    kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
 
 
 def _kind(value: dict[str, Any]) -> str:

@@ -133,7 +133,7 @@ class Cost(Section):
 
 def exactly_one(model: Section, *keys: str) -> Iterator[PathDiagnostic]:
     """Exactly one of the keys is given."""
-    given = [k for k in keys if getattr(model, k) is not None]
+    given = model.stated(*keys)
     alternatives = ", ".join(keys[:-1]) + " or " + keys[-1]
     if not given:
         needs = f"{{key}} needs one of {alternatives}"

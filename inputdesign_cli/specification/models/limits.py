@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -42,6 +42,8 @@ class PowerLimit(Section):
 
 class TableFile(Section, family="curve", phrase="table"):
     """A curve over frequency from a file."""
+
+    kind: ClassVar[Literal["table"]] = "table"
 
     table: FileName = Field(description="CSV file with frequency and value.")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -42,6 +42,8 @@ _PARAMETERS = "a list of true parameters"
 
 class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
     """A(q) y = B(q)/F(q) u + noise, coefficients in ascending powers of q^-1."""
+
+    kind: ClassVar[Literal["polynomial"]] = "polynomial"
 
     A: MonicPerOutput = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."
@@ -138,6 +140,8 @@ class ContinuousMatrix(Section):
 class ContinuousPlant(Section, family="plant", phrase=_CONTINUOUS):
     """A continuous-time transfer matrix; without `sample` the design stays in continuous time."""
 
+    kind: ClassVar[Literal["continuous"]] = "continuous"
+
     continuous: ContinuousMatrix = Field(description="Transfer matrix in s; rows are outputs.")
     sample: Literal["zoh"] | None = Field(
         default=None,
@@ -172,6 +176,8 @@ class RegressionSize(Section):
 class RegressionPlant(Section, family="plant", phrase=_REGRESSION):
     """A linear regression of which some regressors are neglected."""
 
+    kind: ClassVar[Literal["regression"]] = "regression"
+
     regression: RegressionSize = Field(description="The numbers of estimated and neglected regressors.")
 
     @property
@@ -192,6 +198,8 @@ class RegressionPlant(Section, family="plant", phrase=_REGRESSION):
 
 class TrueParameters(Section, family="plant", phrase=_PARAMETERS):
     """The true parameters of a regression: the estimated ones, then the neglected ones."""
+
+    kind: ClassVar[Literal["parameters"]] = "parameters"
 
     parameters: Numbers = Field(description="True values of all regression parameters, estimated ones first.")
 

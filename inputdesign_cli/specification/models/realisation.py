@@ -95,8 +95,9 @@ class Signal(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every setting means something for the type of signal."""
-        for key, types in _ONLY_FOR.items():
-            if getattr(self, key) is not None and self.type is not None and self.type not in types:
+        for key in self.stated(*_ONLY_FOR):
+            types = _ONLY_FOR[key]
+            if self.type is not None and self.type not in types:
                 yield PathDiagnostic(
                     "unsuitable-key",
                     f"{{key}} does not go with type: {self.type}",

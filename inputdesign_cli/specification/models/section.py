@@ -39,6 +39,10 @@ class Section(BaseModel):
         """What is wrong with the section as a whole, once each of its values is valid."""
         return iter(())
 
+    def stated(self, *keys: str) -> tuple[str, ...]:
+        """Those of the keys that have a value."""
+        return tuple(key for key in keys if getattr(self, key) is not None)
+
     @model_validator(mode="after")
     def _checked(self) -> Self:
         if found := tuple(self.check()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Discriminator, Field
 
@@ -149,6 +149,8 @@ class GivenTable(Section, family="given", phrase="type: table"):
 class GivenSignal(Section, family="given", phrase="signal"):
     """A recorded or planned signal."""
 
+    type: ClassVar[Literal["signal"]] = "signal"
+
     signal: FileName = Field(description="CSV file with the samples of the signal.")
 
 
@@ -165,6 +167,8 @@ Given = Annotated[
 
 class GivenSpectrum(Section, family="spectrum", phrase="given"):
     """The excitation is fixed; nothing is designed."""
+
+    type: ClassVar[Literal["given"]] = "given"
 
     given: Given = Field(description="The excitation: white, multisine, a tabulated spectrum, or a signal.")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field
 
@@ -48,6 +48,8 @@ class Ratio(Section):
 class DiscreteTransfer(Ratio, family="transfer", phrase="a transfer function in q^-1"):
     """A transfer function in the delay operator: coefficients in ascending powers of q^-1."""
 
+    kind: ClassVar[Literal["discrete"]] = "discrete"
+
     def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
         """Its poles lie inside the unit circle; `path` leads to the transfer function."""
         yield from check_factors(self.denominator, check_delay_stable, *path)
@@ -63,6 +65,8 @@ class ContinuousRatio(Ratio):
 
 class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time transfer function"):
     """A transfer function in s, and how it is sampled."""
+
+    kind: ClassVar[Literal["continuous"]] = "continuous"
 
     continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = Field(
