@@ -66,7 +66,8 @@ class RecordFilters:
         if loop is None:
             return {"excitation": (one, one), "input": (one, one), "output": (B, AF)}
         P, Q = loop.controller.numerator[0, 0], loop.controller.denominator[0]
-        characteristic = np.polynomial.polynomial.polyadd(np.convolve(AF, Q), np.convolve(B, P))
+        around = np.polynomial.polynomial.polyadd(np.convolve(AF, Q), np.convolve(B, P))
+        characteristic = np.asarray(around, dtype=np.float64)
         return {
             "excitation": (one, one),
             "input": (np.convolve(AF, Q), characteristic),

@@ -17,7 +17,9 @@ def as_channels(experiment: Experiment) -> ChannelExperiment:
     )
     loop = None
     if controller is not None:
-        C = MatrixController.build([[controller.numerator]], [[controller.denominator_polynomial]])
+        C = MatrixController.build(
+            [[controller.numerator.tolist()]], [[controller.denominator_polynomial.tolist()]]
+        )
         loop = PolynomialLoop(model, C)
     return ChannelExperiment(
         model, experiment.samples, prior=experiment.prior, factor=experiment.factor, loop=loop

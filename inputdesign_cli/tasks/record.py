@@ -17,6 +17,7 @@ from inputdesign_cli.signal import (
     Bounds,
     DesignedSpectrum,
     Record,
+    RecordBasis,
     SignalGenerator,
     SignalSettings,
     Target,
@@ -101,14 +102,11 @@ def make_record(request: RecordRequest, design: Design, experiment: ChannelExper
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
     def made(samples: int, candidates: int | None = None) -> Record:
-        count = {} if candidates is None else {"candidates": candidates, "most_candidates": candidates}
-        generator = SignalGenerator(
-            spectrum,
-            replace(settings, **count),
-            samples,
-            request.band,
-            partial(limited_responses, experiment, bounds, request.step, settings.hold),
-        )
+        tried = settings
+        if candidates is not None:
+            tried = replace(settings, candidates=candidates, most_candidates=candidates)
+        limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
+        generator = SignalGenerator(spectrum, tried, samples, request.band, limited)
         return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
 
     record = made(samples)
@@ -141,20 +139,17 @@ def given_record(
     samples = request.length(experiment.samples)
     if settings.period(samples) < least_period(experiment.inputs):
         return None
-    generator = SignalGenerator(
-        spectrum,
-        settings,
-        samples,
-        request.band,
-        partial(limited_responses, experiment, request.bounds, request.step, settings.hold),
-    )
+    limited = partial(limited_responses, experiment, request.bounds, request.step, settings.hold)
+    generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
     plant = FiniteRecord(experiment, samples, request.step)
     return best_record(generator, plant, Target(ratio), request.bounds)
 
 
 def designed_spectrum(request: RecordRequest, design: Design, inputs: int) -> DesignedSpectrum:
     """The spectrum of a design, for values as far apart as asked."""
-    return DesignedSpectrum.of(design.result.basis, design.result.x, inputs=inputs, step=request.step)
+    basis = design.result.basis
+    assert isinstance(basis, RecordBasis)
+    return DesignedSpectrum.of(basis, design.result.x, inputs=inputs, step=request.step)
 
 
 def least_period(inputs: int) -> int:
