@@ -36,3 +36,13 @@ def input_and_output(experiment: Experiment, excitation: Array) -> tuple[Array, 
     plant = FiniteRecord(as_channels(experiment), excitation.size)
     u, y = (plant.signals(kind, excitation[:, None])[:, 0] for kind in ("input", "output"))
     return u, y
+
+
+def channel_record_information(experiment: ChannelExperiment, record: Array, step: float) -> Array:
+    """(k, k): the information of one record (n, r), see `FiniteRecord`."""
+    return FiniteRecord(experiment, len(record), step).information(record)
+
+
+def channel_outputs(experiment: ChannelExperiment, record: Array, step: float) -> Array:
+    """(n, p): what the samples alone cause at the outputs, from rest."""
+    return FiniteRecord(experiment, len(record), step).signals("output", record)

@@ -1,6 +1,5 @@
 """Limits on single samples hold exactly, whatever else is asked of the record."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
