@@ -134,7 +134,7 @@ def draw_figure(outcome: Results, stem: str, file: Path) -> None:
     """A figure of a run."""
     from inputdesign_cli.figures.plots import draw
 
-    draw(outcome.curves[stem], file, outcome.time_unit)
+    file.write_bytes(draw(outcome.curves[stem], outcome.time_unit))
 
 
 def draw_sweep(golden: Golden, name: str, setting: str, file: Path) -> None:

@@ -33,10 +33,11 @@ def assess(
         known = inputdesign_cli.load_spec(spec, overrides or [])
         assessment = inputdesign_cli.assess(known, data, remove_means=remove_means)
     with status(f"{data}: writing ...", quiet=quiet):
+        from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
         directory = output or Path("runs") / f"{data.stem}_assessed"
-        files = write_run(assessment.outcome, directory, figures=figures)
+        files = write_run(assessment.outcome, directory, draw_all(assessment.outcome) if figures else {})
     show(assessment.outcome, files, json_output=json_output, quiet=quiet)
     if not assessment.met:
         raise typer.Exit(EXIT_MISSED)

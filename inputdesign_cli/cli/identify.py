@@ -36,7 +36,9 @@ def identify(
         known = inputdesign_cli.load_spec(spec, overrides or [])
         outcome = inputdesign_cli.identify(known, data, remove_means=remove_means)
     with status(f"{data}: writing ...", quiet=quiet):
+        from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
-        files = write_run(outcome, output or Path("runs") / f"{data.stem}_identified", figures=figures)
+        directory = output or Path("runs") / f"{data.stem}_identified"
+        files = write_run(outcome, directory, draw_all(outcome) if figures else {})
     show(outcome, files, json_output=json_output, quiet=quiet)

@@ -35,10 +35,11 @@ def produce(
         spec = inputdesign_cli.load_spec(spec_file, overrides or [])
         outcome = getattr(inputdesign_cli, verb)(spec, **where)
     with status(f"{spec_file}: writing ...", quiet=quiet):
+        from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
         directory = output or Path("runs") / spec_file.stem
-        files = write_run(outcome, directory, figures=figures)
+        files = write_run(outcome, directory, draw_all(outcome) if figures else {})
     show(outcome, files, json_output=json_output, quiet=quiet)
 
 

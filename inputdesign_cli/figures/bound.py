@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    figure,
-    frequency_axis,
-    legend_above,
-)
-from inputdesign_cli.runs.results import Array, BoundCurves
-
-DASHED = (0, (5, 2))
-DOTTED = (0, (1, 1.2))
+from inputdesign_cli.figures.entries import draw_entries
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE
+from inputdesign_cli.runs.results import Array, BoundCurves, BoundPanel
 
 
-def draw_bound(curves: BoundCurves, path: Path, time_unit: str) -> None:
+def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
     """|G|, r_u, r_adm and white excitation's r_u over frequency, with the active frequencies marked."""
-    with figure(path) as page:
-        axes = page.add_subplot()
-        handles = plot_bound(axes, curves)
-        frequency_axis(axes, curves.frequency, time_unit)
-        axes.set_ylabel("magnitude")
-        legend_above(axes, handles)
+    draw_entries(page, curves.panels, _plot, time_unit, magnitude="magnitude")
 
 
-def plot_bound(axes: Axes, curves: BoundCurves) -> list[Artist]:
-    """The curves of one plant on `axes`; the handles of their legend."""
+def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
+    """The curves of one entry on `axes`; the handles of their legend."""
     w = curves.frequency
     axes.set_yscale("log")
     handles: list[Artist] = []

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, BLUE, GREY, figure
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, legend_over_all
 from inputdesign_cli.runs.results import Array, Ellipse, EllipseCurves
 
 COLUMNS = 3
 POINTS = 200
 
 
-def draw_ellipses(curves: EllipseCurves, path: Path) -> None:
+def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
     """One panel a pair: the region that holds the estimate with the probability of the title."""
     columns = min(COLUMNS, len(curves.pairs))
     rows = -(-len(curves.pairs) // columns)
-    with figure(path) as page:
-        grid = page.subplots(rows, columns, squeeze=False)
-        for axes, pair in zip(grid.flat, curves.pairs, strict=False):
-            _draw(axes, pair, curves.probability)
-        for axes in grid.flat[len(curves.pairs) :]:
-            axes.set_axis_off()
-        handles, _ = grid.flat[0].get_legend_handles_labels()
-        page.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    grid = page.subplots(rows, columns, squeeze=False)
+    for axes, pair in zip(grid.flat, curves.pairs, strict=False):
+        _draw(axes, pair, curves.probability)
+    for axes in grid.flat[len(curves.pairs) :]:
+        axes.set_axis_off()
+    handles, _ = grid.flat[0].get_legend_handles_labels()
+    legend_over_all(page, handles)
 
 
 def _draw(axes: Axes, pair: Ellipse, probability: float) -> None:
     label = f"{100 * probability:g} % of estimates, design"
     axes.plot(*boundary(pair.center, pair.covariance, probability), color=BLUE, linewidth=1.8, label=label)
     if pair.white is not None:
-        dashed = (0, (5, 2))
         outline = boundary(pair.center, pair.white, probability)
-        axes.plot(*outline, color=GREY, linestyle=dashed, linewidth=1.2, label="flat input")
+        axes.plot(*outline, color=GREY, linestyle=DASHED, linewidth=1.2, label="flat input")
     axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
     axes.set_xlabel(pair.names[0])
     axes.set_ylabel(pair.names[1])

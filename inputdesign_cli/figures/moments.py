@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, ORANGE, figure
+from inputdesign_cli.figures.style import BLACK, ORANGE
 from inputdesign_cli.runs.results import MomentsCurves
 
 NUMBERED = 8  # rows up to which the entries are written into the cells
 
 
-def draw_moments(curves: MomentsCurves, path: Path, time_unit: str) -> None:
+def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
     """R as a coloured matrix, the estimated block framed; beside it the power of each line of the input."""
-    with figure(path) as page:
-        if curves.line_frequency is None or curves.line_power is None:
-            _draw_matrix(page.add_subplot(), curves)
-            return
-        matrix, lines = page.subplots(1, 2, width_ratios=[1, 1])
-        _draw_matrix(matrix, curves)
-        lines.vlines(curves.line_frequency, 0.0, curves.line_power, color=ORANGE, linewidth=1.8)
-        lines.plot(curves.line_frequency, curves.line_power, "o", color=ORANGE, markersize=5)
-        lines.set_xlim(-0.03 * curves.nyquist, 1.03 * curves.nyquist)
-        lines.set_ylim(0.0, 1.08 * float(curves.line_power.max()))
-        lines.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
-        lines.set_ylabel("power of each line (mean square)")
+    if curves.line_frequency is None or curves.line_power is None:
+        _draw_matrix(page.add_subplot(), curves)
+        return
+    matrix, lines = page.subplots(1, 2, width_ratios=[1, 1])
+    _draw_matrix(matrix, curves)
+    lines.vlines(curves.line_frequency, 0.0, curves.line_power, color=ORANGE, linewidth=1.8)
+    lines.plot(curves.line_frequency, curves.line_power, "o", color=ORANGE, markersize=5)
+    lines.set_xlim(-0.03 * curves.nyquist, 1.03 * curves.nyquist)
+    lines.set_ylim(0.0, 1.08 * float(curves.line_power.max()))
+    lines.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+    lines.set_ylabel("power of each line (mean square)")
 
 
 def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:

@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
+from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, BLUE, ORANGE, figure, frequency_axis, legend_above
+from inputdesign_cli.figures.style import BLACK, BLUE, ORANGE, frequency_axis, legend_above
 from inputdesign_cli.runs.results import OptimalityCurves
 
 
-def draw_optimality(curves: OptimalityCurves, path: Path, time_unit: str) -> None:
+def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> None:
     """What a unit of cost buys at each frequency, relative to the best: one on the support, never more."""
-    with figure(path) as page:
-        axes = page.add_subplot()
-        (ratio,) = axes.plot(
-            curves.frequency, curves.ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost"
+    axes = page.add_subplot()
+    (ratio,) = axes.plot(
+        curves.frequency, curves.ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost"
+    )
+    handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="optimal: nowhere above one")]
+    if curves.support.size:
+        handles += axes.plot(
+            curves.support,
+            np.interp(curves.support, curves.frequency, curves.ratio),
+            linestyle="none",
+            marker="o",
+            markersize=6,
+            markerfacecolor="white",
+            markeredgecolor=ORANGE,
+            markeredgewidth=1.6,
+            clip_on=False,
+            zorder=5,
+            label="power of the optimum",
         )
-        handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="optimal: nowhere above one")]
-        if curves.support.size:
-            handles += axes.plot(
-                curves.support,
-                np.interp(curves.support, curves.frequency, curves.ratio),
-                linestyle="none",
-                marker="o",
-                markersize=6,
-                markerfacecolor="white",
-                markeredgecolor=ORANGE,
-                markeredgewidth=1.6,
-                clip_on=False,
-                zorder=5,
-                label="power of the optimum",
-            )
-        axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
-        axes.set_ylabel("relative worth of excitation")
-        frequency_axis(axes, curves.frequency, time_unit)
-        legend_above(axes, handles)
+    axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
+    axes.set_ylabel("relative worth of excitation")
+    frequency_axis(axes, curves.frequency, time_unit)
+    legend_above(axes, handles)

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.bound import draw_bound
-from inputdesign_cli.figures.channels import draw_channel_bounds
-from inputdesign_cli.figures.data import draw_channel_fit, draw_channel_residuals, draw_fit, draw_residuals
+from inputdesign_cli.figures.data import draw_fit, draw_residuals
+from inputdesign_cli.figures.directions import draw_directions
 from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.error import draw_error
 from inputdesign_cli.figures.loss import draw_loss
-from inputdesign_cli.figures.matrix_spectrum import draw_directions, draw_matrix_spectrum
 from inputdesign_cli.figures.moments import draw_moments
 from inputdesign_cli.figures.optimality import draw_optimality
 from inputdesign_cli.figures.signal import draw_signal
-from inputdesign_cli.figures.spectrum import draw_spectrum
-from inputdesign_cli.figures.trials import draw_channel_error_bands, draw_cloud, draw_error_bands
+from inputdesign_cli.figures.spectrum import draw_input_spectrum, draw_spectrum
+from inputdesign_cli.figures.style import FileType, rendered
+from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands
 from inputdesign_cli.runs.results import (
     BoundCurves,
-    ChannelBoundCurves,
-    ChannelErrorBandCurves,
-    ChannelFitCurves,
-    ChannelResidualCurves,
     CloudCurves,
     Curves,
     DirectionCurves,
@@ -34,53 +33,35 @@ from inputdesign_cli.runs.results import (
     MomentsCurves,
     OptimalityCurves,
     ResidualCurves,
+    Results,
     SignalCurves,
     SpectrumCurves,
 )
 
+# Each draws its curves on an empty page; the text is the unit of time.
+_DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
+    BoundCurves: draw_bound,
+    CloudCurves: draw_cloud,
+    DirectionCurves: draw_directions,
+    EllipseCurves: draw_ellipses,
+    ErrorBandCurves: draw_error_bands,
+    ErrorCurves: draw_error,
+    FitCurves: draw_fit,
+    LossCurves: draw_loss,
+    MatrixSpectrumCurves: draw_spectrum,
+    MomentsCurves: draw_moments,
+    OptimalityCurves: draw_optimality,
+    ResidualCurves: draw_residuals,
+    SignalCurves: draw_signal,
+    SpectrumCurves: draw_input_spectrum,
+}
 
-def draw(curves: Curves, path: Path, time_unit: str = "s") -> None:
-    """Draw `curves` to `path` as a PNG of 7 by 4.5 inches; frequencies are labelled rad per `time_unit`.
 
-    Raises
-    ------
-    OSError
-        `path` cannot be written.
-    """
-    match curves:
-        case SpectrumCurves():
-            draw_spectrum(curves, path, time_unit)
-        case MatrixSpectrumCurves():
-            draw_matrix_spectrum(curves, path, time_unit)
-        case DirectionCurves():
-            draw_directions(curves, path, time_unit)
-        case LossCurves():
-            draw_loss(curves, path)
-        case BoundCurves():
-            draw_bound(curves, path, time_unit)
-        case OptimalityCurves():
-            draw_optimality(curves, path, time_unit)
-        case SignalCurves():
-            draw_signal(curves, path, time_unit)
-        case ErrorCurves():
-            draw_error(curves, path)
-        case MomentsCurves():
-            draw_moments(curves, path, time_unit)
-        case ChannelBoundCurves():
-            draw_channel_bounds(curves, path, time_unit)
-        case EllipseCurves():
-            draw_ellipses(curves, path)
-        case CloudCurves():
-            draw_cloud(curves, path)
-        case ErrorBandCurves():
-            draw_error_bands(curves, path, time_unit)
-        case ChannelErrorBandCurves():
-            draw_channel_error_bands(curves, path, time_unit)
-        case ChannelFitCurves():
-            draw_channel_fit(curves, path, time_unit)
-        case ChannelResidualCurves():
-            draw_channel_residuals(curves, path)
-        case FitCurves():
-            draw_fit(curves, path, time_unit)
-        case ResidualCurves():
-            draw_residuals(curves, path)
+def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> bytes:
+    """The figure of `curves` as a file; frequencies are labelled rad per `time_unit`."""
+    return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type)
+
+
+def draw_all(results: Results) -> dict[str, bytes]:
+    """The figures of a run by their file names: bound.png, spectrum.png, .."""
+    return {f"{stem}.png": draw(curves, results.time_unit) for stem, curves in results.curves.items()}

@@ -1,69 +1,164 @@
-"""spectrum.png: where in frequency the design puts its power."""
+"""spectrum.png: where in frequency the design puts its power, and in which directions of the inputs."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLUE, GREEN, GREY, ORANGE, figure, frequency_axis, legend_above
-from inputdesign_cli.runs.results import Array, SpectrumCurves
+from inputdesign_cli.figures.style import (
+    BLUE,
+    DASHED,
+    GREEN,
+    GREY,
+    ORANGE,
+    PALETTE,
+    frequency_axis,
+    legend_above,
+)
+from inputdesign_cli.runs.results import Array, MatrixSpectrumCurves, SpectrumCurves
 
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
+# Entries of a nearly singular spectrum lie on each other: the dashes let the lower ones show through.
+DASHES: tuple[Any, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
+MARGIN = 0.02  # beside the outermost lines, of the width between them
+MOST = 6  # curves that stay apart in one panel
+FEW = 60  # lines that are drawn bold
 
 
-def draw_spectrum(curves: SpectrumCurves, path: Path, time_unit: str) -> None:
-    """The density over frequency with the level of the white baseline; sinusoids as stems of their power."""
-    with figure(path) as page:
-        axes = page.add_subplot()
-        frequencies: list[Array] = [curves.frequency]
-        handles: list[Artist] = []
-        if curves.density is not None:
-            label = rf"$\Phi_{{{curves.symbol}}}$, design"
-            handles += axes.plot(curves.frequency, curves.density, color=BLUE, linewidth=2.0, label=label)
-            if curves.record is not None:
-                label = "record, smoothed"
-                handles += axes.plot(
-                    curves.frequency, curves.record, color=GREEN, linewidth=1.0, alpha=0.8, label=label
-                )
-            if curves.white is not None:
-                white = rf"$\Phi_{{{curves.symbol}}}$, white"
-                handles.append(axes.axhline(curves.white, color=GREY, linestyle=(0, (5, 2)), label=white))
-            axes.set_ylabel(rf"spectral density $\Phi_{{{curves.symbol}}}(\omega)$")
-            _scale_density(axes, curves.density, curves.white)
-        if curves.line_frequency is not None and curves.line_power is not None:
-            stems = axes
-            if curves.density is not None:
-                stems = axes.twinx()
-                stems.grid(False)
-                stems.spines["right"].set_visible(True)
-            handles.append(_draw_lines(stems, curves.line_frequency, curves.line_power, curves))
-            frequencies.append(curves.line_frequency)
-        frequency_axis(axes, np.concatenate(frequencies), time_unit)
-        legend_above(axes, handles)
+def draw_spectrum(page: Figure, curves: MatrixSpectrumCurves, time_unit: str) -> None:
+    """The density, or the powers of sinusoids, of one input; of several the matrix and its eigenvalues."""
+    if curves.spectrum.shape[1] > 1:
+        _draw_matrix(page, curves, time_unit)
+        return
+    axes = page.add_subplot()
+    shown = curves.frequency > 0
+    w, power = curves.frequency[shown], curves.spectrum[shown, 0, 0].real
+    if curves.lines:
+        handles = _plot_lines(axes, w, power, curves)
+    else:
+        record = None if curves.record is None else curves.record[shown, 0]
+        handles = _plot_density(axes, w, power, record, curves)
+    frequency_axis(axes, w if curves.band is None else np.append(w, curves.band), time_unit)
+    legend_above(axes, handles)
 
 
-def _scale_density(axes: Axes, density: Array, white: float | None) -> None:
+def _plot_density(
+    axes: Axes, w: Array, density: Array, record: Array | None, curves: MatrixSpectrumCurves
+) -> list[Artist]:
+    phi = rf"\Phi_{{{curves.symbol}}}"
+    handles: list[Artist] = []
+    handles += axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"${phi}$, design")
+    if record is not None:
+        handles += axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
+    if curves.white is not None:
+        handles.append(plot_white(axes, curves.white, f"${phi}$, white"))
+    axes.set_ylabel(rf"spectral density ${phi}(\omega)$")
     peak = float(density.max())
-    if peak > LOG_FROM * (white if white else float(np.median(density))):
+    if peak > LOG_FROM * (curves.white or float(np.median(density))):
         axes.set_yscale("log", nonpositive="mask")
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, peak * 10.0**-DECADES), high)
     else:
         axes.set_ylim(bottom=0.0)
+    return handles
 
 
-def _draw_lines(axes: Axes, frequency: Array, power: Array, curves: SpectrumCurves) -> LineCollection:
-    few = frequency.size <= 60
+def _plot_lines(axes: Axes, w: Array, power: Array, curves: MatrixSpectrumCurves) -> list[Artist]:
+    few = w.size <= FEW
     total = f"sinusoids, total power {power.sum():.4g}"
-    if curves.density is None and curves.white is not None:
+    if curves.white is not None:
         total += f" (white: {curves.white:.4g})"
-    stems = axes.vlines(frequency, 0.0, power, color=ORANGE, linewidth=1.8 if few else 0.8, label=total)
-    axes.plot(frequency, power, linestyle="none", marker="o", markersize=5 if few else 2.5, color=ORANGE)
+    stems = axes.vlines(w, 0.0, power, color=ORANGE, linewidth=1.8 if few else 0.8, label=total)
+    axes.plot(w, power, linestyle="none", marker="o", markersize=5 if few else 2.5, color=ORANGE)
     axes.set_ylim(0.0, 1.08 * float(power.max()))
     axes.set_ylabel(rf"power of each sinusoid of ${curves.symbol}$ (mean square)")
-    return stems
+    return [stems]
+
+
+def _draw_matrix(page: Figure, curves: MatrixSpectrumCurves, time_unit: str) -> None:
+    """Moduli of the entries above, eigenvalues below: where the power is, and in how many directions."""
+    w, r = curves.frequency, curves.spectrum.shape[1]
+    entries = np.asarray(np.abs(curves.spectrum), dtype=float)
+    pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
+    above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    handles: list[Artist] = []
+    for number, (i, j) in enumerate(pairs[:MOST]):
+        label = rf"$|\Phi_{{{i + 1}{j + 1}}}|$"
+        handles += plot_power(above, w, entries[:, i, j], lines=curves.lines, number=number, label=label)
+    if curves.record is not None:
+        drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
+        drawn[0].set_label("record, smoothed")
+        handles += drawn[:1]
+    of = f"power of each line of ${curves.symbol}$"
+    above.set_ylabel(of if curves.lines else rf"density of ${curves.symbol}$")
+    shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
+    if float(shown.max(initial=0.0)) > LOG_FROM * float(np.median(shown)):
+        logarithmic(above, shown)
+    else:
+        above.set_ylim(bottom=0.0)
+    legend_above(above, handles)
+    values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
+    handles = []
+    for number in range(min(r, MOST)):
+        label = rf"$\lambda_{{{number + 1}}}$"
+        handles += plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
+    if curves.white is not None:
+        handles.append(plot_white(below, curves.white))
+    logarithmic(below, values)
+    below.set_ylabel("eigenvalues")
+    legend_above(below, handles)
+    if curves.logarithmic:
+        frequency_axis(below, w, time_unit)
+    else:
+        low, high = float(w.min()), float(w.max()) if w.max() > w.min() else float(w.min()) + 1.0
+        margin = MARGIN * (high - low) if curves.lines else 0.0
+        below.set_xlim(low - margin, high + margin)
+        below.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+
+
+def plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> list[Artist]:
+    """A power over frequency, the `number`th of its panel: a curve, or stems of `lines`."""
+    colour = PALETTE[number % MOST]
+    if not lines:
+        dashes = DASHES[number % len(DASHES)]
+        return list(axes.plot(w, values, color=colour, linestyle=dashes, linewidth=1.8, label=label))
+    axes.vlines(w, 0.0, values, color=colour, linewidth=1.0, alpha=0.6)
+    return list(axes.plot(w, values, linestyle="none", marker="o", markersize=4, color=colour, label=label))
+
+
+def plot_white(axes: Axes, level: float, label: str = "white, same power") -> Artist:
+    """The level of white excitation."""
+    return axes.axhline(level, color=GREY, linestyle=DASHED, label=label)
+
+
+def logarithmic(axes: Axes, values: Array) -> None:
+    """A logarithmic axis over the leading decades: zeros of a spectrum would stretch it without end."""
+    peak = float(values.max(initial=0.0))
+    if peak > 0.0:
+        axes.set_yscale("log", nonpositive="mask")
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, peak * 10.0**-DECADES), max(high, 2.0 * peak))
+
+
+def draw_input_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
+    """The spectrum of one input from separate arrays of its density or its lines."""
+    if curves.density is not None:
+        record = None if curves.record is None else curves.record[:, None]
+        spectrum = curves.density[:, None, None].astype(np.complex128)
+        new = MatrixSpectrumCurves(
+            curves.frequency, spectrum, curves.white, symbol=curves.symbol, record=record
+        )
+    else:
+        assert curves.line_frequency is not None
+        assert curves.line_power is not None
+        spectrum = curves.line_power[:, None, None].astype(np.complex128)
+        band = (float(curves.frequency[0]), float(curves.frequency[-1])) if curves.frequency.size else None
+        new = MatrixSpectrumCurves(
+            curves.line_frequency, spectrum, curves.white, lines=True, symbol=curves.symbol, band=band
+        )
+    draw_spectrum(page, new, time_unit)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
+import io
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
@@ -14,6 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from inputdesign_cli.runs.results import Array
+
+FileType = Literal["png", "svg"]
 
 SIZE = (7.0, 4.5)  # inches
 NARROW = (4.6, 3.4)
@@ -26,6 +27,9 @@ ORANGE = "#D55E00"
 GREEN = "#009E73"
 GREY = "#777777"
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+
+DASHED = (0, (5, 2))
+DOTTED = (0, (1, 1.2))
 
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "idesign",
@@ -44,22 +48,22 @@ _RC: dict[Any, Any] = {
 }
 
 
-@contextmanager
-def figure(path: Path) -> Iterator[Figure]:
-    """A figure to draw on, saved to `path` when the block ends well.
+def rendered(paint: Callable[[Figure], object], file_type: FileType = "png") -> bytes:
+    """The file of a figure that `paint` draws on an empty page.
 
-    As PNG; or, if `path` ends in `.svg`, as a smaller SVG whose text stays readable on a phone.
+    A PNG of 7 by 4.5 inches, or a smaller SVG whose text stays readable on a phone.
     """
-    narrow = str(path).endswith(".svg")
+    narrow = file_type == "svg"
+    buffer = io.BytesIO()
     with mpl.rc_context(_RC):
-        size = NARROW if narrow else SIZE
-        canvas = FigureCanvasAgg(Figure(figsize=size, dpi=DPI, layout="constrained"))
-        yield canvas.figure
+        canvas = FigureCanvasAgg(Figure(figsize=NARROW if narrow else SIZE, dpi=DPI, layout="constrained"))
+        paint(canvas.figure)
         if narrow:
             # Without a date and with ids that do not change, the same figure is the same file.
-            canvas.print_figure(path, format="svg", metadata={"Date": None, "Creator": None})
+            canvas.print_figure(buffer, format="svg", metadata={"Date": None, "Creator": None})
         else:
-            canvas.print_png(path)
+            canvas.print_png(buffer)
+    return buffer.getvalue()
 
 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
@@ -73,7 +77,9 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:
     """A legend over the axes, where it cannot cover a curve."""
-    narrow = axes.get_figure(root=True).get_figwidth() < SIZE[0]  # type: ignore[union-attr]
+    page = axes.get_figure(root=True)
+    assert page is not None
+    narrow = page.get_figwidth() < SIZE[0]
     longest = max((len(str(handle.get_label())) for handle in handles), default=0)
     axes.legend(
         handles=handles,
@@ -84,3 +90,8 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:
         handlelength=2.2,
         columnspacing=1.4,
     )
+
+
+def legend_over_all(page: Figure, handles: Sequence[Artist], title: str | None = None) -> None:
+    """One legend for all panels of a page, above them."""
+    page.legend(handles=handles, loc="outside upper left", ncols=len(handles), title=title, alignment="left")

@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.figures.style import BLACK, GREY, PALETTE, figure, legend_above
+from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, PALETTE, legend_above, rendered
 from inputdesign_cli.figures.sweep_axes import (
     LOG_FROM,
     curve,
@@ -39,7 +40,6 @@ _WHITE_OTHERWISE = "baseline.white.value"
 MOST_CURVES = len(PALETTE)
 MOST_LABELLED = 100  # cells of a map that carry their number
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
-_ANY = (0, (5, 2))
 _KINDS = {
     "least_cost": "cost",
     "shortest_experiment": "samples",
@@ -56,13 +56,13 @@ _KINDS = {
 def draw_sweep(table: SweepTable, root: Path) -> list[Path]:
     """Draw the figures that suit the sweep as PNG files, and return their paths."""
     drawn = []
-    for name, draw in sweep_figures(table):
+    for name, paint in sweep_figures(table):
         drawn.append(root / f"{name}.png")
-        draw(drawn[-1])
+        drawn[-1].write_bytes(rendered(paint))
     return drawn
 
 
-def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Path], None]]]:
+def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]]]:
     """The figures that suit the sweep, each with what draws it: curves over a numeric key, a map over two.
 
     Sweeps over three keys or more, or without two results, have none.
@@ -73,7 +73,7 @@ def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Path], None]]]
     axes = [key for key in table.axes if len(set(table.columns[key])) > 1]
     numeric = [key for key in axes if _usable(table.numbers(key))]
     zipped = bool(table.summary.get("zip"))
-    found: list[tuple[str, Callable[[Path], None]]] = []
+    found: list[tuple[str, Callable[[Figure], None]]] = []
     if numeric and (zipped or len(axes) <= 2):
         along = max(numeric, key=lambda key: len(set(table.columns[key])))
         across = None if zipped else next((key for key in axes if key != along), None)
@@ -100,51 +100,50 @@ def _label(table: SweepTable, quantity: str) -> str:
     return _KINDS.get(_kind(table), quantity) if quantity == "objective.value" else quantity
 
 
-def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, path: Path) -> None:
+def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, page: Figure) -> None:
     """The quantity over one key, a curve for each value of the other, each with its bound; white if alone."""
     x, y = table.numbers(along), table.numbers(quantity)
     assert x is not None
     assert y is not None
     groups = list(dict.fromkeys(table.columns[across])) if across else [""]
     bound, whatever = _bound(table, quantity)
-    with figure(path) as page:
-        axes = page.add_subplot()
-        handles: list[Artist] = []
-        shown = [y]
-        for group, colour in zip(groups, PALETTE, strict=False):
-            member = np.array([not across or text == group for text in table.columns[across or along]])
-            name = f"{_short(across)} = {group}" if across else "design"
-            handles += curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
-            if bound is not None:
-                shade = colour if across else BLACK
-                curve(axes, x[member], bound[member], color=shade, linestyle=_ANY, linewidth=1.1)
-                shown.append(bound)
+    axes = page.add_subplot()
+    handles: list[Artist] = []
+    shown = [y]
+    for group, colour in zip(groups, PALETTE, strict=False):
+        member = np.array([not across or text == group for text in table.columns[across or along]])
+        name = f"{_short(across)} = {group}" if across else "design"
+        handles += curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
         if bound is not None:
-            side = "ceiling" if _maximised(table) else "floor"
-            label = f"{side}: {whatever}"
-            handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=_ANY, label=label))
-        white = table.numbers(_WHITE.get(_kind(table), _WHITE_OTHERWISE))
-        if quantity == "objective.value" and not across and white is not None:
-            handles += curve(axes, x, white, color=GREY, linestyle=(0, (1, 1.2)), label="white excitation")
-            shown.append(white)
-        mark_failures(axes, x[~np.isfinite(y)])
-        values = np.concatenate([part[np.isfinite(part)] for part in shown])
-        low, high = float(values.min()), float(values.max())
-        if low > 0 and high > LOG_FROM * low and _kind(table) != "D":
-            axes.set_yscale("log")
-            plain_numbers(axes.yaxis, high / low)
-        elif _maximised(table):
-            # What counts are differences; but those of rounding are none.
-            half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
-            axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-        elif low > 0:
-            axes.set_ylim(bottom=0.0)
-        scale_key(axes, along, x)
-        axes.set_ylabel(_label(table, quantity))
-        if len(handles) > 4:
-            axes.legend(handles=handles, loc="best")
-        else:
-            legend_above(axes, handles)
+            shade = colour if across else BLACK
+            curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1)
+            shown.append(bound)
+    if bound is not None:
+        side = "ceiling" if _maximised(table) else "floor"
+        label = f"{side}: {whatever}"
+        handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
+    white = table.numbers(_WHITE.get(_kind(table), _WHITE_OTHERWISE))
+    if quantity == "objective.value" and not across and white is not None:
+        handles += curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
+        shown.append(white)
+    mark_failures(axes, x[~np.isfinite(y)])
+    values = np.concatenate([part[np.isfinite(part)] for part in shown])
+    low, high = float(values.min()), float(values.max())
+    if low > 0 and high > LOG_FROM * low and _kind(table) != "D":
+        axes.set_yscale("log")
+        plain_numbers(axes.yaxis, high / low)
+    elif _maximised(table):
+        # What counts are differences; but those of rounding are none.
+        half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
+        axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
+    elif low > 0:
+        axes.set_ylim(bottom=0.0)
+    scale_key(axes, along, x)
+    axes.set_ylabel(_label(table, quantity))
+    if len(handles) > 4:
+        axes.legend(handles=handles, loc="best")
+    else:
+        legend_above(axes, handles)
 
 
 def _bound(table: SweepTable, quantity: str) -> tuple[Array | None, str]:
@@ -160,7 +159,7 @@ def _maximised(table: SweepTable) -> bool:
     return any(table.columns.get("objective.upper_bound", []))
 
 
-def _draw_map(table: SweepTable, quantity: str, down: str, along: str, path: Path) -> None:
+def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Figure) -> None:
     """The quantity in colour over two keys; points without a result stay hatched."""
     values = table.numbers(quantity)
     assert values is not None
@@ -171,20 +170,19 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, path: Pat
     low, high = float(np.nanmin(cells)), float(np.nanmax(cells))
     wide = low > 0 and high > LOG_FROM * low
     norm = LogNorm(low, high) if wide else Normalize(low, high if high > low else low + 1.0)
-    with figure(path) as page:
-        axes = page.add_subplot()
-        axes.grid(False)
-        axes.patch.set(hatch="xxx", edgecolor="#BBBBBB")
-        image = axes.pcolormesh(np.ma.masked_invalid(cells), norm=norm, cmap="cividis", rasterized=True)
-        bar = page.colorbar(image, label=_label(table, quantity))
-        if wide:
-            plain_numbers(bar.ax.yaxis, high / low)
-        _ticks(axes, columns, "x")
-        _ticks(axes, rows, "y")
-        axes.set_xlabel(key_label(along))
-        axes.set_ylabel(key_label(down))
-        if cells.size <= MOST_LABELLED and len(columns) <= 12:
-            _number_cells(axes, cells, norm)
+    axes = page.add_subplot()
+    axes.grid(False)
+    axes.patch.set(hatch="xxx", edgecolor="#BBBBBB")
+    image = axes.pcolormesh(np.ma.masked_invalid(cells), norm=norm, cmap="cividis", rasterized=True)
+    bar = page.colorbar(image, label=_label(table, quantity))
+    if wide:
+        plain_numbers(bar.ax.yaxis, high / low)
+    _ticks(axes, columns, "x")
+    _ticks(axes, rows, "y")
+    axes.set_xlabel(key_label(along))
+    axes.set_ylabel(key_label(down))
+    if cells.size <= MOST_LABELLED and len(columns) <= 12:
+        _number_cells(axes, cells, norm)
 
 
 def _number_cells(axes: Axes, cells: Array, norm: Normalize) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, PALETTE, figure, legend_above
+from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above
 from inputdesign_cli.figures.sweep_axes import LOG_FROM, curve, mark_failures, plain_numbers, scale_key
 from inputdesign_cli.figures.sweep_table import SweepTable
 
@@ -26,7 +25,7 @@ def moment_entries(table: SweepTable) -> list[str]:
     return found[:MOST_ENTRIES]
 
 
-def draw_moments(table: SweepTable, along: str, path: Path) -> None:
+def draw_moments(table: SweepTable, along: str, page: Figure) -> None:
     """R11, R12, .. and the trace over a key, crosses where a point has no result.
 
     The axis is logarithmic if the trace spans more than a decade and no entry is zero or negative.
@@ -37,25 +36,24 @@ def draw_moments(table: SweepTable, along: str, path: Path) -> None:
     entries = moment_entries(table)
     # Entries may coincide (R11 = R22 if the regressors are delayed copies): the later, the thinner.
     widths = np.linspace(5.0, 1.2, len(entries))
-    with figure(path) as page:
-        axes = page.add_subplot()
-        handles: list[Artist] = []
-        values = [trace]
-        for name, colour, width in zip(entries, PALETTE, widths, strict=False):
-            y = table.numbers(name)
-            assert y is not None
-            label = f"$R_{{{','.join(_place(name)) if len(entries) > 3 else ''.join(_place(name))}}}$"
-            handles += curve(axes, x, y, color=colour, linewidth=width, label=label)
-            values.append(y)
-        handles += curve(axes, x, trace, color=BLACK, linestyle=(0, (5, 2)), label="trace $R$")
-        mark_failures(axes, x[~np.isfinite(trace)])
-        span = float(np.nanmax(trace) / np.nanmin(trace))
-        if span > LOG_FROM and min(float(np.nanmin(part)) for part in values) > 0:
-            axes.set_yscale("log")
-            plain_numbers(axes.yaxis, span)
-        scale_key(axes, along, x)
-        axes.set_ylabel("moments, summed over the samples")
-        legend_above(axes, handles)
+    axes = page.add_subplot()
+    handles: list[Artist] = []
+    values = [trace]
+    for name, colour, width in zip(entries, PALETTE, widths, strict=False):
+        y = table.numbers(name)
+        assert y is not None
+        label = f"$R_{{{','.join(_place(name)) if len(entries) > 3 else ''.join(_place(name))}}}$"
+        handles += curve(axes, x, y, color=colour, linewidth=width, label=label)
+        values.append(y)
+    handles += curve(axes, x, trace, color=BLACK, linestyle=DASHED, label="trace $R$")
+    mark_failures(axes, x[~np.isfinite(trace)])
+    span = float(np.nanmax(trace) / np.nanmin(trace))
+    if span > LOG_FROM and min(float(np.nanmin(part)) for part in values) > 0:
+        axes.set_yscale("log")
+        plain_numbers(axes.yaxis, span)
+    scale_key(axes, along, x)
+    axes.set_ylabel("moments, summed over the samples")
+    legend_above(axes, handles)
 
 
 def _place(name: str) -> list[str]:

@@ -2,76 +2,59 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.figures.channels import entry_panels
 from inputdesign_cli.figures.ellipses import boundary
-from inputdesign_cli.figures.style import BLACK, BLUE, GREY, ORANGE, figure, frequency_axis, legend_above
-from inputdesign_cli.runs.results import ChannelErrorBandCurves, CloudCurves, ErrorBandCurves
+from inputdesign_cli.figures.entries import draw_entries
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, ORANGE, legend_over_all
+from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel
 
 COLUMNS = 2
-DASHED = (0, (5, 2))
 
 
-def draw_cloud(curves: CloudCurves, path: Path) -> None:
+def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
     """One panel a pair of parameters: an estimate a dot, with the ellipse that theory predicts."""
     columns = min(COLUMNS, len(curves.pairs))
     rows = -(-len(curves.pairs) // columns)
-    with figure(path) as page:
-        grid = page.subplots(rows, columns, squeeze=False)
-        for axes, (i, j) in zip(grid.flat, curves.pairs, strict=False):
-            pair = np.array([i, j])
-            axes.plot(*curves.theta[:, pair].T, ".", color=BLUE, markersize=2.5, alpha=0.5, rasterized=True)
-            outline = boundary(curves.centre[pair], curves.covariance[np.ix_(pair, pair)], curves.probability)
-            axes.plot(*outline, color=ORANGE, linewidth=1.8)
-            axes.plot(*curves.centre[pair], "+", color=BLACK, markersize=9, markeredgewidth=1.6)
-            axes.set_xlabel(curves.names[i])
-            axes.set_ylabel(curves.names[j])
-            axes.locator_params(nbins=4)
-        for axes in grid.flat[len(curves.pairs) :]:
-            axes.set_axis_off()
-        share = f"{100 * curves.probability:g} % ellipse of theory"
-        handles = [
-            Line2D([], [], color=BLUE, marker=".", linestyle="none", label=f"{len(curves.theta)} estimates"),
-            Line2D([], [], color=ORANGE, label=share),
-            Line2D([], [], color=BLACK, marker="+", linestyle="none", label="truth"),
-        ]
-        page.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    grid = page.subplots(rows, columns, squeeze=False)
+    for axes, (i, j) in zip(grid.flat, curves.pairs, strict=False):
+        pair = np.array([i, j])
+        axes.plot(*curves.theta[:, pair].T, ".", color=BLUE, markersize=2.5, alpha=0.5, rasterized=True)
+        outline = boundary(curves.centre[pair], curves.covariance[np.ix_(pair, pair)], curves.probability)
+        axes.plot(*outline, color=ORANGE, linewidth=1.8)
+        axes.plot(*curves.centre[pair], "+", color=BLACK, markersize=9, markeredgewidth=1.6)
+        axes.set_xlabel(curves.names[i])
+        axes.set_ylabel(curves.names[j])
+        axes.locator_params(nbins=4)
+    for axes in grid.flat[len(curves.pairs) :]:
+        axes.set_axis_off()
+    share = f"{100 * curves.probability:g} % ellipse of theory"
+    handles = [
+        Line2D([], [], color=BLUE, marker=".", linestyle="none", label=f"{len(curves.theta)} estimates"),
+        Line2D([], [], color=ORANGE, label=share),
+        Line2D([], [], color=BLACK, marker="+", linestyle="none", label="truth"),
+    ]
+    legend_over_all(page, handles)
 
 
-def draw_error_bands(curves: ErrorBandCurves, path: Path, time_unit: str) -> None:
+def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
     """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
-    with figure(path) as page:
-        axes = page.add_subplot()
-        handles = _bands(axes, curves)
-        frequency_axis(axes, curves.frequency, time_unit)
-        axes.set_ylabel(r"$|\hat{G} - G_0|$")
-        axes.set_title(curves.name, loc="right", color=GREY)
-        legend_above(axes, handles)
+    plot = partial(_bands, runs=curves.runs)
+    draw_entries(page, curves.panels, plot, time_unit, magnitude=r"$|\hat{G} - G_0|$", title=curves.name)
 
 
-def draw_channel_error_bands(curves: ChannelErrorBandCurves, path: Path, time_unit: str) -> None:
-    """The same in a panel for every entry of G, outputs as rows."""
-    with figure(path) as page:
-        handles: list[Artist] = []
-        for axes, entry in entry_panels(page, curves.entries, time_unit):
-            handles = max(handles, _bands(axes, entry), key=len)
-        page.legend(
-            handles=handles, loc="outside upper left", ncols=len(handles), title=curves.name, alignment="left"
-        )
-
-
-def _bands(axes: Axes, curves: ErrorBandCurves) -> list[Artist]:
-    """The curves of one plant or entry; the handles of their legend."""
+def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
+    """The curves of one entry; the handles of their legend."""
     w, levels = curves.frequency, sorted(curves.quantiles)
     low, high = levels[0], levels[-1]
     axes.set_yscale("log")
-    label = f"{100 * low:g} to {100 * high:g} % of {curves.runs} runs"
+    label = f"{100 * low:g} to {100 * high:g} % of {runs} runs"
     band = axes.fill_between(
         w, curves.quantiles[low], curves.quantiles[high], color=BLUE, alpha=0.25, linewidth=0, label=label
     )
@@ -79,7 +62,7 @@ def _bands(axes: Axes, curves: ErrorBandCurves) -> list[Artist]:
     for level in levels[1:-1]:
         handles += axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
     if curves.r_u is not None:
-        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="$r_u$, promised")
+        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="$r_u$, predicted")
     if curves.r_adm is not None:
         r_adm = np.where(curves.r_adm > 0, curves.r_adm, np.nan)
         handles += axes.plot(w, r_adm, color=ORANGE, label=r"$r_\mathrm{adm}$")

@@ -6,7 +6,6 @@ Every run draws new phases of the designed sinusoids (scaled to their power exac
 
 from __future__ import annotations
 
-import re
 import time
 from dataclasses import replace
 from typing import Any
@@ -25,7 +24,7 @@ from inputdesign_cli.monte_carlo.evaluation import PredictedError
 from inputdesign_cli.monte_carlo.trials import joined
 from inputdesign_cli.plant import ChannelLoop
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, ChannelBoundCurves, Results
+from inputdesign_cli.runs.results import BoundCurves, Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.tasks.build.channel_requirements import build_entry_errors, unstated_errors
@@ -101,16 +100,16 @@ def _promise(spec: Spec, nominal: ChannelExperiment, outcome: Results, informati
             spec, unstated_errors(spec, experiment), information, None, stated=False
         )
     unit, alpha = frequency_unit(spec), model_error_alpha(spec, experiment)
-    if isinstance(bound, BoundCurves):  # of the norm of all entries
-        return PredictedError(bound.frequency * unit, bound.r_u, bound.r_adm, alpha)
-    assert isinstance(bound, ChannelBoundCurves)
-    panels = list(bound.entries.values())
-    places = [tuple(int(number) - 1 for number in re.findall(r"\d+", name)) for name in bound.entries]
+    assert isinstance(bound, BoundCurves)
+    panels = bound.panels
+    if len(panels) == 1 and panels[0].entry is None:  # of the norm of all entries
+        (alone,) = panels
+        return PredictedError(alone.frequency * unit, alone.r_u, alone.r_adm, alpha)
     admissible = [panel.r_adm for panel in panels if panel.r_adm is not None]
     return PredictedError(
         w=np.concatenate([panel.frequency for panel in panels]) * unit,
         r_u=np.concatenate([panel.r_u for panel in panels]),
         r_adm=np.concatenate(admissible) if admissible else None,
         alpha=alpha,
-        entries=np.repeat([place or (0, 0) for place in places], [p.frequency.size for p in panels], axis=0),
+        entries=np.repeat([p.entry or (0, 0) for p in panels], [p.frequency.size for p in panels], axis=0),
     )

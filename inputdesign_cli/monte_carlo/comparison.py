@@ -23,7 +23,7 @@ from inputdesign_cli.monte_carlo.evaluation import (
 )
 from inputdesign_cli.monte_carlo.statistics import wishart_range
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import ChannelErrorBandCurves, ErrorBandCurves, Results
+from inputdesign_cli.runs.results import ErrorBandCurves, Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.tasks.build.channels import frequency_unit
@@ -139,22 +139,24 @@ def _wishart(study: Simulation, size: int) -> list[float]:
     return list(wishart_range(size, study.runs, np.random.default_rng(study.seed))) if study.runs > 1 else []
 
 
-def _error_bands(
-    spec: Spec, trials: Trials, promise: PredictedError, name: str
-) -> ChannelErrorBandCurves | ErrorBandCurves:
+def _error_bands(spec: Spec, trials: Trials, promise: PredictedError, name: str) -> ErrorBandCurves:
     """Of every entry that the promise is about."""
     errors, frequency = trials.errors(promise), promise.w / frequency_unit(spec)
     r_u = promise.r_u if name == "design" else None
+    title, runs = name.replace("_", " "), len(errors)
     if promise.entries is None:
-        return error_bands(errors, frequency=frequency, r_u=r_u, r_adm=promise.r_adm, name=name)
-    panels = {}
-    for i, j in np.unique(promise.entries, axis=0):
+        alone = error_bands(errors, frequency=frequency, r_u=r_u, r_adm=promise.r_adm)
+        return ErrorBandCurves((alone,), title, runs)
+    panels = []
+    for i, j in np.unique(promise.entries, axis=0).tolist():
         own = np.all(promise.entries == (i, j), axis=1)
-        panels[f"[{i + 1},{j + 1}]"] = error_bands(
-            errors[:, own],
-            frequency=frequency[own],
-            r_u=None if r_u is None else r_u[own],
-            r_adm=None if promise.r_adm is None else promise.r_adm[own],
-            name=name,
+        panels.append(
+            error_bands(
+                errors[:, own],
+                frequency=frequency[own],
+                r_u=None if r_u is None else r_u[own],
+                r_adm=None if promise.r_adm is None else promise.r_adm[own],
+                entry=(i, j),
+            )
         )
-    return ChannelErrorBandCurves(panels, name.replace("_", " "))
+    return ErrorBandCurves(tuple(panels), title, runs)

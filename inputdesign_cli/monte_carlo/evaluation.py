@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves
+from inputdesign_cli.runs.results import CloudCurves, Entry, ErrorBandPanel
 from inputdesign_cli.specification import Spec
 
 _QUANTILES = (0.05, 0.5, 0.95)
@@ -183,16 +183,15 @@ def gap_notes(spec: Spec, inputs: Mapping[str, Any]) -> list[str]:
 
 
 def error_bands(
-    errors: Array, *, frequency: Array, r_u: Array | None, r_adm: Array | None, name: str
-) -> ErrorBandCurves:
+    errors: Array, *, frequency: Array, r_u: Array | None, r_adm: Array | None, entry: Entry = None
+) -> ErrorBandPanel:
     """Quantiles of the errors (runs, n) of one entry of G over frequency (n,)."""
-    return ErrorBandCurves(
+    return ErrorBandPanel(
         frequency=frequency,
         quantiles={q: np.quantile(errors, q, axis=0) for q in _QUANTILES},
         r_u=r_u,
         r_adm=r_adm,
-        name=name.replace("_", " "),
-        runs=len(errors),
+        entry=entry,
     )
 
 

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import base64
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.figures.plots import Curves, draw
+from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.report.study_words import study_caption
-from inputdesign_cli.runs.results import Array, BoundCurves, OptimalityCurves, SignalCurves, SpectrumCurves
+from inputdesign_cli.runs.results import (
+    Array,
+    BoundCurves,
+    BoundPanel,
+    OptimalityCurves,
+    SignalCurves,
+    SpectrumCurves,
+)
 from inputdesign_cli.runs.text_formats import read_csv
 
 Result = Mapping[str, Any]
@@ -54,8 +59,7 @@ def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) 
             curves, alt, caption = found
             if isinstance(curves, SpectrumCurves) and closed_loop:
                 curves = replace(curves, symbol="r")
-            uri = svg_uri(partial(_draw, curves, time_unit))
-            charts[stem] = Chart(uri, alt, caption)
+            charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg")), alt, caption)
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
         if kind == "png" and stem not in charts and (run / name).is_file():
@@ -63,16 +67,9 @@ def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) 
     return charts
 
 
-def _draw(curves: Curves, time_unit: str, path: Path) -> None:
-    draw(curves, path, time_unit)
-
-
-def svg_uri(draw_to: Callable[[Path], Any]) -> str:
-    """What a function draws to an SVG file, as a data URI: in an image its ids meet no others of the page."""
-    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
-        path = Path(folder) / "chart.svg"
-        draw_to(path)
-        return "data:image/svg+xml;base64," + base64.b64encode(path.read_bytes()).decode()
+def svg_uri(content: bytes) -> str:
+    """An SVG file as a data URI: in an image its ids meet no others of the page."""
+    return "data:image/svg+xml;base64," + base64.b64encode(content).decode()
 
 
 def png_chart(path: Path) -> Chart:
@@ -93,7 +90,7 @@ def _bound(table: Mapping[str, Array], result: Result) -> tuple[BoundCurves, str
     w = _frequency(table)
     error = result.get("model_error", {})
     active = np.clip(np.array(error.get("active_frequencies", []), dtype=float), w[0], w[-1])
-    curves = BoundCurves(
+    panel = BoundPanel(
         w,
         table["r_u"],
         table["G_abs"],
@@ -102,7 +99,8 @@ def _bound(table: Mapping[str, Array], result: Result) -> tuple[BoundCurves, str
         active,
         table.get("r_u_record"),
     )
-    if curves.r_adm is None:
+    curves = BoundCurves((panel,))
+    if panel.r_adm is None:
         alone = "The error r_u that the model may have, and the gain |G|, against frequency."
         return curves, alone, alone
     worst = f"; the largest ratio is {error['worst_ratio']:.6g}" if "worst_ratio" in error else ""

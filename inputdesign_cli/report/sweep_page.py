@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import QUANTITIES, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.report.charts import Chart, svg_uri
@@ -91,8 +92,8 @@ def _charts(table: SweepTable) -> list[Chart]:
         "moments": "The second moments of the regressors over the key.",
     }
     return [
-        Chart(svg_uri(draw), f"{captions[name]} Drawn from sweep.csv.", captions[name])
-        for name, draw in sweep_figures(table)
+        Chart(svg_uri(rendered(paint, "svg")), f"{captions[name]} Drawn from sweep.csv.", captions[name])
+        for name, paint in sweep_figures(table)
     ]
 
 

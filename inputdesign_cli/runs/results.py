@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+# An entry of G by output and input, from zero; None is the only entry, or the norm of them all.
+Entry = tuple[int, int] | None
 
 
 @dataclass(frozen=True)
@@ -39,15 +41,16 @@ class SpectrumCurves:
 
 @dataclass(frozen=True)
 class MatrixSpectrumCurves:
-    """The spectrum of several inputs over frequency: a density, or the powers of lines."""
+    """The spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
 
     frequency: Array  # (n,) rad per time unit
-    spectrum: NDArray[np.complex128]  # (n, inputs, inputs), Hermitian
-    white: float | None = None  # the level of white noise of the same total power
+    spectrum: NDArray[np.complex128]  # (n, r, r), Hermitian; real powers will do
+    white: float | None = None  # the level of the white baseline; of one input's sinusoids its power
     lines: bool = False
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
-    logarithmic: bool = False  # the axis of frequency
-    record: Array | None = None  # (n, inputs), smoothed periodograms of the record
+    logarithmic: bool = False  # the axis of frequency; that of one input always is
+    record: Array | None = None  # (n, r), smoothed periodograms of the record
+    band: tuple[float, float] | None = None  # where power may be, if that is wider than `frequency`
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,8 @@ class LossCurves:
 
 
 @dataclass(frozen=True)
-class BoundCurves:
-    """Model error against admissible error over frequency; all arrays (n,)."""
+class BoundPanel:
+    """Model error against admissible error over frequency, of one entry of G; all arrays (n,)."""
 
     frequency: Array
     r_u: Array
@@ -81,6 +84,14 @@ class BoundCurves:
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
+    entry: Entry = None
+
+
+@dataclass(frozen=True)
+class BoundCurves:
+    """Model error against admissible error, entry by entry."""
+
+    panels: tuple[BoundPanel, ...]
 
 
 @dataclass(frozen=True)
@@ -90,13 +101,6 @@ class OptimalityCurves:
     frequency: Array
     ratio: Array
     support: Array
-
-
-@dataclass(frozen=True)
-class ChannelBoundCurves:
-    """Model error against admissible error, entry by entry: "[2,1]" -> its curves."""
-
-    entries: Mapping[str, BoundCurves]
 
 
 @dataclass(frozen=True)
@@ -130,63 +134,54 @@ class CloudCurves:
 
 
 @dataclass(frozen=True)
-class ErrorBandCurves:
-    """Quantiles over many runs of |G_hat - G_0| over frequency, against what was promised; arrays (n,)."""
+class ErrorBandPanel:
+    """Quantiles over many runs of |G_hat - G_0| over frequency, against what was predicted; arrays (n,)."""
 
     frequency: Array
     quantiles: Mapping[float, Array]  # probability -> (n,)
     r_u: Array | None = None
     r_adm: Array | None = None
+    entry: Entry = None
+
+
+@dataclass(frozen=True)
+class ErrorBandCurves:
+    """The errors of the models of `runs` experiments with the input `name`, entry by entry."""
+
+    panels: tuple[ErrorBandPanel, ...]
     name: str = "design"
     runs: int = 0
 
 
 @dataclass(frozen=True)
-class ChannelErrorBandCurves:
-    """The same entry by entry: "[2,1]" -> its curves."""
+class FitPanel:
+    """A recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
 
-    entries: Mapping[str, ErrorBandCurves]
-    name: str = "design"
-
-
-@dataclass(frozen=True)
-class FitCurves:
-    """Recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
-
-    time: Array
     y: Array
     predicted: Array
     simulated: Array | None = None
     fit: float | None = None  # per cent
+    output: int = 0  # from zero
+
+
+@dataclass(frozen=True)
+class FitCurves:
+    """A model against the data that it was estimated from, output by output, over `time` (n,)."""
+
+    time: Array
+    panels: tuple[FitPanel, ...]
 
 
 @dataclass(frozen=True)
 class ResidualCurves:
-    """Normalised correlations of residuals over lags (samples), and the probabilities of the two tests."""
+    """Normalised correlations of p residuals among each other and with r past inputs, over lags (samples).
 
-    lags: Array
-    autocorrelation: Array
-    input_lags: Array
-    cross_correlation: Array
-    limit: float
-    whiteness: float
-    independence: float
+    `whiteness` and `independence` are the probabilities of the two tests.
+    """
 
-
-@dataclass(frozen=True)
-class ChannelFitCurves:
-    """The same output by output: "y1" -> its curves."""
-
-    outputs: Mapping[str, FitCurves]
-
-
-@dataclass(frozen=True)
-class ChannelResidualCurves:
-    """Normalised correlations of p residuals among each other and with r past inputs."""
-
-    lags: Array
+    lags: Array  # (n,)
     autocorrelation: Array  # (n, p, p)
-    input_lags: Array
+    input_lags: Array  # (m,)
     cross_correlation: Array  # (m, p, r)
     limit: float
     whiteness: float
@@ -233,17 +228,13 @@ Curves = (
     | BoundCurves
     | OptimalityCurves
     | SignalCurves
-    | ChannelBoundCurves
     | EllipseCurves
     | ErrorCurves
     | MomentsCurves
     | CloudCurves
     | ErrorBandCurves
-    | ChannelErrorBandCurves
     | FitCurves
-    | ChannelFitCurves
     | ResidualCurves
-    | ChannelResidualCurves
 )
 
 

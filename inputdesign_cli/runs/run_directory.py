@@ -11,9 +11,10 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from inputdesign_cli.errors import DataError, Diagnostic, OutputError
@@ -42,7 +43,7 @@ STANDARD_FILES = (
 JOURNAL = ".replacing-run.json"
 
 
-def finished_result(outcome: Results) -> dict[str, Any]:
+def finished_result(results: Results) -> dict[str, Any]:
     """The content of `result.json` in JSON's own types, with `environment` and `spec_sha256` filled in.
 
     `spec_sha256` is the digest of `spec.yaml` as it is written.
@@ -52,32 +53,33 @@ def finished_result(outcome: Results) -> dict[str, Any]:
     ValueError, TypeError
         The result holds a NaN, an infinity or a type that JSON lacks: a mistake of the program.
     """
-    result: dict[str, Any] = plain(outcome.result)
+    result: dict[str, Any] = plain(results.result)
     if not result.get("environment"):
         result["environment"] = environment()
     if not result.get("spec_sha256"):
-        result["spec_sha256"] = hashlib.sha256(outcome.resolved_spec.encode()).hexdigest()
+        result["spec_sha256"] = hashlib.sha256(results.resolved_spec.encode()).hexdigest()
     return result
 
 
-def write_run(outcome: Results, directory: Path, *, figures: bool = True) -> list[Path]:
+def write_run(
+    results: Results, directory: Path, figures: Mapping[str, bytes] = MappingProxyType({})
+) -> list[Path]:
     """Write a run directory and return the paths of its files, `result.json` last.
 
     An earlier run in `directory` is replaced, including those of its files that the new run no longer
     has; files that are not of a run are left alone. Whatever fails, `directory` holds afterwards what it
     held before.
 
-    Parameters
-    ----------
-    figures : draw the curves of the outcome as PNG files too.
+    Args:
+        results: what a verb of the package returned.
+        directory: where to write it.
+        figures: file name ("bound.png") -> content, as `figures.plots.draw_all` draws them.
 
-    Raises
-    ------
-    OutputError
-        `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a file of
-        the user's would be overwritten).
+    Raises:
+        OutputError: `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a
+            file of the user's would be overwritten).
     """
-    result = finished_result(outcome)
+    result = finished_result(results)
     target = Path(os.path.realpath(directory))
     with complaining(directory):
         if target.exists() and not target.is_dir():
@@ -95,7 +97,7 @@ def write_run(outcome: Results, directory: Path, *, figures: bool = True) -> lis
         try:
             shutil.rmtree(partial, ignore_errors=True)
             partial.mkdir()
-            names = _write_files(outcome, result, partial, figures)
+            names = _write_files(results, result, partial, figures)
             if target.exists():
                 _replace(names, partial, target, shown=directory)
             else:
@@ -184,21 +186,18 @@ def _unreadable(directory: Path, why: str) -> DataError:
     return DataError(Diagnostic("run-unreadable", message, hint="run the spec again"))
 
 
-def _write_files(outcome: Results, result: dict[str, Any], folder: Path, figures: bool) -> list[str]:
+def _write_files(
+    results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
+) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
-    texts = {SPEC: outcome.resolved_spec}
-    texts |= {f"{stem}.csv": csv_text(table) for stem, table in _tables(outcome).items()}
+    texts = {SPEC: results.resolved_spec}
+    texts |= {f"{stem}.csv": csv_text(table) for stem, table in _tables(results).items()}
     for name, text in texts.items():
         _write(folder / name, text)
-    for name, content in outcome.files.items():
+    contents = {**results.files, **figures}
+    for name, content in contents.items():
         (folder / name).write_bytes(content)
-    names = [*texts, *outcome.files]
-    if figures and outcome.curves:
-        from inputdesign_cli.figures.plots import draw
-
-        for stem, curves in outcome.curves.items():
-            draw(curves, folder / f"{stem}.png", outcome.time_unit)
-            names.append(f"{stem}.png")
+    names = [*texts, *contents]
     _write(folder / RESULT, json_text({**result, "files": names}))
     names.append(RESULT)
     for name in names:
@@ -207,15 +206,16 @@ def _write_files(outcome: Results, result: dict[str, Any], folder: Path, figures
     return names
 
 
-def _tables(outcome: Results) -> dict[str, Table]:
+def _tables(results: Results) -> dict[str, Table]:
     """The tables, with what the curves show beyond them: a report is drawn from the files alone."""
-    tables = dict(outcome.tables)
-    for stem, curves in outcome.curves.items():
+    tables = dict(results.tables)
+    for stem, curves in results.curves.items():
         if isinstance(curves, OptimalityCurves) and stem not in tables:
-            header = f"frequency_rad_per_{outcome.time_unit}"
+            header = f"frequency_rad_per_{results.time_unit}"
             tables[stem] = Table({header: curves.frequency, "ratio": curves.ratio})
-        elif isinstance(curves, BoundCurves) and stem in tables:
-            more = {"r_u_white": curves.r_u_white, "r_u_record": curves.r_u_record}
+        elif isinstance(curves, BoundCurves) and stem in tables and len(curves.panels) == 1:
+            (panel,) = curves.panels
+            more = {"r_u_white": panel.r_u_white, "r_u_record": panel.r_u_record}
             shown = {name: values for name, values in more.items() if values is not None}
             tables[stem] = Table({**tables[stem].columns, **shown})
     return tables

@@ -97,9 +97,10 @@ def _compute(task: PointTask, directory: Path) -> PointEnd:
         seconds = time.perf_counter() - started
         timing = {**outcome.result.get("timing_s", {}), "point": seconds}
         outcome = replace(outcome, result={**outcome.result, "timing_s": timing})
+        from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
-        write_run(outcome, directory, figures=task.figures)
+        write_run(outcome, directory, draw_all(outcome) if task.figures else {})
     except OutputError:
         raise
     except IdesignError as error:

@@ -18,10 +18,9 @@ from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.runs.results import (
     BoundCurves,
-    ChannelBoundCurves,
-    ChannelFitCurves,
-    ChannelResidualCurves,
     FitCurves,
+    FitPanel,
+    ResidualCurves,
     Results,
     Table,
 )
@@ -144,12 +143,12 @@ def _data_curves(spec: Spec, found: ChannelIdentified) -> tuple[dict[str, Table]
     simulated = plant.signals("output", u) if any(stable) else None
     columns = {f"time_{spec.time_unit}": instants, **_columns("u{}", u), **_columns("y{}", y)}
     columns |= _columns("y{}_predicted", predicted)
-    outputs = {}
+    outputs = []
     for i, fit in enumerate(estimate.fit):
         curve = simulated[:, i] if simulated is not None and stable[i] else None
         if curve is not None:
             columns[f"y{i + 1}_simulated"] = curve
-        outputs[f"y{i + 1}"] = FitCurves(instants, y[:, i], predicted[:, i], curve, fit)
+        outputs.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i))
     columns |= _columns("residual_{}", estimate.errors)
     white, cross = estimate.whiteness, estimate.independence
     shared = min(white.lags.size, cross.lags.size)
@@ -158,8 +157,8 @@ def _data_curves(spec: Spec, found: ChannelIdentified) -> tuple[dict[str, Table]
     residuals |= {"cross_correlation_lag": cross.lags[:shared]}
     residuals |= _pairs("cross_correlation", cross.correlation[:shared])
     curves: dict[str, Any] = {
-        "fit": ChannelFitCurves(outputs),
-        "residuals": ChannelResidualCurves(
+        "fit": FitCurves(instants, tuple(outputs)),
+        "residuals": ResidualCurves(
             white.lags,
             white.correlation,
             cross.lags,
@@ -181,7 +180,7 @@ def _pairs(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{name}_{i + 1}{j + 1}": values[:, i, j] for i in range(rows) for j in range(columns)}
 
 
-def _bound(found: ChannelIdentified) -> tuple[Table, ChannelBoundCurves | BoundCurves, dict[str, Any]]:
+def _bound(found: ChannelIdentified) -> tuple[Table, BoundCurves, dict[str, Any]]:
     spec, experiment, information = found.spec, found.experiment, found.estimate.information
     entry: dict[str, Any] = {"alpha": model_error_alpha(spec, experiment)}
     stated = build_entry_errors(spec, experiment)

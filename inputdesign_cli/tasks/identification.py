@@ -19,7 +19,15 @@ from inputdesign_cli.identification import Estimate, Structure
 from inputdesign_cli.identification import identify as identify_record
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, FitCurves, ResidualCurves, Results, Table
+from inputdesign_cli.runs.results import (
+    BoundCurves,
+    BoundPanel,
+    FitCurves,
+    FitPanel,
+    ResidualCurves,
+    Results,
+    Table,
+)
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.channels import has_channels
 from inputdesign_cli.tasks.build.data import Data, read_data, told_of
@@ -160,12 +168,12 @@ def _data_curves(spec: Spec, found: Identified) -> tuple[dict[str, Table], dict[
         ),
     }
     curves = {
-        "fit": FitCurves(instants, data.y, predicted, simulated, estimate.fit),
+        "fit": FitCurves(instants, (FitPanel(data.y, predicted, simulated, estimate.fit),)),
         "residuals": ResidualCurves(
             white.lags,
-            white.correlation,
+            white.correlation[:, None, None],
             cross.lags,
-            cross.correlation,
+            cross.correlation[:, None, None],
             white.limit,
             white.probability,
             cross.probability,
@@ -192,8 +200,8 @@ def _bound(found: Identified) -> tuple[Table, BoundCurves, dict[str, Any]]:
             entry["worst_frequency"] = worst.frequency / spec.sample_time
     G = np.abs(experiment.model.plant_at(w))
     columns["G_abs"] = G
-    curves = BoundCurves(frequency=w / spec.sample_time, r_u=r_u, G_abs=G, r_adm=r_adm, label="data")
-    return Table(columns), curves, entry
+    panel = BoundPanel(frequency=w / spec.sample_time, r_u=r_u, G_abs=G, r_adm=r_adm, label="data")
+    return Table(columns), BoundCurves((panel,)), entry
 
 
 def experiment_peaks(experiment: Experiment) -> Array:

@@ -2,6 +2,7 @@
 
 import struct
 import sys
+from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
@@ -11,17 +12,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.runs.results import (
     BoundCurves,
-    ChannelBoundCurves,
+    BoundPanel,
     DirectionCurves,
     Ellipse,
     EllipseCurves,
+    ErrorBandCurves,
+    ErrorBandPanel,
     ErrorCurves,
+    FitCurves,
+    FitPanel,
     LossCurves,
     MatrixSpectrumCurves,
     MomentsCurves,
     OptimalityCurves,
+    ResidualCurves,
     SignalCurves,
-    SpectrumCurves,
 )
 
 W = np.geomspace(1e-3, np.pi, 200)
@@ -30,17 +35,45 @@ G = np.abs(3.6 * Z / (1 - 0.7 * Z))
 DENSITY = 0.03 + 2.5 * np.exp(-((W / 0.22) ** 2))
 PAIR = DENSITY[:, None, None] * np.array([[1.0, 0.9j], [-0.9j, 1.0]])
 
+
+def bound(*panels):
+    return BoundCurves(tuple(panels))
+
+
+def one_input(values, *more, **settings):
+    """Curves of the spectrum of one input from real values (n,)."""
+    return MatrixSpectrumCurves(W, values[:, None, None], *more, **settings)
+
+
+def lines(frequencies, powers, **settings):
+    """Curves of sinusoids of one input."""
+    power = np.array(powers)[:, None, None]
+    return MatrixSpectrumCurves(np.array(frequencies), power, lines=True, **settings)
+
+
+def correlations(p, r):
+    lags = np.arange(1, 21)
+    values = 0.1 * np.cos(np.arange(20 * p * (p + r)).reshape(20, p, p + r))
+    return ResidualCurves(lags, values[:, :, :p], lags, values[:, :, p:], 0.1, 0.5, 0.7)
+
+
+T = np.arange(500.0)
+FIT = FitPanel(np.sin(T), np.sin(T) + 0.1, np.sin(T) - 0.1, 83.2)
+BANDS = ErrorBandPanel(W, {0.05: 0.1 * G, 0.5: 0.2 * G, 0.95: 0.4 * G}, 0.5 * G, 0.6 * G)
+
 CURVES = {
-    "bound": BoundCurves(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi])),
-    "bound without a target": BoundCurves(W, 0.008 * G, G),
-    "bound with a gap in r_adm": BoundCurves(W, 0.008 * G, G, np.where(W < 1, 0.01 * G, -1.0)),
-    "spectrum": SpectrumCurves(W, DENSITY, 1.7),
-    "spectrum with zeros": SpectrumCurves(W, 1e4 * np.maximum(np.cos(20 * W), 0.0) / W**2, 1.0),
-    "spectrum with its record": SpectrumCurves(W, DENSITY, 1.7, record=DENSITY * (1 + 0.2 * np.sin(90 * W))),
-    "bound with its record": BoundCurves(W, 0.008 * G, G, 0.01 * G, r_u_record=0.009 * G),
+    "bound": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi]))),
+    "bound without a target": bound(BoundPanel(W, 0.008 * G, G)),
+    "bound with a gap in r_adm": bound(BoundPanel(W, 0.008 * G, G, np.where(W < 1, 0.01 * G, -1.0))),
+    "spectrum": one_input(DENSITY, 1.7),
+    "spectrum with zeros": one_input(1e4 * np.maximum(np.cos(20 * W), 0.0) / W**2, 1.0),
+    "spectrum with its record": one_input(
+        DENSITY, 1.7, record=(DENSITY * (1 + 0.2 * np.sin(90 * W)))[:, None]
+    ),
+    "bound with its record": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_record=0.009 * G)),
     "limited signal": SignalCurves(np.arange(50.0), {"u1": 3 + np.sin(np.arange(50.0))}, {"u1": (1.5, 4.5)}),
-    "lines": SpectrumCurves(W, None, 1.7, np.array([0.1553]), np.array([0.1925])),
-    "lines and density": SpectrumCurves(W, DENSITY, None, np.array([0.02, 0.1]), np.array([0.1, 0.2]), "r"),
+    "lines": lines([0.1553], [0.1925], white=1.7, band=(1e-3, np.pi)),
+    "lines in a loop": lines([0.02, 0.1], [0.1, 0.2], symbol="r"),
     "matrix": MatrixSpectrumCurves(W, PAIR, 1.7),
     "matrix of lines": MatrixSpectrumCurves(W[::20], PAIR[::20], lines=True),
     "matrix with zeros": MatrixSpectrumCurves(W, PAIR * np.maximum(np.cos(20 * W), 0.0)[:, None, None]),
@@ -51,9 +84,15 @@ CURVES = {
     "matrix on a logarithmic axis": MatrixSpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
     "matrix with a peak": MatrixSpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
     "one line of channels": MatrixSpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
-    "bounds of entries": ChannelBoundCurves(
-        {"[1,2]": BoundCurves(W, 0.008 * G, G, 0.01 * G), "[2,1]": BoundCurves(W, 0.008 * G, G)}
+    "bounds of entries": bound(
+        BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=(0, 1)), BoundPanel(W, 0.008 * G, G, entry=(1, 0))
     ),
+    "error bands": ErrorBandCurves((BANDS,), "design", 100),
+    "error bands of entries": ErrorBandCurves((replace(BANDS, entry=(0, 0)), replace(BANDS, entry=(1, 0)))),
+    "fit": FitCurves(T, (FIT,)),
+    "fit of two outputs": FitCurves(T, (FIT, FitPanel(T, T + 1, output=1))),
+    "residuals": correlations(1, 1),
+    "residuals of two outputs": correlations(2, 1),
     "ellipses": EllipseCurves(
         tuple(
             Ellipse(("b1", f"a{i}"), np.array([1.0, i]), np.array([[2.0, 1.0], [1.0, 1.0]]), np.eye(2))
@@ -74,8 +113,8 @@ CURVES = {
 def page(monkeypatch):
     """The figure that was drawn last, instead of its pixels."""
     kept = []
-    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, path: kept.append(canvas.figure))
-    return lambda curves, unit="s": (draw(curves, "unused.png", unit), kept[-1])[1]
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, file: kept.append(canvas.figure))
+    return lambda curves, unit="s": (draw(curves, unit), kept[-1])[1]
 
 
 def lines_by_label(axes):
@@ -84,21 +123,20 @@ def lines_by_label(axes):
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_a_png_of_the_promised_size(name, tmp_path):
-    draw(CURVES[name], tmp_path / "a.png", "s")
-    data = (tmp_path / "a.png").read_bytes()
+def test_a_png_of_the_promised_size(name):
+    data = draw(CURVES[name])
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     assert struct.unpack(">II", data[16:24]) == (1050, 675)
 
 
-def test_no_global_state(tmp_path):
+def test_no_global_state():
     def state():
         # Reading the backend would choose one.
         settings = {key: mpl.rcParams[key] for key in mpl.rcParams if key != "backend"}
         return settings, "matplotlib.pyplot" in sys.modules
 
     before = state()
-    draw(CURVES["bound"], tmp_path / "a.png", "s")
+    draw(CURVES["bound"])
     assert state() == before
 
 
@@ -132,6 +170,27 @@ def test_the_spectrum_beside_the_white_level(page):
     np.testing.assert_array_equal(lines[r"$\Phi_{u}$, design"].get_ydata(), DENSITY)
     assert set(lines[r"$\Phi_{u}$, white"].get_ydata()) == {1.7}
     assert axes.get_yscale() == "linear"
+
+
+def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
+    panels = page(CURVES["bounds of entries"]).axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["", "$G_{12}$", "$G_{21}$", ""]
+    np.testing.assert_array_equal(lines_by_label(panels[1])[r"$r_\mathrm{adm}$"].get_ydata(), 0.01 * G)
+    assert r"$r_\mathrm{adm}$" not in lines_by_label(panels[2])
+
+
+def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(page):
+    upper, lower = page(CURVES["fit"]).axes
+    assert "simulated from u (fit 83.2 %)" in lines_by_label(upper)
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), -0.1)
+    panels = page(CURVES["fit of two outputs"]).axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
+
+
+def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
+    assert [a.get_ylabel() for a in page(CURVES["residuals"]).axes] == ["with themselves", "with past inputs"]
+    titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
+    assert titles == ["with residual 1", "with residual 2", "with u1", "", "", ""]
 
 
 def test_a_spectrum_over_decades_is_logarithmic_and_not_endless(page):

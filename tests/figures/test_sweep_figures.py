@@ -3,6 +3,7 @@
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import draw_sweep, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable
 
@@ -44,11 +45,11 @@ def test_the_figures_that_suit_a_sweep(given, names, tmp_path):
 @pytest.fixture
 def pages(monkeypatch):
     kept = []
-    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, path: kept.append(canvas.figure))
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda canvas, file: kept.append(canvas.figure))
 
     def draw(given, tmp_path):
         for _, make in sweep_figures(given):
-            make(tmp_path / "unused.png")
+            rendered(make)
         return kept
 
     return draw

@@ -8,6 +8,7 @@ import pytest
 
 from inputdesign_cli import load_spec, simulate, solve, validate
 from inputdesign_cli.cli import main
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.runs.run_directory import write_run
 
 CONTROL = "accuracy.closed_loop_error.control"
@@ -43,7 +44,7 @@ def test_the_design_of_the_column(spec, tmp_path):
     result = outcome.result
     assert result["status"] == "optimal"
     assert result["objective"]["kind"] == "closed_loop_error"
-    # (mean tr Z^{1/2})^2 / power, from the errata: mean S2, the noise, the eigenvalues of the matrix root.
+    # (mean tr Z^{1/2})^2 / power, from docs/errata.md: mean S2, the noise, eigenvalues of the matrix root.
     by_hand = (1.637898 * 1e-5 * np.sqrt(2) * 72.376130) ** 2 / 2
     assert result["objective"]["value"] == pytest.approx(by_hand, rel=1e-5)
     assert 0 <= result["objective"]["relative_gap"] < 1e-10
@@ -53,7 +54,7 @@ def test_the_design_of_the_column(spec, tmp_path):
     assert structure["white"]["value"] == pytest.approx(1.02222e-5, rel=5e-6)
     assert result["information"]["parameters"] == ["a1", "b1[1,1]", "b1[1,2]", "b1[2,1]", "b1[2,2]"]
     assert set(outcome.curves) == {"spectrum", "directions", "signal"}
-    write_run(outcome, tmp_path / "run", figures=True)
+    write_run(outcome, tmp_path / "run", draw_all(outcome))
     with (tmp_path / "run" / "spectrum.csv").open(encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     assert header == ["frequency_rad_per_min", "phi_11", "phi_12_re", "phi_12_im", "phi_22"]

@@ -83,8 +83,8 @@ def test_powers_are_equal_and_those_of_the_design(studied):
 
 def test_every_entry_has_its_error_bands(studied):
     curves = studied.curves["errors_design"]
-    assert list(curves.entries) == ["[1,1]", "[1,2]", "[2,1]", "[2,2]"]
-    for band in curves.entries.values():
+    assert [band.entry for band in curves.panels] == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    for band in curves.panels:
         assert np.all(band.quantiles[0.05] <= band.quantiles[0.95])
         assert np.all(band.quantiles[0.95] < band.r_u)
     assert studied.curves["cloud_design"].theta.shape == (120, 10)

@@ -9,6 +9,7 @@ import pytest
 from inputdesign_cli import load_spec, parse_spec, simulate, solve, validate
 from inputdesign_cli.cli import main
 from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.monte_carlo.regression import run_experiments
 from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.signal import delayed_regressors, free_regressors
@@ -170,9 +171,8 @@ def test_estimates_are_least_squares():
 
 @pytest.mark.parametrize("path", [FREE, FIR], ids=lambda p: p.stem)
 def test_a_run_has_its_files(path, tmp_path):
-    files = {
-        file.name for file in write_run(solve(load_spec(path, ["experiment.samples=60"])), tmp_path / "run")
-    }
+    outcome = solve(load_spec(path, ["experiment.samples=60"]))
+    files = {file.name for file in write_run(outcome, tmp_path / "run", draw_all(outcome))}
     wanted = {"spec.yaml", "signal.csv", "signal.png", "error.png", "moments.png", "result.json"}
     assert files == wanted | ({"spectrum.csv"} if path == FIR else set())
 

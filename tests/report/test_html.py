@@ -14,6 +14,7 @@ import scipy.signal
 
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.sweep.running import sweep
@@ -37,7 +38,7 @@ def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     for name, loop in (("open", ""), ("closed", LOOP)):
         (folder / f"{name}.yaml").write_text(SPEC % loop)
-        write_run(solve(load_spec(folder / f"{name}.yaml")), folder / name, figures=False)
+        write_run(solve(load_spec(folder / f"{name}.yaml")), folder / name)
     return folder
 
 
@@ -105,7 +106,7 @@ def test_the_same_run_gives_the_same_page(runs):
 
 def test_figures_without_a_known_table_are_taken_as_they_are(runs, tmp_path):
     run = tmp_path / "run"
-    write_run(solve(load_spec(runs / "open.yaml")), run, figures=False)
+    write_run(solve(load_spec(runs / "open.yaml")), run)
     result = json.loads((run / "result.json").read_text())
     (run / "loss.png").write_bytes(b"\x89PNG not really")
     result |= {
@@ -188,7 +189,7 @@ SPECS = Path(__file__).parents[2] / "specs"
     ],
 )
 def test_each_kind_of_question_has_its_own_words(name, overrides, verb, said, tmp_path):
-    write_run(verb(load_spec(SPECS / f"{name}.yaml", overrides)), tmp_path / "run", figures=False)
+    write_run(verb(load_spec(SPECS / f"{name}.yaml", overrides)), tmp_path / "run")
     page = words(parse(report_text(tmp_path / "run")))
     for part in said:
         assert part in page, part
@@ -218,7 +219,7 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
     spec = parse_spec(SPEC % "", overrides=[f"accuracy.model_error.relative={relative}"])
     found = assess(spec, data)
     assert found.met == met
-    write_run(found.outcome, tmp_path / "run", figures=False)
+    write_run(found.outcome, tmp_path / "run")
     page, result = parse(report_text(tmp_path / "run")), found.outcome.result
     verdict = result["assessment"]["requirements"][0]
     assert f"model error reaches {verdict['worst_ratio']:.4g}" in words(page)
@@ -234,7 +235,8 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
 
 
 def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):
-    write_run(identify(parse_spec(SPEC % ""), data), tmp_path / "run")
+    found = identify(parse_spec(SPEC % ""), data)
+    write_run(found, tmp_path / "run", draw_all(found))
     page = parse(report_text(tmp_path / "run"))
     assert "The model was estimated from 400 samples" in words(page)
     assert "predicted one step ahead" in words(page)
@@ -244,7 +246,7 @@ def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):
 def test_the_page_of_a_study(tmp_path):
     overrides = ["simulation={runs: 20, compare: [white], plant: {B: [0, 1.1], F: [1, -0.4]}}"]
     outcome = simulate(parse_spec(SPEC % LOOP, overrides=overrides))
-    write_run(outcome, tmp_path / "run")
+    write_run(outcome, tmp_path / "run", draw_all(outcome))
     page, inputs = parse(report_text(tmp_path / "run")), outcome.result["simulation"]["inputs"]
     cells = rows(page)
     for name, entry in inputs.items():

@@ -31,11 +31,9 @@ def outcome(mark: str, *, optimality: bool = False) -> Results:
     )
 
 
-@pytest.fixture
-def quick_figures(monkeypatch):
-    """Figures without the second that drawing them takes."""
-    draw = lambda curves, path, unit: path.write_text("drawn")  # noqa: E731
-    monkeypatch.setattr("inputdesign_cli.figures.plots.draw", draw)
+def write_with_figures(results, directory):
+    """A run with what passes for figures."""
+    return record.write_run(results, directory, {f"{stem}.png": b"drawn" for stem in results.curves})
 
 
 def marks(directory) -> set[str]:
@@ -53,7 +51,7 @@ def names(directory) -> set[str]:
 
 
 def test_the_files_of_a_run(tmp_path):
-    paths = record.write_run(outcome("first", optimality=True), tmp_path / "runs" / "a")
+    paths = write_with_figures(outcome("first", optimality=True), tmp_path / "runs" / "a")
     assert [path.name for path in paths] == [
         "spec.yaml",
         "signal.csv",
@@ -64,16 +62,16 @@ def test_the_files_of_a_run(tmp_path):
     ]
     assert names(tmp_path / "runs" / "a") == {path.name for path in paths}
     assert names(tmp_path / "runs") == {"a"}
-    assert (tmp_path / "runs" / "a" / "signal.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "runs" / "a" / "signal.png").read_bytes() == b"drawn"
 
 
 def test_figures_can_be_left_out(tmp_path):
-    record.write_run(outcome("first"), tmp_path / "a", figures=False)
+    record.write_run(outcome("first"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "result.json"}
 
 
 def test_the_result_names_its_software_and_its_spec(tmp_path):
-    record.write_run(outcome("first"), tmp_path / "a", figures=False)
+    record.write_run(outcome("first"), tmp_path / "a")
     result = json.loads((tmp_path / "a" / "result.json").read_text())
     assert result["spec_sha256"] == hashlib.sha256((tmp_path / "a" / "spec.yaml").read_bytes()).hexdigest()
     assert result["environment"]["python"] == platform.python_version()
@@ -81,30 +79,27 @@ def test_the_result_names_its_software_and_its_spec(tmp_path):
     assert set(result["environment"]) >= {"platform", "idesign", "scipy", "cvxpy", "clarabel"}
 
 
-@pytest.mark.usefixtures("quick_figures")
 def test_read_run_returns_what_was_written(tmp_path):
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_with_figures(outcome("first"), tmp_path / "a")
     result = record.read_run(tmp_path / "a")
     assert result["title"] == "first"
     assert result["objective"] == {"value": 5.0}
     assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png"}
 
 
-@pytest.mark.usefixtures("quick_figures")
 def test_a_later_run_replaces_an_earlier_one_and_its_stale_figure(tmp_path):
-    record.write_run(outcome("first", optimality=True), tmp_path / "a")
-    record.write_run(outcome("second"), tmp_path / "a")
+    write_with_figures(outcome("first", optimality=True), tmp_path / "a")
+    write_with_figures(outcome("second"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "result.json"}
     assert marks(tmp_path / "a") == {"second"}
 
 
-@pytest.mark.usefixtures("quick_figures")
 def test_files_of_the_user_survive(tmp_path):
-    record.write_run(outcome("first", optimality=True), tmp_path / "a")
+    write_with_figures(outcome("first", optimality=True), tmp_path / "a")
     (tmp_path / "a" / "notes.txt").write_text("mine")
     (tmp_path / "a" / "photo.png").write_text("mine")
     (tmp_path / "a" / "data").mkdir()
-    record.write_run(outcome("second"), tmp_path / "a")
+    write_with_figures(outcome("second"), tmp_path / "a")
     assert (tmp_path / "a" / "notes.txt").read_text() == "mine"
     assert (tmp_path / "a" / "photo.png").read_text() == "mine"
     assert (tmp_path / "a" / "data").is_dir()
@@ -113,7 +108,7 @@ def test_files_of_the_user_survive(tmp_path):
 def test_a_file_of_the_user_is_never_overwritten(tmp_path):
     (tmp_path / "spec.yaml").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        record.write_run(outcome("first"), tmp_path)
+        write_with_figures(outcome("first"), tmp_path)
     assert caught.value.diagnostics[0].code == "output-not-a-run"
     assert "spec.yaml" in caught.value.diagnostics[0].message
     assert names(tmp_path) == {"spec.yaml"}
@@ -122,14 +117,14 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path):
 
 def test_a_run_into_an_empty_directory(tmp_path):
     (tmp_path / "a").mkdir()
-    record.write_run(outcome("first"), tmp_path / "a", figures=False)
+    record.write_run(outcome("first"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "result.json"}
 
 
 def test_a_link_to_a_directory_stays_a_link(tmp_path):
     (tmp_path / "disc").mkdir()
     (tmp_path / "a").symlink_to(tmp_path / "disc")
-    record.write_run(outcome("first"), tmp_path / "a", figures=False)
+    record.write_run(outcome("first"), tmp_path / "a")
     assert (tmp_path / "a").is_symlink()
     assert (tmp_path / "disc" / "result.json").is_file()
 
@@ -137,7 +132,7 @@ def test_a_link_to_a_directory_stays_a_link(tmp_path):
 def test_a_destination_that_is_a_file(tmp_path):
     (tmp_path / "a").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        record.write_run(outcome("first"), tmp_path / "a")
+        write_with_figures(outcome("first"), tmp_path / "a")
     assert caught.value.diagnostics[0].code == "output-not-a-directory"
     assert (tmp_path / "a").read_text() == "mine"
 
@@ -145,7 +140,7 @@ def test_a_destination_that_is_a_file(tmp_path):
 def test_a_destination_below_a_file(tmp_path):
     (tmp_path / "a").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        record.write_run(outcome("first"), tmp_path / "a" / "b")
+        write_with_figures(outcome("first"), tmp_path / "a" / "b")
     assert caught.value.diagnostics[0].code == "output-not-writable"
 
 
@@ -189,9 +184,7 @@ ERRORS = [
 
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
 def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch, error, raised):
-    steps = count_operations(
-        monkeypatch, lambda: record.write_run(outcome("first"), tmp_path / "probe", figures=False)
-    )
+    steps = count_operations(monkeypatch, lambda: record.write_run(outcome("first"), tmp_path / "probe"))
     assert steps > 6
     for step in range(1, steps):
         place = tmp_path / f"step{step}"
@@ -199,34 +192,30 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch
         with monkeypatch.context() as patch:
             Saboteur(patch, step, error)
             with pytest.raises(raised):
-                record.write_run(outcome("first"), place / "a", figures=False)
+                record.write_run(outcome("first"), place / "a")
         assert names(place) == set(), step
 
 
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
-@pytest.mark.usefixtures("quick_figures")
 def test_a_failure_at_any_step_of_a_replacement_keeps_the_old_run(tmp_path, monkeypatch, error, raised):
-    record.write_run(outcome("first", optimality=True), tmp_path / "probe")
-    steps = count_operations(
-        monkeypatch, lambda: record.write_run(outcome("second"), tmp_path / "probe", figures=False)
-    )
+    write_with_figures(outcome("first", optimality=True), tmp_path / "probe")
+    steps = count_operations(monkeypatch, lambda: record.write_run(outcome("second"), tmp_path / "probe"))
     assert steps > 12
     old = tmp_path / "a"
-    record.write_run(outcome("first", optimality=True), old)
+    write_with_figures(outcome("first", optimality=True), old)
     (old / "notes.txt").write_text("mine")
     before = {path.name: path.read_bytes() for path in old.iterdir()}
     for step in range(1, steps + 1):
         with monkeypatch.context() as patch:
             Saboteur(patch, step, error)
             with pytest.raises(raised):
-                record.write_run(outcome("second"), old, figures=False)
+                record.write_run(outcome("second"), old)
         assert {path.name: path.read_bytes() for path in old.iterdir()} == before, step
 
 
-@pytest.mark.usefixtures("quick_figures")
 def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch):
     """The state of the directory before each single move: with a result.json, all files are of its run."""
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_with_figures(outcome("first"), tmp_path / "a")
     seen = []
 
     def observe(original):
@@ -240,16 +229,15 @@ def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch)
     with monkeypatch.context() as patch:
         for name in ("rename", "replace"):
             patch.setattr(pathlib.Path, name, observe(getattr(pathlib.Path, name)))
-        record.write_run(outcome("second"), tmp_path / "a")
+        write_with_figures(outcome("second"), tmp_path / "a")
     seen.append(marks(tmp_path / "a"))
     assert all(len(found) == 1 for found in seen)
     assert seen[0] == {"first"}
     assert seen[-1] == {"second"}
 
 
-@pytest.mark.usefixtures("quick_figures")
 def test_a_run_after_a_power_cut_in_the_middle_of_a_replacement(tmp_path, monkeypatch):
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_with_figures(outcome("first"), tmp_path / "a")
 
     class PowerCut(BaseException):
         pass
@@ -267,9 +255,9 @@ def test_a_run_after_a_power_cut_in_the_middle_of_a_replacement(tmp_path, monkey
         patch.setattr(pathlib.Path, "rename", cut)
         patch.setattr(pathlib.Path, "unlink", lambda self, missing_ok=False: None)
         with pytest.raises(PowerCut):
-            record.write_run(outcome("second"), tmp_path / "a")
+            write_with_figures(outcome("second"), tmp_path / "a")
     assert not (tmp_path / "a" / "result.json").exists()
-    record.write_run(outcome("second"), tmp_path / "a")
+    write_with_figures(outcome("second"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "result.json"}
 
 
@@ -298,7 +286,7 @@ def test_a_disc_that_fills_up_while_writing(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(pathlib.Path, "open", open_full)
         with pytest.raises(OutputError) as caught:
-            record.write_run(outcome("first"), tmp_path / "a", figures=False)
+            record.write_run(outcome("first"), tmp_path / "a")
     assert caught.value.diagnostics[0].code == "output-full"
     assert names(tmp_path) == set()
 
@@ -306,7 +294,7 @@ def test_a_disc_that_fills_up_while_writing(tmp_path, monkeypatch):
 def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
     bad = Results(result={"format": 1, "value": np.nan}, resolved_spec="")
     with pytest.raises(ValueError, match=r"result\.value"):
-        record.write_run(bad, tmp_path / "a")
+        write_with_figures(bad, tmp_path / "a")
     assert names(tmp_path) == set()
 
 

@@ -78,7 +78,7 @@ def test_decoupled_loops_cost_as_much_as_each_alone():
 def test_what_a_design_writes_is_what_an_analysis_reads(tmp_path):
     """The powers and the accuracy of spectrum.csv, and of signal.csv, as given excitations."""
     outcome = solve(changed("signal={samples: 2000, seed: 1, scale: design}"))
-    write_run(outcome, tmp_path, figures=False)
+    write_run(outcome, tmp_path)
     result = outcome.result
     spec = changed(f"spectrum={{given: {{type: table, file: {tmp_path / 'spectrum.csv'}}}}}")
     table = solve(spec).result

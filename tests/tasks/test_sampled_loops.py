@@ -122,7 +122,7 @@ def test_what_a_design_writes_is_what_an_analysis_reads(tmp_path):
     """The powers and the accuracy of spectrum.csv, and of signal.csv, as given excitations."""
     spec = load_spec(MOTOR, ["signal.scale=design"])
     outcome = solve(spec)
-    write_run(outcome, tmp_path, figures=False)
+    write_run(outcome, tmp_path)
     result = outcome.result
     given = f"spectrum={{given: {{type: table, file: {tmp_path / 'spectrum.csv'}}}}}"
     table = solve(parse_spec(spec.to_yaml(), overrides=[given])).result

@@ -9,6 +9,7 @@ import scipy.io.wavfile
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.runs.run_directory import write_run
 
 BASE = """
@@ -113,10 +114,10 @@ def test_files_and_plots(tmp_path):
     np.testing.assert_allclose(wave * outcome.result["signal"]["wav_full_scale"], applied, rtol=1e-6)
     low, high = outcome.curves["signal"].limits["u1"]
     assert low <= applied.min() < applied.max() <= high
-    bound = outcome.curves["bound"]
+    (bound,) = outcome.curves["bound"].panels
     assert np.all(bound.r_u_record <= bound.r_adm * (1 + 1e-9))
     assert solve(parse_spec(text)).files == outcome.files
-    names = {path.name for path in write_run(outcome, tmp_path / "run")}
+    names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
     assert {"signal.mat", "signal.wav", "signal.csv", "signal.png"} <= names
 
 

@@ -10,6 +10,7 @@ import scipy.io.wavfile
 
 from inputdesign_cli import load_spec, solve, validate
 from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.runs.run_directory import write_run
 
 SPEC = Path(__file__).parent.parent.parent / "specs" / "two_by_two_arx.yaml"
@@ -77,9 +78,9 @@ def test_what_is_applied_to_several_inputs(tmp_path):
     _, wave = scipy.io.wavfile.read(io.BytesIO(outcome.files["signal.wav"]))
     np.testing.assert_allclose(wave * signal["wav_full_scale"], applied, rtol=1e-6)
     assert {"phi_record_11", "phi_record_22"} <= set(outcome.tables["spectrum"].columns)
-    for entry in outcome.curves["bound"].entries.values():
+    for entry in outcome.curves["bound"].panels:
         assert np.all(entry.r_u_record <= entry.r_adm * (1 + 1e-9))
-    names = {path.name for path in write_run(outcome, tmp_path / "run")}
+    names = {path.name for path in write_run(outcome, tmp_path / "run", draw_all(outcome))}
     assert {"signal.mat", "signal.wav", "signal.png", "spectrum.png", "bound.png"} <= names
 
 

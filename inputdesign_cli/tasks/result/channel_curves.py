@@ -14,7 +14,7 @@ from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import (
     BoundCurves,
-    ChannelBoundCurves,
+    BoundPanel,
     MatrixSpectrumCurves,
     OptimalityCurves,
     SpectrumCurves,
@@ -93,7 +93,7 @@ def bound_curves_of(
     *,
     label: str = "design",
     record: Array | None = None,
-) -> tuple[Table, ChannelBoundCurves | BoundCurves] | None:
+) -> tuple[Table, BoundCurves] | None:
     """bound.csv and its plot of those requirements that bound a model error; None when none does.
 
     `label` says what gave r_u, and `record` is the information of the record to be applied.
@@ -126,7 +126,8 @@ def _norm_bound_curves(
     if applied is not None:
         columns["r_u_record"] = applied
     w = w / frequency_unit(spec)
-    return Table(columns), BoundCurves(w, r_u, G, r_adm, compared, label=label, r_u_record=applied)
+    panel = BoundPanel(w, r_u, G, r_adm, compared, label=label, r_u_record=applied)
+    return Table(columns), BoundCurves((panel,))
 
 
 def _bound_axis(requirements: Sequence[EntryOfPlant | NormError], information: Array) -> Array:
@@ -146,7 +147,7 @@ def entry_bound_curves(
     stated: bool = True,
     label: str = "design",
     record: Array | None = None,
-) -> tuple[Table, ChannelBoundCurves]:
+) -> tuple[Table, BoundCurves]:
     """bound.csv and its plot: r_u, r_adm and |G| of every entry over the band of the requirement.
 
     Without r_adm where no requirement is `stated`, so that the entries' own bounds mean nothing. `record` is
@@ -155,7 +156,7 @@ def entry_bound_curves(
     w = _bound_axis(requirements, information)
     frequency = w / frequency_unit(spec)
     columns: dict[str, Array] = {frequency_header(spec): frequency}
-    entries = {}
+    panels = []
     for requirement in requirements:
         i, j = requirement.output, requirement.input
         r_u = requirement.error_bound(information, w)
@@ -170,10 +171,10 @@ def entry_bound_curves(
         applied = None if record is None else requirement.error_bound(record, w)
         if applied is not None:
             columns[f"r_u_record_{i + 1}{j + 1}"] = applied
-        entries[requirement.label] = BoundCurves(
-            frequency, r_u, G, r_adm, compared, label=label, r_u_record=applied
+        panels.append(
+            BoundPanel(frequency, r_u, G, r_adm, compared, label=label, r_u_record=applied, entry=(i, j))
         )
-    return Table(columns), ChannelBoundCurves(entries)
+    return Table(columns), BoundCurves(tuple(panels))
 
 
 def channel_optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | None:

@@ -8,7 +8,7 @@ from inputdesign_cli.accuracy import error_bound
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, OptimalityCurves, SpectrumCurves, Table
+from inputdesign_cli.runs.results import BoundCurves, BoundPanel, OptimalityCurves, SpectrumCurves, Table
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import Basis, LinesBasis
 from inputdesign_cli.tasks.build.model_error import sampled_band
@@ -85,7 +85,7 @@ def bound_curves(
         r_adm = stated.admissible.at(w)
         columns["r_adm"] = r_adm
     columns["G_abs"] = G
-    curves = BoundCurves(
+    panel = BoundPanel(
         frequency=frequency,
         r_u=r_u,
         G_abs=G,
@@ -93,7 +93,7 @@ def bound_curves(
         r_u_white=None if white is None else error_bound(experiment, white, task.alpha, w),
         active=distinct(np.maximum(active, w[0])) / spec.sample_time if stated is not None else np.zeros(0),
     )
-    return Table(columns), curves
+    return Table(columns), BoundCurves((panel,))
 
 
 def optimality_curves(spec: Spec, design: Design) -> OptimalityCurves | None:

@@ -40,9 +40,10 @@ def with_record(
     curves: BoundCurves, spec: Spec, experiment: Experiment, alpha: float, samples: Array
 ) -> BoundCurves:
     """The model error with that of the record itself."""
+    (panel,) = curves.panels
     try:
         information = record_information(experiment, samples)
-        r_u = error_bound(experiment, information, alpha, curves.frequency * spec.sample_time)
+        r_u = error_bound(experiment, information, alpha, panel.frequency * spec.sample_time)
     except np.linalg.LinAlgError:  # the record does not excite every parameter
         return curves
-    return replace(curves, r_u_record=r_u)
+    return BoundCurves((replace(panel, r_u_record=r_u),))
