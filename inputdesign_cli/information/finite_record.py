@@ -39,9 +39,13 @@ class FiniteRecord:
 
     def information(self, record: Array) -> Array:
         """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (n, r), in these coordinates."""
-        psi = self._answers.gradient(record)
+        psi = self.gradient(record)
         flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
         return self.known + flat @ flat.T
+
+    def gradient(self, record: Array) -> NDArray[np.float64]:
+        """(n, k, p): psi of the prediction, from rest, in these coordinates, noise whitened to I."""
+        return self._answers.gradient(record)
 
     @cached_property
     def known(self) -> Array:

@@ -45,12 +45,7 @@ class RecordFilters:
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
         """(n, k, 1): psi of the prediction, in the coordinates of the experiment, noise whitened to 1."""
-        u, y = (self.signals(kind, record)[:, 0] for kind in ("input", "output"))
-        sources = {
-            letter: scipy.signal.lfilter(*self._predictor[letter], y if letter == "a" else u)
-            for letter in {p.letter for p in self.model.parameters} & self._predictor.keys()
-        }
-        samples = len(record)
+        sources, samples = self._sources(record), len(record)
         raw = np.zeros((samples, self.experiment.size))
         for column, parameter in enumerate(self.model.parameters):
             if parameter.letter in sources and parameter.power < samples:
@@ -65,20 +60,26 @@ class RecordFilters:
         if loop is None:
             return {"excitation": (one, one), "input": (one, one), "output": (B, AF)}
         P, Q = loop.controller.numerator[0, 0], loop.controller.denominator[0]
-        characteristic: Array = np.polynomial.polynomial.polyadd(np.convolve(AF, Q), np.convolve(B, P))
+        around = np.polynomial.polynomial.polyadd(np.convolve(AF, Q), np.convolve(B, P))
+        characteristic = np.asarray(around, dtype=np.float64)
         return {
             "excitation": (one, one),
             "input": (np.convolve(AF, Q), characteristic),
             "output": (np.convolve(B, Q), characteristic),
         }
 
-    @cached_property
-    def _predictor(self) -> dict[str, Filter]:
-        """From y (a) or u (b, f) to the gradient with respect to a coefficient without delay.
+    def _sources(self, record: Array) -> dict[str, Array]:
+        """(n,) each: the gradient with respect to a coefficient of A, B or F, but for its delay.
 
-        Minus the derivatives of the prediction error epsilon = (D / C) (A y - (B / F) u).
+        Minus the derivatives of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters follow each
+        other: in one product of their denominators twice the same pole costs half the digits.
         """
-        m = self.model
+        m, letters = self.model, {p.letter for p in self.model.parameters}
         B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]
-        CF = np.convolve(C, F)
-        return {"a": (-D, C), "b": (D, CF), "f": (-np.convolve(D, B), np.convolve(CF, F))}
+        by_b = scipy.signal.lfilter(D, np.convolve(C, F), self.signals("input", record)[:, 0])
+        sources = {"b": by_b}
+        if "a" in letters:
+            sources["a"] = scipy.signal.lfilter(-D, C, self.signals("output", record)[:, 0])
+        if "f" in letters:
+            sources["f"] = scipy.signal.lfilter(-B, F, by_b)
+        return sources

@@ -55,7 +55,7 @@ class DesignedSpectrum:
         """
         step = hold * self.step
         if self.density is not None:
-            w = 2.0 * np.pi * np.arange(period // 2 + 1) / (period * step)
+            w = np.asarray(2.0 * np.pi * np.arange(period // 2 + 1) / (period * step), dtype=np.float64)
             return grid_lines(self.density(w), period, step)
         if self.sinusoids is None:
             raise ValueError("a spectrum has a density or sinusoids")

@@ -12,7 +12,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.designed import DesignedSpectrum
 from inputdesign_cli.signal.levels import few_levels
 from inputdesign_cli.signal.lines import Lines
-from inputdesign_cli.signal.multisine import LineVectors, blocks_of, gaussian_record, multisine_record
+from inputdesign_cli.signal.multisine import blocks_of, gaussian_record, multisine_record
 from inputdesign_cli.signal.phases import LimitedResponse, low_peak_phases, schroeder_phases
 from inputdesign_cli.signal.settings import Method, SignalSettings
 from inputdesign_cli.signal.shift_register import register_length, shifted_sequences
@@ -73,7 +73,7 @@ class SignalGenerator:
         """
         settings, blocks = self.settings, 1
         if self.method == "multisine":
-            blocks = blocks_of(self._vectors, self.spectrum.inputs)
+            blocks = blocks_of(self.settings.vectors, self.spectrum.inputs)
         elif self.method in ("binary", "ternary"):
             blocks = self.spectrum.inputs
         block = self.period // blocks
@@ -97,7 +97,9 @@ class SignalGenerator:
     def _period(self, rng: np.random.Generator) -> Array:
         method, lines, length = self.method, self.lines, self.period
         if method == "multisine":
-            return multisine_record(lines, length, rng, self._vectors, angles=self._phases(lines, rng))
+            return multisine_record(
+                lines, length, rng, self.settings.vectors, angles=self._phases(lines, rng)
+            )
         if method == "binary" or method == "ternary":
             return few_levels(lines, length, rng, method)
         if method == "filtered_noise":
@@ -108,10 +110,6 @@ class SignalGenerator:
             bits = self.settings.bits or register_length(length)
             return shifted_sequences(bits, length, lines.inputs, rng) * np.sqrt(lines.mean_squares)
         raise ValueError("a given record is not drawn")
-
-    @property
-    def _vectors(self) -> LineVectors:
-        return "random" if self.settings.phases == "random" else "orthogonal"
 
     def _phases(self, lines: Lines, rng: np.random.Generator) -> Array | None:
         """The common phases (L,) of the lines; None for uniform ones."""

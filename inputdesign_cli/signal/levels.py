@@ -101,10 +101,7 @@ def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> Comp
 def _unitary(matrices: ComplexArray) -> ComplexArray:
     """(L, r, r): the unitary factors of their polar decompositions."""
     if matrices.shape[-1] == 1:
-        size = np.abs(matrices)
-        return np.asarray(
-            np.where(size > 0.0, matrices, 1.0) / np.where(size > 0.0, size, 1.0), dtype=complex
-        )
+        return np.exp(1j * np.angle(matrices))
     left, _, right = np.linalg.svd(matrices)
     return np.asarray(left @ right)
 

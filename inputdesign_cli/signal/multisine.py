@@ -6,16 +6,13 @@ A record of r periods whose vectors are orthogonal has, on average over them, th
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.lines import Lines
-
-LineVectors = Literal["orthogonal", "random"]
+from inputdesign_cli.signal.settings import LineVectors
 
 
 def orthogonal_columns(order: int) -> NDArray:

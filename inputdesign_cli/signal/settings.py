@@ -12,6 +12,7 @@ from inputdesign_cli.signal.sinusoids import Selection
 
 Method = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "given"]
 Phases = Literal["orthogonal", "random", "schroeder", "optimised"]
+LineVectors = Literal["orthogonal", "random"]
 LEVELLED = ("binary", "ternary", "prbs")
 
 
@@ -87,6 +88,11 @@ class SignalSettings:
     def block(self) -> int:
         """The length of a record is a multiple of this."""
         return self.periods * self.hold
+
+    @property
+    def vectors(self) -> LineVectors:
+        """Of the lines of a multisine over the inputs, see `multisine_record`."""
+        return "random" if self.phases == "random" else "orthogonal"
 
     def period(self, samples: int) -> int:
         """Values a period."""

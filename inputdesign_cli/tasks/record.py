@@ -104,13 +104,8 @@ def make_record(request: RecordRequest, design: Design, experiment: ChannelExper
         tried = settings
         if candidates is not None:
             tried = replace(settings, candidates=candidates, most_candidates=candidates)
-        generator = SignalGenerator(
-            spectrum,
-            tried,
-            samples,
-            request.band,
-            partial(limited_responses, experiment, bounds, request.step, settings.hold),
-        )
+        limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
+        generator = SignalGenerator(spectrum, tried, samples, request.band, limited)
         return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
 
     record = made(samples)
@@ -143,13 +138,8 @@ def given_record(
     samples = request.length(experiment.samples)
     if settings.period(samples) < least_period(experiment.inputs):
         return None
-    generator = SignalGenerator(
-        spectrum,
-        settings,
-        samples,
-        request.band,
-        partial(limited_responses, experiment, request.bounds, request.step, settings.hold),
-    )
+    limited = partial(limited_responses, experiment, request.bounds, request.step, settings.hold)
+    generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
     plant = FiniteRecord(experiment, samples, request.step)
     return best_record(generator, plant, Target(ratio), request.bounds)
 

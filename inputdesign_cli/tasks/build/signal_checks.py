@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.signal import LineVectors, Quantiser, SignalSettings, blocks_of
+from inputdesign_cli.signal import Quantiser, SignalSettings, blocks_of
 from inputdesign_cli.signal.settings import LEVELLED
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.signal_settings import (
@@ -77,8 +77,7 @@ def check_signal(spec: Spec) -> None:
 def _check_harmonics(spec: Spec, settings: SignalSettings, samples: int | None) -> None:
     if samples is None or not isinstance(settings.lines, tuple):
         return
-    vectors: LineVectors = "random" if settings.phases == "random" else "orthogonal"
-    block = settings.period(samples) // blocks_of(vectors, spec.plant.inputs)
+    block = settings.period(samples) // blocks_of(settings.vectors, spec.plant.inputs)
     top = block // 2
     if settings.lines[-1] > top:
         raise spec.complain(

@@ -1,4 +1,4 @@
-"""Records of several inputs: jointly low peaks, limits on each channel, their own accuracy."""
+"""The words of `signal:` and of limits on single samples with several inputs, from the spec to the files."""
 
 import io
 from pathlib import Path
@@ -12,43 +12,8 @@ from inputdesign_cli import load_spec, solve, validate
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.runs.run_directory import write_run
-from inputdesign_cli.signal import Lines, low_peak_angles, multisine_record, schroeder_angles
 
 SPEC = Path(__file__).parent.parent.parent / "specs" / "two_by_two_arx.yaml"
-
-
-def coloured(lines, period):
-    """Correlated inputs of different powers."""
-    rng = np.random.default_rng(0)
-    roots = rng.normal(size=(lines, 2, 2)) + 1j * rng.normal(size=(lines, 2, 2))
-    powers = roots @ roots.conj().swapaxes(1, 2) * np.array([[1.0, 0.3], [0.3, 0.09]])
-    return Lines(2 * np.pi * np.arange(1, lines + 1) / period, powers, period)
-
-
-def test_low_peaks_of_all_inputs_and_periods_at_once():
-    lines, rng = coloured(40, 256), np.random.default_rng(1)
-    start = 2 * np.pi * rng.random(40)
-    rms = np.sqrt(np.einsum("naa->a", lines.powers).real)
-
-    def crest(angles):
-        record = multisine_record(lines, 512, rng, "orthogonal", angles=angles)
-        np.testing.assert_allclose(np.sqrt(np.mean(record**2, axis=0)), rms, rtol=1e-9)
-        return (np.abs(record).max(axis=0) / rms).max()
-
-    assert crest(low_peak_angles(lines, 512, start)) < 0.75 * crest(start)
-    assert np.isfinite(crest(schroeder_angles(lines, 512)))
-
-
-def test_weights_of_the_inputs():
-    """An input that may reach little is kept low at the expense of the other."""
-    lines, rng = coloured(40, 256), np.random.default_rng(1)
-    start = 2 * np.pi * rng.random(40)
-    rms = np.sqrt(np.einsum("naa->a", lines.powers).real)
-    peaks = []
-    for weight in (1.0, 3.0):
-        angles = low_peak_angles(lines, 512, start, amplitude=rms * np.array([1.0, weight]))
-        peaks.append(np.abs(multisine_record(lines, 512, rng, "orthogonal", angles=angles)).max(axis=0))
-    assert peaks[1][0] < peaks[0][0]
 
 
 def test_limits_on_each_channel():
