@@ -27,6 +27,8 @@ def explain(
     from inputdesign_cli.error_codes import CODES, explanation
 
     if code is None:
-        typer.echo("\n".join(aligned([(name, known.title) for name, known in sorted(CODES.items())])))
+        typer.echo(
+            "\n".join(aligned([(name, known.title) for name, known in sorted(CODES.items())], wrap=True))
+        )
     else:
         typer.echo(explanation(code))
