@@ -2,7 +2,7 @@
 
 The certificate needs no program: phi* <= phi(M) + max over S of <grad, S> - <grad, M>, and the maximum is
 the minimum over mu in [0, 1] of the largest generalised eigenvalue of
-(Q, mu P_I / K_u + (1 - mu) P_O / K_y), Q = sum of grad_lm A_lm (errata).
+(Q, mu P_I / K_u + (1 - mu) P_O / K_y), Q = sum of grad_lm A_lm (docs/errata.md).
 """
 
 import warnings

@@ -13,8 +13,8 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.channel_model import ChannelModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.loop import LoopResponse, refuse_instantaneous, refuse_unstable
-from inputdesign_cli.plant.matrix_controller import MatrixController
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
 
@@ -33,7 +33,7 @@ class ChannelLoop(ABC):
     """
 
     model: ChannelModel
-    controller: MatrixController
+    controller: TransferMatrix
 
     @property
     @abstractmethod

@@ -13,12 +13,12 @@ from inputdesign_cli.plant.model import PolynomialModel
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
-    Rational,
     evaluate,
     join_roots,
     roots_in_z,
     unit_circle,
 )
+from inputdesign_cli.plant.transfer import Rational
 
 
 @dataclass(frozen=True)

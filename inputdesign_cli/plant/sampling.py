@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.signal
 
-from inputdesign_cli.plant.polynomial import Rational
+from inputdesign_cli.plant.transfer import Rational
 
 
 def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], period: float) -> Rational:
@@ -15,6 +15,25 @@ def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], pe
 
     `period` is in the unit of time of s. Any leading delay stays in the numerator.
     """
-    sampled, poles, _ = scipy.signal.cont2discrete((numerator, denominator), period, method="zoh")
+    if len(denominator) == 1:
+        return Rational(np.array([numerator[-1] / denominator[0]]))
+    # scipy takes coefficients below 1e-14 for zeros, so it gets a numerator of order one.
+    given = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
+    gain = float(np.abs(given).max(initial=0.0))
+    scaled = given / gain if gain > 0 else np.ones(1)
+    above, below, _ = scipy.signal.cont2discrete((scaled, denominator), period, method="zoh")
     # In z both have the same length, so that their coefficients are those of q^-1, ascending.
-    return Rational.build(list(np.atleast_2d(sampled)[0]), [list(poles)])
+    top = gain * np.ravel(above).astype(float)
+    return Rational(np.concatenate([np.zeros(below.size - top.size), top]), (below,))
+
+
+def hold_entries(
+    numerators: Sequence[Sequence[Sequence[float]]],
+    denominators: Sequence[Sequence[Sequence[float]]],
+    period: float,
+) -> list[list[Rational]]:
+    """The same for every entry of a matrix."""
+    return [
+        [zero_order_hold(above, below, period) for above, below in zip(*rows, strict=True)]
+        for rows in zip(numerators, denominators, strict=True)
+    ]

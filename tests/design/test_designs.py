@@ -341,7 +341,7 @@ def test_weighted_variance_example_of_the_peer():
 
 
 def test_free_optimum_of_the_first_order_system(first_order):
-    """errata: 0.1925467, one line at 0.1553."""
+    """docs/errata.md: 0.1925467, one line at 0.1553."""
     design = solve(first_order, requirements=relative(), basis=LinesBasis.anywhere(GRID))
     check(design)
     assert design.result.objective == pytest.approx(0.1925467, rel=1e-6)

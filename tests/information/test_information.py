@@ -80,7 +80,7 @@ def test_information_of_an_arx_model_with_white_input():
 
 
 def test_loop_norms_of_the_flexible_transmission(flexible):
-    """||S||^2 and ||G S||^2 (H2), recomputed independently in the errata."""
+    """||S||^2 and ||G S||^2 (H2), recomputed independently in docs/errata.md."""
     basis = FirBasis(0)
     for kind, expected in (("input", 1.0606348409), ("output", 1.8022202466)):
         value = basis.integrals(lambda w, k=kind: flexible.power_density(k, w), flexible.singularities)[0]

@@ -1,4 +1,4 @@
-"""The exact finite-order criterion: its ingredients, its optimum, and the figures of the errata."""
+"""The exact finite-order criterion: its ingredients, its optimum, and the figures of docs/errata.md."""
 
 import numpy as np
 import pytest

@@ -44,7 +44,7 @@ def test_the_design_of_the_column(spec, tmp_path):
     result = outcome.result
     assert result["status"] == "optimal"
     assert result["objective"]["kind"] == "closed_loop_error"
-    # (mean tr Z^{1/2})^2 / power, from the errata: mean S2, the noise, the eigenvalues of the matrix root.
+    # (mean tr Z^{1/2})^2 / power, from docs/errata.md: mean S2, the noise, eigenvalues of the matrix root.
     by_hand = (1.637898 * 1e-5 * np.sqrt(2) * 72.376130) ** 2 / 2
     assert result["objective"]["value"] == pytest.approx(by_hand, rel=1e-5)
     assert 0 <= result["objective"]["relative_gap"] < 1e-10

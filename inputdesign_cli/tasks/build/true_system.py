@@ -8,11 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import scipy.signal
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment, Experiment
-from inputdesign_cli.plant import Loop
+from inputdesign_cli.plant import Loop, hold_entries
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
@@ -89,17 +88,11 @@ def _polynomials(spec: Spec, plant: Any) -> Any:
     """A true plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
     if not isinstance(plant, ContinuousPlant):
         return plant
-    above, below = [], []
-    for tops, bottoms in zip(
-        plant.continuous.numerator_matrix, plant.continuous.denominator_matrix, strict=True
-    ):
-        pairs = [
-            scipy.signal.cont2discrete((top, bottom), spec.sample_time, "zoh")
-            for top, bottom in zip(tops, bottoms, strict=True)
-        ]
-        above.append(tuple(tuple(np.ravel(pair[0]).tolist()) for pair in pairs))
-        below.append(tuple(tuple(np.ravel(pair[1]).tolist()) for pair in pairs))
-    return PolynomialPlant.model_construct(A=(1.0,), B=tuple(above), F=tuple(below))
+    matrix = plant.continuous
+    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, spec.sample_time)
+    above = tuple(tuple(tuple(entry.numerator.tolist()) for entry in row) for row in held)
+    below = tuple(tuple(tuple(entry.denominator_polynomial.tolist()) for entry in row) for row in held)
+    return PolynomialPlant.model_construct(A=(1.0,), B=above, F=below)
 
 
 @contextmanager

@@ -1,0 +1,223 @@
+"""Transfer functions: scalars in q^-1 and in s, and matrices in q^-1 with the scalar as their 1 x 1 case.
+
+Denominators are kept in factors: a controller's slow pole next to z = 1 loses digits when it is multiplied
+out, and the sensitivity function at low frequency depends on just those digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.polynomial import (
+    Array,
+    ComplexArray,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
+from inputdesign_cli.plant.polynomial_matrix import at, delay_of, stack
+from inputdesign_cli.plant.state_space import StateSpace
+
+Coefficients = Sequence[float] | Array
+
+
+class ScalarTransfer(Protocol):
+    """A weight or a filter, whatever its variable."""
+
+    def at(self, w: ArrayLike) -> ComplexArray:
+        """Its value at frequencies `w`, same shape."""
+        ...
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles and zeros as points of the frequency plane, frequency + j damping."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rational:
+    """numerator / (product of the denominator factors), all in q^-1, ascending."""
+
+    numerator: Array
+    denominator: tuple[Array, ...] = (np.ones(1),)
+
+    @classmethod
+    def build(
+        cls, numerator: Coefficients, denominator: Coefficients | Sequence[Coefficients] = (1.0,)
+    ) -> Rational:
+        """From plain numbers; `denominator` is one polynomial or a list of factors."""
+        factors = [denominator] if np.ndim(denominator[0]) == 0 else denominator
+        return cls(np.asarray(numerator, dtype=float), tuple(np.asarray(f, dtype=float) for f in factors))
+
+    def numerator_at(self, w: ArrayLike) -> ComplexArray:
+        """Numerator at normalised frequencies `w`."""
+        return evaluate(self.numerator, unit_circle(w))
+
+    def denominator_at(self, w: ArrayLike) -> ComplexArray:
+        """Product of the denominator factors at normalised frequencies `w`."""
+        return _product_at(self.denominator, unit_circle(w))
+
+    def at(self, w: ArrayLike) -> ComplexArray:
+        """Frequency response at normalised frequencies `w`."""
+        return self.numerator_at(w) / self.denominator_at(w)
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles in z, factor by factor."""
+        return join_roots(roots_in_z(factor) for factor in self.denominator)
+
+    @cached_property
+    def zeros(self) -> ComplexArray:
+        """Zeros in z, those at the origin and at infinity left out."""
+        return roots_in_z(self.numerator)
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles and zeros as points of the frequency plane."""
+        return logarithmic_distance(join_roots([self.poles, self.zeros]))
+
+    @cached_property
+    def denominator_polynomial(self) -> Array:
+        """The denominator factors multiplied out."""
+        return product_of(self.denominator)
+
+
+@dataclass(frozen=True)
+class ContinuousRational:
+    """numerator / denominator in s, coefficients in descending powers."""
+
+    numerator: Array
+    denominator: Array
+
+    def at(self, w: ArrayLike) -> ComplexArray:
+        """Its value at frequencies `w` in rad per time unit."""
+        s = 1j * np.asarray(w, dtype=float)
+        return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s), dtype=complex)
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles and zeros as points of the frequency plane."""
+        roots = np.concatenate([np.roots(self.numerator), np.roots(self.denominator)])
+        return np.asarray(np.abs(roots.imag) + 1j * np.abs(roots.real))
+
+
+@dataclass(frozen=True)
+class TransferMatrix:
+    """T = Q^-1 P in q^-1: `numerator` P (rows, columns, l), `factors` of each entry of the diagonal Q.
+
+    A denominator that several entries of a row share is kept once, so that its poles are not counted twice:
+    with integral action on every output each input has one integrator.
+    """
+
+    numerator: Array
+    factors: tuple[tuple[Array, ...], ...]
+
+    @classmethod
+    def build(
+        cls,
+        numerator: Sequence[Sequence[Coefficients]],
+        denominator: Sequence[Sequence[Coefficients]],
+    ) -> TransferMatrix:
+        """From entries with a denominator each; zero entries have no poles."""
+        rows, below = [], []
+        for tops, bottoms in zip(numerator, denominator, strict=True):
+            own = [tuple(bottom) if np.any(top) else () for top, bottom in zip(tops, bottoms, strict=True)]
+            distinct = [factor for factor in dict.fromkeys(own) if factor]
+            missing = [[f for f in distinct if f != factor] if factor else [] for factor in own]
+            rows.append([product_of([top, *rest]).tolist() for top, rest in zip(tops, missing, strict=True)])
+            below.append(tuple(np.array(factor, dtype=float) for factor in distinct))
+        return cls(stack(rows), tuple(below))
+
+    @classmethod
+    def diagonal(cls, entry: Rational, size: int) -> TransferMatrix:
+        """t(q) I of `size` rows."""
+        return cls(np.eye(size)[:, :, None] * entry.numerator, (entry.denominator,) * size)
+
+    @cached_property
+    def denominator(self) -> tuple[Array, ...]:
+        """The diagonal of Q, multiplied out."""
+        return tuple(product_of(row) for row in self.factors)
+
+    def at(self, w: ArrayLike) -> ComplexArray:
+        """T (n, rows, columns) at normalised frequencies `w` (n,)."""
+        P, below = self.fraction_at(w)
+        return P / below[:, :, None]
+
+    def fraction_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """P (n, rows, columns) and the diagonal of Q (n, rows) at normalised frequencies `w` (n,)."""
+        q = unit_circle(w)
+        return at(self.numerator, q), np.stack([_product_at(row, q) for row in self.factors], axis=-1)
+
+    def scaled(self, factor: Rational) -> TransferMatrix:
+        """This matrix times a scalar transfer function."""
+        rows = [[np.convolve(p, factor.numerator).tolist() for p in row] for row in self.numerator]
+        return TransferMatrix(stack(rows), tuple((*row, *factor.denominator) for row in self.factors))
+
+    def common_fraction(self) -> tuple[Array, Array]:
+        """P' (rows, columns, l) and d (m,) with T = P' / d; factors that rows share are in d once."""
+        shared: list[Array] = []
+        missing: list[list[Array]] = []
+        for row in self.factors:
+            left = list(shared)
+            for factor in row:
+                match = next((i for i, f in enumerate(left) if np.array_equal(f, factor)), None)
+                if match is None:
+                    shared.append(factor)
+                    for rest in missing:
+                        rest.append(factor)
+                else:
+                    del left[match]
+            missing.append(left)
+        rows = [
+            [product_of([p, *rest]).tolist() for p in row]
+            for row, rest in zip(self.numerator, missing, strict=True)
+        ]
+        return stack(rows), product_of(shared)
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles in z."""
+        return join_roots(roots_in_z(factor) for row in self.factors for factor in row)
+
+    @cached_property
+    def delay(self) -> int:
+        """The number of samples by which every entry is delayed."""
+        return delay_of(self.numerator)
+
+    @property
+    def realisation(self) -> StateSpace:
+        """From columns to rows, row by row in the observer's canonical form."""
+        outputs, inputs, length = self.numerator.shape
+        direct = np.zeros((outputs, inputs))
+        blocks = []
+        for j, denominator in enumerate(self.denominator):
+            n = max(length, denominator.size) - 1
+            q, P = np.zeros(n + 1), np.zeros((n + 1, inputs))
+            q[: denominator.size], P[:length] = denominator, self.numerator[j].T
+            q, P = q / denominator[0], P / denominator[0]
+            direct[j] = P[0]
+            A, C = np.eye(n, k=1), np.zeros((outputs, n))
+            if n:
+                A[:, 0], C[j, 0] = -q[1:], 1.0
+            blocks.append((A, P[1:] - np.outer(q[1:], P[0]), C))
+        return StateSpace.of(blocks, direct)
+
+
+def product_of(polynomials: Iterable[Coefficients]) -> Array:
+    """The product of polynomials, 1 if there are none."""
+    return reduce(np.convolve, (np.asarray(p, dtype=float) for p in polynomials), np.ones(1))
+
+
+def _product_at(polynomials: Iterable[Array], q: ComplexArray) -> ComplexArray:
+    value = np.ones_like(q)
+    for polynomial in polynomials:
+        value = value * evaluate(polynomial, q)
+    return value
