@@ -77,12 +77,14 @@ def _default_files() -> list[Path]:
 
 def table(rows: Sequence[Row]) -> str:
     """The comparison as aligned text; where a number is missing, the reason follows its line."""
-    cells = [HEADER]
+    from rich.text import Text
+
+    cells: list[tuple[str | Text, ...]] = [tuple(Text(name, "bold") for name in HEADER)]
     for row in rows:
         quantity = row.quantity
         cells.append(
             (
-                "ok" if row.passed else "FAILS",
+                Text("ok", "green") if row.passed else Text("FAILS", "bold red"),
                 f"{row.golden}: {row.run}",
                 quantity.name,
                 "-" if row.computed is None else f"{row.computed:.8g}",

@@ -28,6 +28,7 @@ def explain(
 
     if code is None:
         known = sorted(explanations().items())
-        typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known])))
+        typer.echo("
+".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
     else:
         typer.echo(explanation(code))

@@ -34,7 +34,7 @@ def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
         ("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}"),
     ]
     title = result.get("title")
-    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap="   ")])
+    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])
 
 
 def _identified(result: Result) -> list[tuple[str, str]]:

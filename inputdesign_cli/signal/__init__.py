@@ -6,7 +6,6 @@ from inputdesign_cli.signal.constraints import largest_move as largest_move
 from inputdesign_cli.signal.crest import crest_factor as crest_factor
 from inputdesign_cli.signal.crest import optimise_phases as optimise_phases
 from inputdesign_cli.signal.designed import DesignedSpectrum as DesignedSpectrum
-from inputdesign_cli.signal.designed import RecordBasis as RecordBasis
 from inputdesign_cli.signal.evaluation import Target as Target
 from inputdesign_cli.signal.generator import SignalGenerator as SignalGenerator
 from inputdesign_cli.signal.lines import Lines as Lines

@@ -267,11 +267,13 @@ def test_progress_goes_to_terminals_only(monkeypatch, capsys):
     with status("working", quiet=False):
         pass
     assert capsys.readouterr() == ("", "")
+    monkeypatch.setenv("TERM", "xterm")
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with status("working", quiet=False):
-        assert terminal.text == "working"
-    assert terminal.text.endswith("\r\x1b[K")
+    with status("[working] on it", quiet=False):
+        pass
+    assert "[working] on it" in terminal.text
+    assert terminal.text.endswith("\x1b[2K"), "the line is cleared"
     terminal.text = ""
     with status("working", quiet=True):
         pass
@@ -280,6 +282,17 @@ def test_progress_goes_to_terminals_only(monkeypatch, capsys):
 
 def test_columns_are_aligned():
     assert aligned([("a", "1"), ("bcd", "22")], right=[1]) == ["a     1", "bcd  22"]
+    assert aligned([("漢", "[x]"), ("bcd", "y")]) == ["漢   [x]", "bcd  y"]
+
+
+def test_lines_break_on_a_terminal_and_nowhere_else(monkeypatch):
+    rows = [("note", "one two three " * 10)]
+    assert len(aligned(rows, wrap=True)) == 1
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = aligned(rows, wrap=True)
+    assert max(map(len, lines)) <= 40
+    assert all(line.startswith("      ") for line in lines[1:])
 
 
 # The commands -------------------------------------------------------------------------------------
