@@ -18,8 +18,9 @@ ORDER = [
     {"spectrum", "information", "accuracy"},
     {"design", "signal", "identification"},
     {"runs"},
+    {"monte_carlo"},
     {"tasks"},
-    {"monte_carlo", "sweep", "figures"},
+    {"sweep", "figures"},
     {"report"},
     {"cli", "__main__"},
 ]

@@ -28,7 +28,6 @@ def explain(
 
     if code is None:
         known = sorted(explanations().items())
-        typer.echo("
-".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
+        typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
     else:
         typer.echo(explanation(code))

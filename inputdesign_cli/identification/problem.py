@@ -3,8 +3,8 @@
 With weights W (p, p) the cost is the sum over the samples of epsilon^T W epsilon. Without, it is
 N det(S / N)^(1/p), S the sum of epsilon epsilon^T, which with one output is S itself. Its minimiser is that
 of the cost with the inverse covariance of its own residuals, the maximum-likelihood estimate for Gaussian
-noise of unknown covariance; Ljung (1999), (7.87)-(7.96) and Section 15.2. Its gradient is that of the weighted
-cost at W = N det(S / N)^(1/p) S^-1 / p, and so is its Hessian up to what vanishes at the minimum.
+noise of unknown covariance; Ljung (1999), (7.87)-(7.96) and Section 15.2. Its gradient is that of the
+weighted cost at W = N det(S / N)^(1/p) S^-1 / p, and so is its Hessian up to what vanishes at the minimum.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
 from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.signal.channels import Lines
+from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise
 
 # Batches stay in the cache of the processor.

@@ -33,6 +33,6 @@ def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Result
 
             return analyse(spec)
         case "simulate":
-            from inputdesign_cli.monte_carlo.simulation import simulate
+            from inputdesign_cli.tasks import simulate
 
             return simulate(spec, executor=executor)

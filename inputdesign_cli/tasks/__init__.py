@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
@@ -43,6 +44,20 @@ def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing."""
     with _placed(spec):
         build_task(spec).check()
+
+
+def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
+    """Design the experiment, or take the given one, and try it many times on a simulated true system.
+
+    Args:
+        executor: where batches of runs are computed (default: in this process); the result does not depend
+            on it.
+
+    Raises:
+        SpecError: what this version does not simulate, and all that `solve` raises.
+    """
+    with _placed(spec):
+        return build_task(spec).simulate(executor)
 
 
 def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Results:

@@ -11,16 +11,18 @@ from typing import Any, Literal
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Results, Table
 from inputdesign_cli.runs.units import Header
-from inputdesign_cli.signal import Record, SignalGenerator
+from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.record import (
@@ -36,6 +38,7 @@ from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
+from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
@@ -69,7 +72,8 @@ class ConvexTask:
     grid: GridMethod | None
     columns: FewColumns | None
     record: RecordRequest
-    unstated: Sequence[ModelError] = ()
+    unstated: Sequence[ModelError]
+    simulation: Simulation
 
     def check(self) -> None:
         """Nothing: building has checked all."""
@@ -81,14 +85,18 @@ class ConvexTask:
             InfeasibleError: nothing within the limits meets the requirements.
             InaccurateError: the proof did not close.
         """
-        return self.delivered()[0]
+        return self._delivered().results
 
-    def delivered(self) -> tuple[Results, SignalGenerator | None]:
-        """The same, and what generates other records of the spectrum, if there is one.
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """The same, with the design tried many times on the true system; see `tasks.simulation`.
 
         Raises:
+            SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
             InfeasibleError, InaccurateError: see `solve`.
         """
+        return simulate(self.simulation, self._delivered(), executor)
+
+    def _delivered(self) -> Delivered:
         started = time.perf_counter()
         done, how = self.designed()
         result = design_result(done, how, self.tolerance)
@@ -109,7 +117,11 @@ class ConvexTask:
         result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
         units = self.header.units
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
-        return results, None if record is None else redrawn(self.record, done.design, record)
+        if record is None:
+            return Delivered(results, None, None)
+        found = done.design.result
+        generator = redrawn(self.record, done.design, record)
+        return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
 
     def designed(self) -> tuple[Designed, dict[str, Any]]:
         """The design with its experiment, its status and what the solver did.

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, worst
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weights_of
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Results, Table
 from inputdesign_cli.runs.units import Header
-from inputdesign_cli.signal import DesignedSpectrum, Record, in_phase_record
+from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, worst_ratio
 from inputdesign_cli.tasks.result.bound import bound_curves
@@ -25,6 +27,7 @@ from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
+from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 _TOO_FAINT = 1e-13
 _ROUNDING = 1e-9
@@ -107,6 +110,7 @@ class GivenTask:
     limits: StatedLimits
     record: RecordRequest
     ellipses: Pairs | None
+    simulation: Simulation
 
     def check(self) -> None:
         """Nothing: building has checked all."""
@@ -117,6 +121,17 @@ class GivenTask:
         Raises:
             SpecError: `not-exciting` when the excitation leaves parameters undetermined.
         """
+        return self._delivered().results
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """The same, with the excitation tried many times on the true system; see `tasks.simulation`.
+
+        Raises:
+            SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with; see `solve`.
+        """
+        return simulate(self.simulation, self._delivered(), executor)
+
+    def _delivered(self) -> Delivered:
         started = time.perf_counter()
         raw, excitation, units = self.experiment, self.excitation, self.header.units
         experiment = raw.whitened(max(sum(excitation.power["excitation"]), 1e-300))
@@ -159,7 +174,10 @@ class GivenTask:
         if notes:
             result["notes"] = notes
         result["timing_s"] = {"analysis": time.perf_counter() - started}
-        return Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        if record is None:
+            return Delivered(results, None, None)
+        return Delivered(results, record.samples, self._renewed(len(record.samples)))
 
     def _result(
         self, experiment: ChannelExperiment, requirements: Sequence[Requirement], information: Array
@@ -201,6 +219,19 @@ class GivenTask:
             return self._in_phase(*excitation.sinusoids, experiment, ratio)
         spectrum = DesignedSpectrum.of(basis, x, inputs=experiment.inputs, step=request.step)
         return given_record(request, experiment, spectrum, ratio)
+
+    def _renewed(self, samples: int) -> Excitation | None:
+        """What realises the spectrum anew; None for a record that was given."""
+        excitation, request = self.excitation, self.record
+        basis, x = excitation.basis, excitation.x
+        if basis is None or x is None:
+            return None
+        inputs = self.experiment.inputs
+        if excitation.sinusoids is not None and isinstance(basis, LinesBasis) and inputs > 1:
+            frequencies, amplitudes = excitation.sinusoids
+            return InPhase("design", frequencies * request.step, amplitudes, basis, x)
+        spectrum = DesignedSpectrum.of(basis, x, inputs=inputs, step=request.step)
+        return Redrawn("design", SignalGenerator(spectrum, request.settings, samples, request.band), basis, x)
 
     def _in_phase(
         self,

@@ -1,6 +1,5 @@
 """Limits on single samples hold exactly, whatever else is asked of the record."""
 
-
 import numpy as np
 import pytest
 from channel_plants import arx

@@ -17,6 +17,7 @@ from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_
 from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
+from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
 from inputdesign_cli.tasks.build.system import build_cost, build_experiment
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
@@ -64,6 +65,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         columns=_few_columns(spec, basis),
         record=build_record_request(spec),
         unstated=unstated_errors(spec, experiment),
+        simulation=build_simulation(spec, experiment),
     )
 
 

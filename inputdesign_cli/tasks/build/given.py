@@ -26,6 +26,7 @@ from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
+from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.system import (
     build_cost,
     build_experiment,
@@ -79,6 +80,7 @@ def build_given(spec: Spec) -> GivenTask:
         limits=_limits(spec),
         record=build_record_request(spec),
         ellipses=spec.report.ellipses,
+        simulation=build_simulation(spec, experiment),
     )
 
 
