@@ -138,4 +138,4 @@ def _summary(done: SweepSummary) -> str:
         diagnostic = done.first_failure.diagnostics[0]
         lines.append(("first failure", f"[{diagnostic.code}] {diagnostic.message}"))
     lines.append(("files", f"{done.directory}: {', '.join(path.name for path in done.files)}"))
-    return "\n".join(aligned(lines, gap="   "))
+    return "\n".join(aligned(lines, gap=3, wrap=True))

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import ChannelExperiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import (
-    ChannelPhases,
-    ChannelSignalGenerator,
-    Lines,
-    channel_record_information,
-    in_phase_record,
-    multisine_record,
-)
-from inputdesign_cli.signal.levels import pseudo_random, register_length, signs
-from inputdesign_cli.spectrum import TabulatedChannels
-
-FlatKind = Literal["white", "prbs", "binary"]
-_LINES_AT_ONCE = 64
+from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, in_phase_record
+from inputdesign_cli.signal.settings import Method
+from inputdesign_cli.spectrum import Basis, LinesBasis, TabulatedSpectrum
 
 
 class Excitation(Protocol):
@@ -53,58 +43,62 @@ class Recorded:
 
     def information(self, experiment: ChannelExperiment) -> Array:
         """Of the samples themselves."""
-        return channel_record_information(experiment, self.record, self.step)
+        return FiniteRecord(experiment, len(self.record), self.step).information(self.record)
 
 
 @dataclass(frozen=True)
 class Redrawn:
-    """Records of the designed spectrum, drawn anew in each run and scaled to its power exactly."""
+    """Records of a spectrum, generated anew in each run and scaled to its power exactly.
+
+    `basis` and `x` are the spectrum that the generator realises.
+    """
 
     name: str
-    generator: ChannelSignalGenerator
-    power: float
-    step: float
+    generator: SignalGenerator
+    basis: Basis | TabulatedSpectrum
+    x: Array
+
+    @classmethod
+    def flat(
+        cls,
+        name: str,
+        method: Method,
+        powers: Array,
+        band: tuple[float, float],
+        samples: int,
+        step: float,
+    ) -> Redrawn:
+        """Independent inputs of these powers (r,), each flat over a band in the unit of the experiment."""
+        white = TabulatedSpectrum.white(powers, band)
+        spectrum = DesignedSpectrum.of(white, np.ones(1), inputs=powers.size, step=step)
+        settings = SignalSettings(method, phases="orthogonal" if powers.size > 1 else "random")
+        edges = (band[0] * step, band[1] * step)
+        return cls(name, SignalGenerator(spectrum, settings, samples, edges), white, np.ones(1))
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
         """Records of the generator's kind of signal."""
         values = np.stack([self.generator.values(rng) for _ in range(runs)])
-        return _scaled(np.repeat(values, self.generator.recipe.hold, axis=1), self.power)
+        records = np.repeat(values, self.generator.settings.hold, axis=1)
+        found = np.mean(records**2, axis=1, keepdims=True).sum(axis=2, keepdims=True)
+        return np.asarray(records * np.sqrt(self.generator.spectrum.power / found))
 
     def information(self, experiment: ChannelExperiment) -> Array:
-        """Of the sinusoids that stand for the spectrum."""
-        generator = self.generator
-        lines = generator.lines if generator.recipe.block == 1 else generator.design(generator.samples, 1)
-        total = float(np.trace(lines.powers.sum(axis=0)).real)
-        return _line_information(experiment, lines.scaled(self.power / total), self.step)
-
-
-@dataclass(frozen=True)
-class Multisine:
-    """Sinusoids of new phases in each run, scaled to their power exactly; frequencies are in rad per step."""
-
-    name: str
-    lines: Lines
-    phases: ChannelPhases
-    step: float
-
-    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Records of random phases."""
-        drawn = np.stack([multisine_record(self.lines, samples, rng, self.phases) for _ in range(runs)])
-        return _scaled(drawn, float(np.trace(self.lines.powers.sum(axis=0)).real))
-
-    def information(self, experiment: ChannelExperiment) -> Array:
-        """Of the sinusoids."""
-        return _line_information(experiment, self.lines, self.step)
+        """Of the spectrum."""
+        return _information(experiment, self.basis, self.x)
 
 
 @dataclass(frozen=True)
 class InPhase:
-    """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels."""
+    """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels.
+
+    `basis` and `x` are their spectrum.
+    """
 
     name: str
     frequencies: Array
     amplitudes: Array
-    step: float
+    basis: LinesBasis
+    x: Array
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
         """Records of random phases."""
@@ -114,58 +108,10 @@ class InPhase:
 
     def information(self, experiment: ChannelExperiment) -> Array:
         """Of the sinusoids."""
-        constant = (self.frequencies <= 0.0) | (self.frequencies >= np.pi)
-        powers = np.einsum("la,lb->lab", self.amplitudes, self.amplitudes).astype(complex)
-        powers *= np.where(constant, 1.0, 0.5)[:, None, None]
-        return _line_information(experiment, Lines(self.frequencies, powers), self.step)
+        return _information(experiment, self.basis, self.x)
 
 
-@dataclass(frozen=True)
-class Flat:
-    """Independent signals of one kind and of these powers (r,), each of a flat spectrum in discrete time.
-
-    White noise is Gaussian, a binary signal takes its signs, prbs is a maximum length sequence.
-    """
-
-    name: str
-    powers: Array
-    kind: FlatKind
-
-    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """Records scaled to their powers exactly."""
-        # Parts of one long sequence: two sequences of a shift register are delays of each other.
-        channels = self.powers.size
-        length = samples * channels
-        if self.kind == "prbs":
-            bits = register_length(length)
-            whole = np.stack([pseudo_random(bits, length, rng) for _ in range(runs)])
-        else:
-            noise = rng.standard_normal((runs, length))
-            whole = noise if self.kind == "white" else signs(noise)
-        parts = whole.reshape(runs, channels, samples).swapaxes(1, 2)
-        return parts * np.sqrt(self.powers / np.mean(parts**2, axis=1, keepdims=True))
-
-    def information(self, experiment: ChannelExperiment) -> Array:
-        """Of the flat spectrum."""
-        basis = TabulatedChannels.white(self.powers, (0.0, np.pi))
-        maps = basis.integrals(experiment.information_density, experiment.singularities)
-        return np.asarray(experiment.baseline_information + maps[0])
-
-
-def _scaled(records: Array, power: float) -> Array:
-    """Records (runs, samples, r) of this power in all channels together."""
-    found = np.mean(records**2, axis=1, keepdims=True).sum(axis=2, keepdims=True)
-    return np.asarray(records * np.sqrt(power / found))
-
-
-def _line_information(experiment: ChannelExperiment, lines: Lines, step: float) -> Array:
-    """M0 + sum over lines of tr(D P), D the information density."""
-    total = experiment.baseline_information.copy()
-    w = lines.frequencies / (step if experiment.model.continuous else 1.0)
-    for start in range(0, w.size, _LINES_AT_ONCE):
-        part = slice(start, start + _LINES_AT_ONCE)
-        density = experiment.information_density(w[part])
-        if experiment.inputs == 1:
-            density = density[..., None, None]
-        total += np.einsum("nklab,nba->kl", density, lines.powers[part], optimize=True).real
-    return total
+def _information(experiment: ChannelExperiment, basis: Basis | TabulatedSpectrum, x: Array) -> Array:
+    """(k, k): M of a spectrum."""
+    maps = basis.integrals(experiment.information_density, experiment.singularities)
+    return np.asarray(experiment.baseline_information + np.tensordot(x, maps, axes=1))

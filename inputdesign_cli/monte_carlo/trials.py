@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Absolute, EntryError, NormError
+from inputdesign_cli.accuracy import Absolute, Entry, ModelError
 from inputdesign_cli.information import ChannelExperiment
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
@@ -95,13 +95,17 @@ class Trials:
 
     def bound(self, predicted: PredictedError, information: Array) -> Array:
         """r_u (n,) on the true system at the frequencies and entries of the prediction."""
-        true, alpha = self.true, predicted.alpha
         if predicted.entries is None:
-            norm = NormError(true, Absolute(1.0), alpha, true.band)
-            return norm.error_bound(information, predicted.w)
+            return self._bound(predicted.w, predicted.alpha, None, information)
         r_u = np.empty(predicted.w.size)
         for i, j in np.unique(predicted.entries, axis=0).tolist():
             own = np.all(predicted.entries == (i, j), axis=1)
-            entry = EntryError(true, Absolute(1.0), alpha, true.band, output=i, input=j)
-            r_u[own] = entry.error_bound(information, predicted.w[own])
+            r_u[own] = self._bound(predicted.w[own], predicted.alpha, (i, j), information)
         return r_u
+
+    def _bound(self, w: Array, alpha: float, entry: Entry | None, information: Array) -> Array:
+        unstated = Absolute(1.0)
+        error = ModelError(
+            experiment=self.true, band=self.true.band, entry=entry, admissible=unstated, alpha=alpha
+        )
+        return error.error_bound(information, w)

@@ -1,6 +1,7 @@
 """Plants: G, H, their parameter gradients and the loop around them, at any frequencies."""
 
 from inputdesign_cli.plant.channel_loop import ChannelLoop as ChannelLoop
+from inputdesign_cli.plant.channel_loop import close_loop as close_loop
 from inputdesign_cli.plant.channel_model import ChannelModel as ChannelModel
 from inputdesign_cli.plant.channels import PolynomialChannels as PolynomialChannels
 from inputdesign_cli.plant.continuous import ContinuousChannels as ContinuousChannels
@@ -21,5 +22,6 @@ from inputdesign_cli.plant.sampling import zero_order_hold as zero_order_hold
 from inputdesign_cli.plant.transfer import ContinuousRational as ContinuousRational
 from inputdesign_cli.plant.transfer import Rational as Rational
 from inputdesign_cli.plant.transfer import ScalarTransfer as ScalarTransfer
-from inputdesign_cli.plant.transfer import TransferMatrix as MatrixController
 from inputdesign_cli.plant.transfer import TransferMatrix as TransferMatrix
+
+MatrixController = TransferMatrix

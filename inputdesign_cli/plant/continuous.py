@@ -1,6 +1,6 @@
 """Transfer matrices in s.
 
-Spectral design paper, (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
+[mohan-spectral], (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_loop import ChannelLoop
+from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
 from inputdesign_cli.plant.channels import PolynomialChannels
 from inputdesign_cli.plant.polynomial import (
     Array,
@@ -20,6 +20,7 @@ from inputdesign_cli.plant.polynomial import (
     unit_circle,
 )
 from inputdesign_cli.plant.polynomial_matrix import at, stack
+from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
@@ -116,3 +117,8 @@ class PolynomialLoop(ChannelLoop):
             return np.asarray(scipy.signal.lfilter([1.0], determinant, above, axis=-2))
 
         return solved(Q, top, minus_N, bottom), solved(R, bottom, P, top)
+
+
+@close_loop.register
+def _(model: PolynomialChannels, controller: TransferMatrix) -> PolynomialLoop:
+    return PolynomialLoop(model, controller)

@@ -15,6 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+# Data as JSON has it. What is in a result is known by its path, not by its type.
+Json = Any
+Result = Mapping[str, Json]
 # An entry of G by output and input, from zero; None is the only entry, or the norm of them all.
 Entry = tuple[int, int] | None
 
@@ -242,7 +245,7 @@ Curves = (
 class Results:
     """One run: the result and what illustrates it. `tables` and `curves` go by file stem ("bound")."""
 
-    result: Mapping[str, Any]
+    result: Result
     resolved_spec: str  # YAML text of the spec with all overrides applied
     time_unit: str = "s"
     tables: Mapping[str, Table] = field(default_factory=dict)

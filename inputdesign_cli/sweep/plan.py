@@ -8,16 +8,15 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import get_args
 
-import inputdesign_cli
 from inputdesign_cli import __version__
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.specification import Draft, read_draft
+from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
 from inputdesign_cli.sweep.point import PointTask
+from inputdesign_cli.sweep.verbs import Verb
 
-Verb = Literal["solve", "analyse", "simulate"]
 _KEY_LENGTH = 24
 _TRIED = 50
 
@@ -26,7 +25,7 @@ _TRIED = 50
 class Plan:
     """The points of a sweep, in order."""
 
-    draft: Draft
+    draft: SpecTemplate
     grid: Grid
     verb: Verb
     _keys: list[str] = field(default_factory=list, repr=False)
@@ -84,11 +83,11 @@ def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb)
     ------
     SpecError : the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
     """
-    if not hasattr(inputdesign_cli, verb):
+    if verb not in get_args(Verb):
         hint = "sweep with --verb solve"
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
-    draft = read_draft(spec, fixed)
+    draft = read_template(spec, fixed)
     plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
     plan.check()
     return plan

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import inputdesign_cli
 from inputdesign_cli.errors import (
     EXIT_BAD_INPUT,
     EXIT_INACCURATE,
@@ -21,8 +20,9 @@ from inputdesign_cli.errors import (
 )
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.text_formats import json_text
-from inputdesign_cli.specification import Draft
+from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweep.layout import Layout, at_work
+from inputdesign_cli.sweep.verbs import Verb, run_verb
 
 STATUS = {EXIT_BAD_INPUT: "invalid", EXIT_INFEASIBLE: "infeasible", EXIT_INACCURATE: "inaccurate"}
 LOST, BROKEN = "lost", "error"
@@ -39,9 +39,9 @@ class PointTask:
 
     index: int
     key: str
-    draft: Draft
+    draft: SpecTemplate
     overrides: tuple[str, ...]
-    verb: str
+    verb: Verb
     figures: bool
     root: Path
     files: dict[str, bytes] | None = None  # what the spec names, for a machine that may not see our files
@@ -93,14 +93,14 @@ def _compute(task: PointTask, directory: Path) -> PointEnd:
     started = time.perf_counter()
     try:
         spec = task.draft.spec(task.overrides)
-        outcome = getattr(inputdesign_cli, task.verb)(spec)
+        results = run_verb(task.verb, spec)
         seconds = time.perf_counter() - started
-        timing = {**outcome.result.get("timing_s", {}), "point": seconds}
-        outcome = replace(outcome, result={**outcome.result, "timing_s": timing})
+        timing = {**results.result.get("timing_s", {}), "point": seconds}
+        results = replace(results, result={**results.result, "timing_s": timing})
         from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
-        write_run(outcome, directory, draw_all(outcome) if task.figures else {})
+        write_run(results, directory, draw_all(results) if task.figures else {})
     except OutputError:
         raise
     except IdesignError as error:
@@ -110,7 +110,7 @@ def _compute(task: PointTask, directory: Path) -> PointEnd:
     except Exception as error:
         diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
         return failed(BROKEN, diagnostic, time.perf_counter() - started)
-    return PointEnd(str(outcome.result.get("status", "done")))
+    return PointEnd(str(results.result.get("status", "done")))
 
 
 def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:

@@ -24,7 +24,7 @@ from inputdesign_cli.runs.run_directory import complaining, replace_text
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.specification.yaml.writer import to_yaml
 from inputdesign_cli.sweep.layout import SPEC, SUMMARY, TABLE, Layout, opened
-from inputdesign_cli.sweep.plan import Plan, Verb, build_plan
+from inputdesign_cli.sweep.plan import Plan, build_plan
 from inputdesign_cli.sweep.point import (
     BROKEN,
     LOST,
@@ -36,6 +36,7 @@ from inputdesign_cli.sweep.point import (
     run_point_elsewhere,
 )
 from inputdesign_cli.sweep.table import PENDING, table_lines
+from inputdesign_cli.sweep.verbs import Verb
 
 FAILURES = frozenset({*STATUS.values(), LOST, BROKEN})
 _ERRORS: dict[str, type[IdesignError]] = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from inputdesign_cli.accuracy import EntryOfPlant, worst_violation
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Results, Table
@@ -19,6 +18,7 @@ from inputdesign_cli.tasks.identification import (
     identification_results,
     identified,
 )
+from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.estimates import identification_entry
 
 _ROUNDING = 1e-9
@@ -92,13 +92,5 @@ def _evaluated(
     units: Units, question: ModelQuestion, information: Array
 ) -> tuple[bool, list[dict[str, Any]]]:
     """Whether the information of the data meets what is asked, and each requirement with its worst ratio."""
-    listed: list[dict[str, Any]] = []
-    for requirement in question.requirements():
-        violation = worst_violation(requirement, information)
-        entry: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
-        if violation.frequency is not None:
-            entry["frequency"] = violation.frequency / units.frequency
-        if isinstance(requirement, EntryOfPlant) and not units.single:
-            entry["entry"] = requirement.label
-        listed.append(entry)
+    listed = [requirement_entry(units, r, information) for r in question.requirements]
     return all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed), listed

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from inputdesign_cli.accuracy import EntryError, Requirement
+from inputdesign_cli.accuracy import ModelError, Requirement
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification import identify as estimate_model
 from inputdesign_cli.information import ChannelExperiment
@@ -27,18 +27,16 @@ class ModelQuestion:
     Attributes:
         experiment: with that model, the loop and the prior information, in raw parameters.
         alpha: of the model error, see the contract.
-        errors: the requirements on the model error, if any.
+        requirements: all that is asked, in raw parameters.
         entries: what has r_u of every entry of G where no requirement has it.
-        requirements: makes all requirements, those of `errors` among them.
         top_up: designs what makes up for what data of information (k, k) leave to be wished for; None where
             the spec designs nothing.
     """
 
     experiment: ChannelExperiment
     alpha: float
-    errors: Sequence[Requirement]
-    entries: Sequence[EntryError]
-    requirements: Callable[[], list[Requirement]]
+    requirements: Sequence[Requirement]
+    entries: Sequence[ModelError]
     top_up: Callable[[Array], Results] | None
 
 
@@ -96,7 +94,7 @@ def identification_results(task: Identification, found: Identified, started: flo
     result = estimate_result(header.title, estimate)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, found.model, estimate)
     tables["bound"], curves["bound"], worst = bound_of_data(
-        header.units, question.errors, question.entries, estimate.information
+        header.units, question.requirements, question.entries, estimate.information
     )
     result["model_error"] = {"alpha": question.alpha, **worst}
     notes = identification_notes(found.data.notes, found.model, estimate)

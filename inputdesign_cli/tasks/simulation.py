@@ -7,28 +7,26 @@ Every run draws a new realisation of the spectrum (scaled to its power exactly) 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import EntryError, Requirement
+from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import ChannelExperiment, PowerKind
-from inputdesign_cli.monte_carlo.excitations import Excitation, Flat, FlatKind, Multisine, Recorded, Redrawn
+from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
 from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_truth
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.plant import ChannelLoop, ChannelModel
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import BoundCurves, Curves, Results, Table
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.signal import ChannelPhases, ChannelSignalGenerator
-from inputdesign_cli.signal.density_lines import density_lines
-from inputdesign_cli.spectrum import TabulatedChannels
-from inputdesign_cli.tasks.result.channel_curves import bound_curves_of, entry_bound_curves
+from inputdesign_cli.signal.settings import LEVELLED, Method
+from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.simulation import (
     covariance_in_theory,
     fractions,
@@ -37,9 +35,6 @@ from inputdesign_cli.tasks.result.simulation import (
     study_entry,
 )
 from inputdesign_cli.tasks.result.simulation_curves import cloud, disturbance, error_bands
-
-# What has a flat spectrum over all of discrete time without being made of sinusoids.
-_FLAT: dict[str, FlatKind] = {"white": "white", "prbs": "prbs", "binary": "binary"}
 
 
 @dataclass(frozen=True)
@@ -64,52 +59,6 @@ class TrueSystem:
 
 
 @dataclass(frozen=True)
-class FlatInputs:
-    """Excitations of a flat spectrum over the band of the experiment, even over its channels.
-
-    Attributes:
-        inputs: number of channels.
-        band: in the unit of the experiment's frequencies.
-        everywhere: whether that is all of discrete time.
-        step: time between samples, in that unit.
-        phases: of sinusoids over the channels.
-    """
-
-    inputs: int
-    band: tuple[float, float]
-    everywhere: bool
-    step: float
-    phases: ChannelPhases
-
-    def of(self, kind: str, name: str, power: float, samples: int) -> Excitation:
-        """One of this kind and total power.
-
-        Noise and signals of two levels fill all of discrete time; on a band the sinusoids of a flat
-        spectrum do.
-
-        Raises:
-            SpecError: `not-supported` for signals of two levels on a band.
-        """
-        powers = np.full(self.inputs, power / self.inputs)
-        if kind in _FLAT and self.everywhere:
-            return Flat(name, powers, _FLAT[kind])
-        if kind not in ("white", "multisine"):
-            raise bad_spec(
-                "not-supported",
-                f"a {kind} signal has power at all frequencies of discrete time, the excitation only on a "
-                "band",
-                hint="compare with multisine or white",
-                key="simulation.compare",
-            )
-        lines = density_lines(
-            TabulatedChannels.white(powers, self.band), powers, samples, self.step, self.phases
-        )
-        if lines is None:
-            raise _nothing_to_simulate()
-        return Multisine(name, lines, self.phases, self.step)
-
-
-@dataclass(frozen=True)
 class Simulation:
     """How an experiment is tried.
 
@@ -117,11 +66,9 @@ class Simulation:
         nominal: the experiment on the design model, in raw parameters, prior information included.
         truth: None where the design model is the true system.
         renewed: whether each run realises the spectrum anew.
-        given: the realisations of a given excitation, for a number of samples; None for a record that is
-            given, or none at all.
-        compare: what else is tried at equal power, of the kinds that `flat` makes.
+        compare: what else is tried at equal power: signals of a flat spectrum over the band, of these kinds.
         cost: weights of the powers of an excitation.
-        errors, entries, alpha: see `ModelQuestion`.
+        entries, alpha: see `ModelQuestion`.
     """
 
     units: Units
@@ -130,12 +77,9 @@ class Simulation:
     runs: int
     seed: int
     renewed: bool
-    given: Callable[[int], Excitation | None]
-    compare: Sequence[str]
-    flat: FlatInputs
+    compare: Sequence[Method]
     cost: Mapping[PowerKind, Weight]
-    errors: Sequence[Requirement]
-    entries: Sequence[EntryError]
+    entries: Sequence[ModelError]
     alpha: float
 
 
@@ -146,12 +90,12 @@ class Delivered:
     Attributes:
         results: what has been computed so far.
         record: (n, r), about its operating point; None if no excitation is needed.
-        generator: draws other records of a designed spectrum.
+        renewed: realises the spectrum anew in each run; None for a record that was given.
     """
 
     results: Results
     record: Array | None
-    generator: ChannelSignalGenerator | None
+    renewed: Excitation | None
 
 
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
@@ -208,26 +152,39 @@ def _excitations(plan: Simulation, delivered: Delivered, record: Array) -> list[
     """The design, what is compared at equal power, and white noise of the power that it would need."""
     result, step, samples = delivered.results.result, plan.units.step, len(record)
     power = float(np.sum(result["power"]["excitation"]))
-    renewed: Excitation | None = None
-    if plan.renewed and delivered.generator is not None:
-        renewed = Redrawn("design", delivered.generator, power, step)
-    elif plan.renewed:
-        renewed = plan.given(samples)
+    renewed = delivered.renewed if plan.renewed else None
     listed: list[Excitation] = [renewed or Recorded("design", record, step)]
-    listed += [plan.flat.of(kind, kind, power, samples) for kind in plan.compare]
+    listed += [_flat(plan, kind, kind, power, samples) for kind in plan.compare]
     needed = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation")
     if needed and result.get("objective", {}).get("kind") == "least_cost" and "white" in plan.compare:
-        listed.append(plan.flat.of("white", "white_that_suffices", float(np.sum(needed)), samples))
+        listed.append(_flat(plan, "white", "white_that_suffices", float(np.sum(needed)), samples))
     return listed
+
+
+def _flat(plan: Simulation, kind: Method, name: str, power: float, samples: int) -> Excitation:
+    """An excitation of a flat spectrum over the band of the experiment, even over its channels.
+
+    Raises:
+        SpecError: `not-supported` for signals of few levels on a band.
+    """
+    nominal, band = plan.nominal, plan.nominal.band
+    everywhere = plan.units.sampled and band == (0.0, np.pi)
+    if kind in LEVELLED and not everywhere:
+        raise bad_spec(
+            "not-supported",
+            f"a {kind} signal has power at all frequencies of discrete time, the excitation only on a band",
+            hint="compare with multisine or white",
+            key="simulation.compare",
+        )
+    powers = np.full(nominal.inputs, power / nominal.inputs)
+    return Redrawn.flat(name, kind, powers, band, samples, plan.units.step)
 
 
 def _predicted(plan: Simulation, results: Results, information: Array) -> PredictedError:
     """What bound.csv says; where there is none, the r_u that the `information` gives."""
     bound = results.curves.get("bound")
     if not isinstance(bound, BoundCurves):
-        _, bound = bound_curves_of(plan.units, plan.errors, information, None) or entry_bound_curves(
-            plan.units, plan.entries, information, None, stated=False
-        )
+        _, bound = bound_curves(plan.units, plan.entries, information, stated=False)
     panels = bound.panels
     admissible = [panel.r_adm for panel in panels if panel.r_adm is not None]
     places = [panel.entry for panel in panels if panel.entry is not None]

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-import inputdesign_cli
 from inputdesign_cli.errors import InfeasibleError, SpecError, bad_spec
-from inputdesign_cli.runs.golden import compare, execute, load_golden
+from inputdesign_cli.runs.golden import compare
+from inputdesign_cli.runs.golden_file import load_golden
 from inputdesign_cli.runs.results import Results
+from inputdesign_cli.sweep.golden_runs import execute
 
 SHIPPED = sorted((Path(__file__).parents[2] / "golden").glob("*.yaml"))
 
@@ -93,9 +94,9 @@ def test_what_is_not_there_does_not_agree(tmp_path, results, notes):
 
 
 def test_execute_runs_the_verb_with_the_overrides(tmp_path, monkeypatch):
-    monkeypatch.setitem(vars(inputdesign_cli), "load_spec", lambda *a: a)
+    monkeypatch.setattr("inputdesign_cli.sweep.golden_runs.load_spec", lambda *a: a)
     verb = lambda spec: Results(result={"spec": spec}, resolved_spec="")  # noqa: E731
-    monkeypatch.setitem(vars(inputdesign_cli), "analyse", verb)
+    monkeypatch.setattr("inputdesign_cli.tasks.analyse", verb)
     golden = load_golden(written(tmp_path, GOOD))
     expected = (tmp_path / "sub" / "b.yaml", ["experiment.samples=10", "spectrum={type: white}"])
     assert execute(golden, golden.runs[1]) == {"spec": expected}
@@ -109,11 +110,11 @@ def test_execute_keeps_infeasible_apart_from_a_bad_spec(tmp_path, monkeypatch):
         return verb
 
     golden = load_golden(written(tmp_path, GOOD))
-    monkeypatch.setitem(vars(inputdesign_cli), "load_spec", lambda *a: a)
+    monkeypatch.setattr("inputdesign_cli.sweep.golden_runs.load_spec", lambda *a: a)
     infeasible = InfeasibleError([])
-    monkeypatch.setitem(vars(inputdesign_cli), "solve", fails(infeasible))
+    monkeypatch.setattr("inputdesign_cli.tasks.solve", fails(infeasible))
     assert execute(golden, golden.runs[0]) is infeasible
-    monkeypatch.setitem(vars(inputdesign_cli), "solve", fails(bad_spec("x", "y")))
+    monkeypatch.setattr("inputdesign_cli.tasks.solve", fails(bad_spec("x", "y")))
     with pytest.raises(SpecError):
         execute(golden, golden.runs[0])
 

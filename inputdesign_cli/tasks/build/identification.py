@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import RegressionPlant, Spec, parse_spec
-from inputdesign_cli.tasks.build.channel_requirements import build_entry_errors, unstated_errors
-from inputdesign_cli.tasks.build.channel_task import channel_requirements, with_prior
-from inputdesign_cli.tasks.build.channels import build_channel_model, channel_experiment, record_step
+from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.model_error import model_error_alpha
+from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.requirements import build_requirements
+from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
 
-def build_identification(spec: Spec, design: Callable[[Spec], Results]) -> Identification:
+def build_identification(spec: Spec) -> Identification:
     """What `identify` and `assess` run on.
-
-    Args:
-        design: designs the experiment that a spec asks for.
 
     Raises:
         SpecError: the plant has no such model.
@@ -40,9 +35,9 @@ def build_identification(spec: Spec, design: Callable[[Spec], Results]) -> Ident
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(
         header=build_header(spec),
-        nominal=build_channel_model(spec),
+        nominal=build_model(spec),
         assessable=bool(spec.accuracy.requirements),
-        at=lambda model, samples, source: _question(_restated(spec, model, source), samples, design),
+        at=lambda model, samples, source: _question(_restated(spec, model, source), samples),
     )
 
 
@@ -56,35 +51,33 @@ def _restated(spec: Spec, model: ChannelModel, source: str) -> Spec:
     )
 
 
-def _question(spec: Spec, samples: int, design: Callable[[Spec], Results]) -> ModelQuestion:
+def _question(spec: Spec, samples: int) -> ModelQuestion:
     """What a spec asks of an experiment of so many samples.
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
     """
-    # Any: requirements ask for no more than both kinds of experiments have.
-    experiment: Any = replace(with_prior(spec, channel_experiment(spec)), samples=samples)
-    errors = build_entry_errors(spec, experiment)
+    experiment = replace(build_experiment(spec), samples=samples)
+    requirements = [make(experiment) for make in build_requirements(spec, experiment)]
 
     def topped_up(information: Array) -> Results:
         prior = {
             "parameters": list(experiment.model.names),
             "information": (0.5 * (information + information.T)).tolist(),
         }
-        return design(
+        return build_convex(
             parse_spec(
                 spec.to_yaml(),
                 file="top-up",
                 overrides=[f"experiment.prior={json.dumps(prior)}"],
                 folder=spec.resolve_path("."),
             )
-        )
+        ).solve()
 
     return ModelQuestion(
         experiment=experiment,
-        alpha=model_error_alpha(spec, experiment),
-        errors=errors,
+        alpha=model_error_alpha(spec, experiment.model),
+        requirements=requirements,
         entries=unstated_errors(spec, experiment),
-        requirements=lambda: [make(experiment) for make in channel_requirements(spec, experiment)],
         top_up=topped_up if spec.designs else None,
     )

@@ -10,7 +10,7 @@ from inputdesign_cli.plant.sampling import hold_entries
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
-from inputdesign_cli.tasks.build.channels import build_channel_model, stable_loop
+from inputdesign_cli.tasks.build.system import build_loop, build_model
 from inputdesign_cli.tasks.simulation import TrueSystem
 
 
@@ -29,10 +29,10 @@ def build_true_system(spec: Spec) -> TrueSystem | None:
         noise = Noise.model_construct(C=stated.C, D=stated.D, variance=stated.variance or 1.0)
     if isinstance(plant, ContinuousPlant) and (isinstance(spec.plant, PolynomialPlant) or noise.filters):
         plant = _polynomials(plant, spec.sample_time)
-    model = build_channel_model(spec.model_copy(update={"plant": plant, "noise": noise}))
+    model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
     controller = spec.experiment.controller
     with _blaming_truth():
-        loop = None if controller is None else stable_loop(model, controller)
+        loop = None if controller is None else build_loop(model, controller)
     return TrueSystem(model, loop, None if study.noise is None else study.noise.relative_std)
 
 

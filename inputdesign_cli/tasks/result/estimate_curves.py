@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import EntryError, Requirement, worst_violation
+from inputdesign_cli.accuracy import ModelError, Requirement, worst
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves, Table
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.result.channel_curves import bound_curves_of, entry_bound_curves
+from inputdesign_cli.tasks.result.bound import bound_curves
 
 
 def data_curves(
@@ -60,24 +60,23 @@ def data_curves(
 
 
 def bound_of_data(
-    units: Units, errors: Sequence[Requirement], entries: Sequence[EntryError], information: Array
+    units: Units, requirements: Sequence[Requirement], entries: Sequence[ModelError], information: Array
 ) -> tuple[Table, BoundCurves, dict[str, Any]]:
-    """bound.csv with its figure, and the worst ratio of r_u and r_adm if there are `errors`.
+    """bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
 
     Args:
-        errors: the requirements on the model error.
-        entries: what has r_u of every entry of G without them.
+        entries: what has r_u of every entry of G where no requirement bounds it.
         information: (k, k) of the data.
     """
     entry: dict[str, Any] = {}
-    if errors:
-        violation = max((worst_violation(error, information) for error in errors), key=lambda v: v.ratio)
+    bounding = [r for r in requirements if r.bounded_error is not None]
+    if bounding:
+        violation = worst([r.worst(information) for r in bounding])
         entry["worst_ratio"] = violation.ratio
         if violation.frequency is not None:
             entry["worst_frequency"] = violation.frequency / units.frequency
-    table, curves = bound_curves_of(units, errors, information, None, label="data") or entry_bound_curves(
-        units, entries, information, None, stated=False, label="data"
-    )
+    errors = [error for error in (r.bounded_error for r in bounding) if error is not None]
+    table, curves = bound_curves(units, errors or entries, information, stated=bool(errors), label="data")
     return table, curves, entry
 
 
