@@ -32,10 +32,10 @@ def record_information(experiment: Experiment, excitation: Array) -> Array:
 
 
 def input_and_output(experiment: Experiment, excitation: Array) -> tuple[Array, Array]:
-    """u_x and y_x (n,): what the excitation alone causes at input and output, from rest."""
-    plant = FiniteRecord(as_channels(experiment), excitation.size)
-    u, y = (plant.signals(kind, excitation[:, None])[:, 0] for kind in ("input", "output"))
-    return u, y
+    """u_x and y_x (.., n): what the excitation alone causes at input and output, from rest."""
+    plant = FiniteRecord(as_channels(experiment), excitation.shape[-1])
+    u, y = (plant.signals(kind, np.atleast_2d(excitation).T) for kind in ("input", "output"))
+    return u.T.reshape(excitation.shape), y.T.reshape(excitation.shape)
 
 
 def channel_record_information(experiment: ChannelExperiment, record: Array, step: float) -> Array:
