@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
+from inputdesign_cli.specification.models.shapes import check_each
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
@@ -21,19 +23,13 @@ def stable_unless_controlled(spec: Spec) -> Iterator[PathDiagnostic]:
     yield from _stable_A(spec, spec.plant, ("plant",))
 
 
-def _stable_A(spec: Spec, plant: Plant, path: Path) -> Iterator[PathDiagnostic]:  # noqa: N802 (the paper's symbol)
+def _stable_A(spec: Spec, plant: Plant, path: tuple[str, ...]) -> Iterator[PathDiagnostic]:  # noqa: N802
     if spec.closed_loop or plant.kind != "polynomial":
         return
-    polynomials = plant.A_per_output if depth(plant.A) == 2 else plant.A_per_output[:1]
-    for i, polynomial in enumerate(polynomials):
-        finding = check_delay_stable(polynomial)
-        if finding is None:
-            continue
-        hint = finding.hint
-        if finding.code == "unstable-polynomial":
-            hint = "an unstable plant needs a loop: add experiment.controller, or " + hint
-        where = (*path, "A", i) if depth(plant.A) == 2 else (*path, "A")
-        yield PathDiagnostic(finding.code, finding.message, hint, where)
+    for found in check_each(plant.A, check_delay_stable, *path, "A"):
+        unstable = found.code == "unstable-polynomial"
+        needs = "an unstable plant needs a loop: add experiment.controller, or " if unstable else ""
+        yield replace(found, hint=needs + found.hint)
 
 
 def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
