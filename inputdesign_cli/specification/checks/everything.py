@@ -1,4 +1,4 @@
-"""Checks across sections. Each is a function of the spec that yields findings with absolute paths."""
+"""Checks across sections. Each is a function of the spec that yields diagnostics with absolute paths."""
 
 from __future__ import annotations
 
@@ -40,10 +40,15 @@ def related(path: Path, broken: Iterable[Path]) -> bool:
 
 
 def run_checks(spec: Spec, broken: set[Path]) -> list[PathDiagnostic]:
-    """All findings of all checks whose inputs could be read."""
+    """What all checks find whose inputs could be read.
+
+    Args:
+        spec: The spec, which is valid section by section.
+        broken: The paths of what could not be read.
+    """
     return [
-        finding
+        found
         for check, reads in CHECKS
         if not any(related(parse_key(key), broken) for key in reads)
-        for finding in check(spec)
+        for found in check(spec)
     ]

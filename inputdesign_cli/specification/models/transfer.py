@@ -22,7 +22,7 @@ from inputdesign_cli.specification.models.values import PolynomialList, depth
 
 
 def factors_of(denominator: Polynomial | PolynomialList) -> PolynomialList:
-    """The factors of a denominator; one polynomial is its own only factor."""
+    """The factors of a denominator; a single polynomial is its own only factor."""
     return cast(PolynomialList, denominator if depth(denominator) == 2 else (denominator,))
 
 

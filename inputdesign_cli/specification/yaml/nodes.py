@@ -119,7 +119,7 @@ def _compose(events: Iterator[Any], document: Document) -> Node | None:
             stack.pop().open = False
             continue
         if isinstance(event, yaml.AliasEvent):
-            node = Node("alias", _anchored(anchors, event.anchor, document, line, column), line, column)
+            node = Node("alias", _anchored(anchors, str(event.anchor), document, line, column), line, column)
         elif isinstance(event, yaml.ScalarEvent):
             node = Node("scalar", event.value, line, column, event.style in (None, ""), event.tag)
         elif isinstance(event, yaml.CollectionStartEvent):
