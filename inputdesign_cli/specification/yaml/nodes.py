@@ -50,7 +50,11 @@ class Document:
     def location(self, line: int, column: int) -> Location:
         """The place of a node in the text as the user wrote it."""
         text = self.lines[line - 1] if 0 < line <= len(self.lines) else ""
-        return Location(self.file, line, column + (self.shift if line == 1 else 0), text)
+        return Location(self.file, line, self.shifted(line, column), text)
+
+    def shifted(self, line: int, column: int) -> int:
+        """The column in the line as the user wrote it."""
+        return column + (self.shift if line == 1 else 0)
 
     def error(self, code: str, message: str, line: int, column: int, hint: str) -> SpecError:
         """What stops the reading."""

@@ -119,8 +119,7 @@ class _Expansion:
         return data
 
     def _mark(self, node: Node) -> Mark:
-        place = self.document.location(node.line, node.column)
-        return Mark(self.source, place.line, place.column)
+        return Mark(self.source, node.line, self.document.shifted(node.line, node.column))
 
     def _complain(
         self, code: str, message: str, hint: str, path: Path, mark: Mark, lost: Path | None = None
