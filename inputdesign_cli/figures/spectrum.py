@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.typing import LineStyleType
 
 from inputdesign_cli.figures.style import (
     BLUE,
@@ -24,7 +23,7 @@ from inputdesign_cli.runs.results import Array, MatrixSpectrumCurves, SpectrumCu
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
 # Entries of a nearly singular spectrum lie on each other: the dashes let the lower ones show through.
-DASHES: tuple[Any, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
+DASHES: tuple[LineStyleType, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
 MARGIN = 0.02  # beside the outermost lines, of the width between them
 MOST = 6  # curves that stay apart in one panel
 FEW = 60  # lines that are drawn bold

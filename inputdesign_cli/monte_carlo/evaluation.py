@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import CloudCurves, Entry, ErrorBandPanel
+from inputdesign_cli.runs.results import CloudCurves, ErrorBandPanel
 from inputdesign_cli.specification import Spec
 
 _QUANTILES = (0.05, 0.5, 0.95)
@@ -183,7 +183,12 @@ def gap_notes(spec: Spec, inputs: Mapping[str, Any]) -> list[str]:
 
 
 def error_bands(
-    errors: Array, *, frequency: Array, r_u: Array | None, r_adm: Array | None, entry: Entry = None
+    errors: Array,
+    *,
+    frequency: Array,
+    r_u: Array | None,
+    r_adm: Array | None,
+    entry: tuple[int, int] | None = None,
 ) -> ErrorBandPanel:
     """Quantiles of the errors (runs, n) of one entry of G over frequency (n,)."""
     return ErrorBandPanel(

@@ -22,7 +22,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import PlainValidator, ValidationError, model_validator
 
@@ -39,7 +39,7 @@ from inputdesign_cli.specification.yaml.reader import Tree, read
 _PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
 
 
-def _result_path(value: Any) -> str:
+def _result_path(value: object) -> str:
     path = text(value)
     if not _PATH.fullmatch(path):
         hint = "write objective.value or power.input[0]"
@@ -123,14 +123,12 @@ class Golden:
 def load_golden(path: Path) -> Golden:
     """Read a golden file.
 
-    Raises
-    ------
-    SpecError
-        Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
-        `golden-path`, `golden-tolerance`, `golden-name`.
+    Raises:
+        SpecError: Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
+            `golden-path`, `golden-tolerance`, `golden-name`.
     """
     tree = read(read_text(path), str(path))
-    readers: dict[Any, Any] = {}
+    readers: dict[int, type[Section]] = {}
     try:
         content = _Content.model_validate(tree.data, context=readers)
     except ValidationError as error:

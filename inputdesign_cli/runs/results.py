@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 # Data as JSON has it. What is in a result is known by its path, not by its type.
 Json = Any
 Result = Mapping[str, Json]
-# An entry of G by output and input, from zero; None is the only entry, or the norm of them all.
-Entry = tuple[int, int] | None
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ class BoundPanel:
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
-    entry: Entry = None
+    entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,7 @@ class ErrorBandPanel:
     quantiles: Mapping[float, Array]  # probability -> (n,)
     r_u: Array | None = None
     r_adm: Array | None = None
-    entry: Entry = None
+    entry: tuple[int, int] | None = None  # as in `BoundPanel`
 
 
 @dataclass(frozen=True)
