@@ -20,6 +20,7 @@ from typing import TypeVar
 
 import numpy as np
 import scipy.signal
+from inputdesign_cli.tasks.loop_error_design import ClosedLoopDesign, design_closed_loop
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.design.loop_error import (
@@ -34,7 +35,6 @@ from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.weight import adjoint, general_weight, reference_weight
 from inputdesign_cli.monte_carlo.loop_error import closed_loop_study
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.tasks.loop_error_design import ClosedLoopDesign, design_closed_loop
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "distillation_column.yaml"
@@ -107,7 +107,6 @@ def grid_program(A: ComplexArray, metrics: ComplexArray, limits: Array, weights:
 def race(repetitions: int = 3) -> dict[str, float | str]:
     """The dual and the grid program in turn on the column with a limit for each input and output."""
     import cvxpy  # noqa: F401 (its import is not what is compared)
-
     from inputdesign_cli.tasks.build.loop_error_problem import build_problem
 
     data = grid_data(build_problem(load_spec(SPEC, [PER_CHANNEL])))

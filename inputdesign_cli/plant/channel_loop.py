@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, singledispatch
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -133,3 +133,18 @@ class ChannelLoop(ABC):
         t = self.responses(w)
         e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), t.y_e.shape)
         return self.model.prediction_gradient(w, t.y_e, t.u_e, e)
+
+
+@singledispatch
+def close_loop(model: ChannelModel, controller: TransferMatrix) -> ChannelLoop:
+    """The loop of a model under a controller; each kind of plant that has one registers its own.
+
+    Raises:
+        SpecError: `not-supported` for a plant that is not sampled.
+    """
+    raise bad_spec(
+        "not-supported",
+        "this version has no loop around a plant in continuous time",
+        hint="write plant.sample: zoh: controllers act on samples",
+        key="experiment.controller",
+    )

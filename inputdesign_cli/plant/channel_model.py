@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,6 +67,18 @@ class ChannelModel(Protocol):
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
+        ...
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        ...
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest.
+
+        Args:
+            step: time between samples of a plant in continuous time; others know theirs.
+        """
         ...
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:

@@ -1,4 +1,7 @@
-"""Polynomial plants with several inputs and outputs: G, H and their gradients."""
+"""Polynomial plants with several inputs and outputs: G, H and their gradients.
+
+The five-polynomial form A y = (B/F) u + (C/D) e ([ljung-1999], Section 4.2) with a matrix of B and F.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,7 @@ from inputdesign_cli.plant.polynomial import (
     roots_in_z,
     unit_circle,
 )
+from inputdesign_cli.plant.simulation import caused_by_inputs, caused_by_noise
 
 Rows = tuple[tuple[Array, ...], ...]
 
@@ -94,6 +98,16 @@ class PolynomialChannels(Parametrised):
         return found
 
     @cached_property
+    def active(self) -> tuple[tuple[int, int], ...]:
+        """The entries (output, input) of G that are not zero."""
+        places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
+        return tuple((i, j) for i, j in places if np.any(self.B[i][j]))
+
+    @cached_property
+    def _active(self) -> frozenset[tuple[int, int]]:
+        return frozenset(self.active)
+
+    @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
 
@@ -151,14 +165,17 @@ class PolynomialChannels(Parametrised):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        factors: dict[tuple[str, int, int], ComplexArray] = {}
+        for i, j in self.active:
+            A, B, F = (evaluate(p, q) for p in (self._row(self.A, i), self.B[i][j], self.F[i][j]))
+            AF = A * F
+            factors |= {("a", i, j): -B / (A * AF), ("b", i, j): 1.0 / AF, ("f", i, j): -B / (F * AF)}
         for index, parameter in enumerate(self.parameters):
-            if parameter.letter in "cd":
-                continue
-            for i, j in parameter.places:
-                A, F = evaluate(self._row(self.A, i), q), evaluate(self.F[i][j], q)
-                B = evaluate(self.B[i][j], q)
-                factor = {"a": -B / (A * F), "b": 1.0 / F, "f": -B / (F * F)}[parameter.letter] / A
-                gradient[:, index, i, j] = factor * q**parameter.power
+            if parameter.letter in "abf":
+                shift = q**parameter.power
+                for i, j in parameter.places:
+                    if (i, j) in self._active:
+                        gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
         return gradient
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
@@ -179,18 +196,29 @@ class PolynomialChannels(Parametrised):
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)
         C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
+        noise = {
+            (letter, i): (factor[:, None] * source[:, i])
+            for i in range(self.outputs)
+            for letter, factor, source in (
+                ("a", -D[i] / C[i], y),
+                ("c", 1.0 / C[i], e),
+                ("d", -1.0 / D[i], e),
+            )
+        }
+        plant: dict[tuple[str, int, int], ComplexArray] = {}
+        for i, j in self.active:
+            F = evaluate(self.F[i][j], q)
+            filtered = D[i] / (C[i] * F)
+            plant["b", i, j] = filtered[:, None] * u[:, j]
+            plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
         for index, parameter in enumerate(self.parameters):
-            letter, shift = parameter.letter, (q**parameter.power)[:, None]
-            if letter in "bf":
-                (i, j) = parameter.places[0]
-                F = evaluate(self.F[i][j], q)
-                filtered = D[i] / (C[i] * F) * (1.0 if letter == "b" else -evaluate(self.B[i][j], q) / F)
-                gradient[:, index, i] = shift * filtered[:, None] * u[:, j]
+            shift = (q**parameter.power)[:, None]
+            if parameter.letter in "bf":
+                i, j = parameter.places[0]
+                gradient[:, index, i] = shift * plant[parameter.letter, i, j]
                 continue
             for i in {place[0] for place in parameter.places}:
-                source = y[:, i] if letter == "a" else e[:, i]
-                filtered = {"a": -D[i] / C[i], "c": 1.0 / C[i], "d": -1.0 / D[i]}[letter]
-                gradient[:, index, i] = shift * filtered[:, None] * source
+                gradient[:, index, i] = shift * noise[parameter.letter, i]
         return gradient
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialChannels:
@@ -213,3 +241,17 @@ class PolynomialChannels(Parametrised):
             tuple(rows["d"]),
             self.covariance if covariance is None else covariance,
         )
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        A, C, D = (self.per_output(rows) for rows in (self.A, self.C, self.D))
+        return caused_by_inputs(A, self.B, self.F, u), caused_by_noise(A, C, D, e)
+
+    @property
+    def stable_outputs(self) -> tuple[bool, ...]:
+        """Output by output, whether its row of G is stable."""
+        rows = [
+            [a, *(f for b, f in zip(bs, fs, strict=True) if np.any(b))]
+            for a, bs, fs in zip(self.per_output(self.A), self.B, self.F, strict=True)
+        ]
+        return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)

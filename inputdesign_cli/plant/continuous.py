@@ -1,6 +1,6 @@
 """Transfer matrices in s.
 
-Spectral design paper, (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
+[mohan-spectral], (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from inputdesign_cli.plant.channel_model import Parameter, Parametrised, WhiteNoise, entry_label
 from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.held import polynomial_roots
+from inputdesign_cli.plant.intersample import Intersample
 from inputdesign_cli.plant.model import Fraction
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -102,6 +103,18 @@ class ContinuousChannels(Parametrised, WhiteNoise):
             self.covariance if covariance is None else covariance,
             self.common,
         )
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What the interpolation of u (.., n, r) within its band causes (.., n, p), and e itself."""
+        return self.driven(u, Intersample(step, hold=False)), e
+
+    def driven(self, u: Array, intersample: Intersample) -> Array:
+        """What samples u (.., n, r) cause at the outputs (.., n, p), from rest."""
+        y = np.zeros((*u.shape[:-1], self.outputs))
+        for i, j in self.active:
+            entry = intersample.entry(self.numerator[i][j], self.denominator[i][j])
+            y[..., i] += intersample.caused(entry, u[..., j])
+        return y
 
     @cached_property
     def poles(self) -> ComplexArray:

@@ -12,6 +12,7 @@ from inputdesign_cli.plant.channel_model import WhiteNoise
 from inputdesign_cli.plant.continuous import ContinuousChannels
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry
+from inputdesign_cli.plant.intersample import Intersample
 from inputdesign_cli.plant.model import Fraction
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.state_space import StateSpace
@@ -57,6 +58,14 @@ class SampledChannels(WhiteNoise):
             (i, j): HeldEntry.of(plant.numerator[i][j], plant.denominator[i][j], self.sample_time)
             for i, j in plant.active
         }
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> SampledChannels:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        return SampledChannels(self.continuous_plant.at(theta, covariance), self.sample_time)
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r), held between samples, causes at the outputs (.., n, p), and e itself."""
+        return self.continuous_plant.driven(u, Intersample(self.sample_time, hold=True)), e
 
     @cached_property
     def poles(self) -> ComplexArray:

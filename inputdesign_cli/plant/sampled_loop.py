@@ -9,9 +9,10 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_loop import ChannelLoop
+from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.sampled import SampledChannels
+from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
@@ -76,3 +77,8 @@ class SampledLoop(ChannelLoop):
             found[..., t, :] += x @ from_states
             x = x @ next_state + found[..., t, :] @ onward
         return found[..., : self.model.outputs], found[..., self.model.outputs :]
+
+
+@close_loop.register
+def _(model: SampledChannels, controller: TransferMatrix) -> SampledLoop:
+    return SampledLoop(model, controller)

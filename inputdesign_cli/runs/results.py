@@ -29,19 +29,6 @@ class Table:
 
 @dataclass(frozen=True)
 class SpectrumCurves:
-    """The designed spectrum over frequency, as a density, as lines, or both."""
-
-    frequency: Array  # (n,) rad per time unit
-    density: Array | None = None  # (n,) Phi(frequency)
-    white: float | None = None  # the flat level of the white baseline, for comparison
-    line_frequency: Array | None = None  # (L,)
-    line_power: Array | None = None  # (L,) mean square of each sinusoid
-    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
-    record: Array | None = None  # (n,) smoothed periodogram of the record
-
-
-@dataclass(frozen=True)
-class MatrixSpectrumCurves:
     """The spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
 
     frequency: Array  # (n,) rad per time unit
@@ -51,7 +38,7 @@ class MatrixSpectrumCurves:
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
     logarithmic: bool = False  # the axis of frequency; that of one input always is
     record: Array | None = None  # (n, r), smoothed periodograms of the record
-    band: tuple[float, float] | None = None  # where power may be, if that is wider than `frequency`
+    band: tuple[float, float] | None = None  # where the sinusoids might be
 
 
 @dataclass(frozen=True)
@@ -223,7 +210,6 @@ class MomentsCurves:
 
 Curves = (
     SpectrumCurves
-    | MatrixSpectrumCurves
     | DirectionCurves
     | LossCurves
     | BoundCurves

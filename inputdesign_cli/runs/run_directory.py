@@ -18,7 +18,7 @@ from types import MappingProxyType
 
 from inputdesign_cli.errors import DataError, Diagnostic, OutputError
 from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.results import BoundCurves, Json, OptimalityCurves, Results, Table
+from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.text_formats import csv_text, json_text, plain
 
 __all__ = [
@@ -183,7 +183,7 @@ def _write_files(
 ) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
     texts = {SPEC: results.resolved_spec}
-    texts |= {f"{stem}.csv": csv_text(table) for stem, table in _tables(results).items()}
+    texts |= {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
     for name, text in texts.items():
         _write(folder / name, text)
     contents = {**results.files, **figures}
@@ -196,21 +196,6 @@ def _write_files(
         _sync(folder / name)
     _sync(folder)
     return names
-
-
-def _tables(results: Results) -> dict[str, Table]:
-    """The tables, with what the curves show beyond them: a report is drawn from the files alone."""
-    tables = dict(results.tables)
-    for stem, curves in results.curves.items():
-        if isinstance(curves, OptimalityCurves) and stem not in tables:
-            header = f"frequency_rad_per_{results.time_unit}"
-            tables[stem] = Table({header: curves.frequency, "ratio": curves.ratio})
-        elif isinstance(curves, BoundCurves) and stem in tables and len(curves.panels) == 1:
-            (panel,) = curves.panels
-            more = {"r_u_white": panel.r_u_white, "r_u_record": panel.r_u_record}
-            shown = {name: values for name, values in more.items() if values is not None}
-            tables[stem] = Table({**tables[stem].columns, **shown})
-    return tables
 
 
 def _write(path: Path, text: str) -> None:

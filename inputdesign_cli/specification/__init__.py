@@ -1,6 +1,5 @@
-"""The spec room: YAML in, frozen and validated objects out, every diagnostic with its line."""
+"""Specifications: YAML in, frozen and validated objects out, every diagnostic with its line."""
 
-from inputdesign_cli.specification.draft import Draft, read_draft
 from inputdesign_cli.specification.loading import load_spec, parse_spec
 from inputdesign_cli.specification.models.accuracy import (
     Accuracy,
@@ -51,6 +50,7 @@ from inputdesign_cli.specification.models.transfer import (
     DiscreteTransfer,
 )
 from inputdesign_cli.specification.schema import json_schema
+from inputdesign_cli.specification.template import SpecTemplate, read_template
 
 __all__ = [
     "Accuracy",
@@ -65,7 +65,6 @@ __all__ = [
     "Cost",
     "DiscreteMatrix",
     "DiscreteTransfer",
-    "Draft",
     "Experiment",
     "FirSpectrum",
     "FreeSpectrum",
@@ -95,6 +94,7 @@ __all__ = [
     "SimulationNoise",
     "Solver",
     "Spec",
+    "SpecTemplate",
     "SpectrumLimit",
     "Sweep",
     "TableFile",
@@ -104,5 +104,5 @@ __all__ = [
     "json_schema",
     "load_spec",
     "parse_spec",
-    "read_draft",
+    "read_template",
 ]

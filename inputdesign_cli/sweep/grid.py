@@ -6,14 +6,11 @@ import json
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from pydantic_core import PydanticCustomError
-
-from inputdesign_cli.errors import Diagnostic, Location, SpecError, bad_spec
+from inputdesign_cli.errors import Location, SpecError, bad_spec
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import Sweep
-from inputdesign_cli.specification.models.findings import CARRIER
 from inputdesign_cli.specification.models.sweep import range_values
 from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.specification.yaml.scalars import resolve
@@ -90,10 +87,10 @@ def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
         parts = _split(text)
         try:
             texts = range_values(text) or parts
-        except PydanticCustomError as error:
-            finding = (error.context or {})[CARRIER][0]
+        except SpecError as error:
+            (found,) = error.diagnostics
             place = Location(f"--set {setting}", 1, len(key) + 2, setting)
-            raise SpecError(Diagnostic(finding.code, finding.message, finding.hint, location=place)) from None
+            raise SpecError(replace(found, location=place)) from None
         key = key.strip()
         if not equals or len(texts) < 2:
             fixed.append(setting)

@@ -12,7 +12,7 @@ from typing import get_args
 
 from inputdesign_cli import __version__
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.specification import Draft, read_draft
+from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
 from inputdesign_cli.sweep.point import PointJob
 from inputdesign_cli.sweep.verbs import Verb
@@ -25,7 +25,7 @@ _TRIED = 50
 class Plan:
     """The points of a sweep, in order."""
 
-    draft: Draft
+    draft: SpecTemplate
     grid: Grid
     verb: Verb
     _keys: list[str] = field(default_factory=list, repr=False)
@@ -85,7 +85,7 @@ def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb)
         hint = "sweep with --verb solve"
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
-    draft = read_draft(spec, fixed)
+    draft = read_template(spec, fixed)
     plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
     plan.check()
     return plan

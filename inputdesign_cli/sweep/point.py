@@ -20,7 +20,7 @@ from inputdesign_cli.errors import (
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.text_formats import json_text
-from inputdesign_cli.specification import Draft
+from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweep.layout import Layout, at_work
 from inputdesign_cli.sweep.verbs import Verb, run_verb
 
@@ -39,7 +39,7 @@ class PointJob:
 
     index: int
     key: str
-    draft: Draft
+    draft: SpecTemplate
     overrides: tuple[str, ...]
     verb: Verb
     figures: bool

@@ -1,6 +1,7 @@
 """The distillation column and random data that the tests of this folder share."""
 
 import numpy as np
+from inputdesign_cli.design.loop_error.transfer import sampled
 
 from inputdesign_cli.design.loop_error import (
     ClosedLoopProblem,
@@ -9,7 +10,6 @@ from inputdesign_cli.design.loop_error import (
     ModelReference,
     PowerLimit,
 )
-from inputdesign_cli.design.loop_error.transfer import sampled
 
 POLE = np.exp(-2 / 75)
 GAINS = np.array([[0.878, -0.864], [1.082, -1.096]])

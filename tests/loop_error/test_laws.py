@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from inputdesign_cli.design.loop_error.transfer import sampled
 
 from inputdesign_cli.design.loop_error import InternalModel, MatrixTransfer, MinimumVariance, ModelReference
 from inputdesign_cli.design.loop_error.laws import propagation
-from inputdesign_cli.design.loop_error.transfer import sampled
 from loop_error.column import random_complex, random_plant
 
 W = np.array([0.1, 0.7, 1.9, 3.0])

@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-
-from inputdesign_cli.signal.matrix_factor import matrix_factor
-from inputdesign_cli.signal.rational import rational_filter
 from inputdesign_cli.signal.tabulated_multisine import (
     lines_of,
     masses_of_density,
@@ -14,6 +11,9 @@ from inputdesign_cli.signal.tabulated_multisine import (
     periodogram_masses,
     roots_of,
 )
+
+from inputdesign_cli.signal.matrix_factor import matrix_factor
+from inputdesign_cli.signal.rational import rational_filter
 from loop_error.column import adjoint, column, random_hermitian
 
 TAPS = np.array([[[2.0, 0.0], [0.5, 1.0]], [[0.6, 0.3], [-0.4, 0.2]]])

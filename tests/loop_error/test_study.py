@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.signal
+from inputdesign_cli.monte_carlo.arx import ArxStudy
+from inputdesign_cli.signal.tabulated_multisine import lines_of, masses_of_density
 
 from inputdesign_cli.design.loop_error import (
     ClosedLoopProblem,
@@ -12,10 +14,8 @@ from inputdesign_cli.design.loop_error import (
     ModelReference,
     PowerLimit,
 )
-from inputdesign_cli.monte_carlo.arx import ArxStudy
 from inputdesign_cli.monte_carlo.loop_error import closed_loop_study, error_filters, prefilter
 from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
-from inputdesign_cli.signal.tabulated_multisine import lines_of, masses_of_density
 from loop_error.column import column, random_plant
 
 W = np.linspace(0.05, 3.1, 9)

@@ -7,9 +7,9 @@ from inputdesign_cli import load_spec, parse_spec, simulate
 from inputdesign_cli.compute.executor import Finished
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.monte_carlo.channel_excitations import Flat, InPhase, Multisine, Recorded
+from inputdesign_cli.monte_carlo.excitations import Flat, InPhase, Multisine, Recorded
 from inputdesign_cli.plant import PolynomialChannels
-from inputdesign_cli.signal import Lines, SignalSettings, channel_record_information
+from inputdesign_cli.signal import Lines, channel_record_information
 
 SPEC = "specs/two_by_two_arx.yaml"
 FIRST = "specs/first_order.yaml"
@@ -294,7 +294,7 @@ def test_the_information_of_an_excitation_is_that_of_its_records(kind):
     excitation = {
         "multisine": Multisine("m", Lines(w, powers, 1000), "orthogonal", 1.0),
         "in_phase": InPhase("i", w, np.array([[1.0, 2.0], [3.0, -1.0]]), 1.0),
-        "flat": Flat("f", np.array([2.0, 3.0]), SignalSettings("prbs")),
+        "flat": Flat("f", np.array([2.0, 3.0]), "prbs"),
     }[kind]
     rng = np.random.default_rng(1)
     records = excitation.draw(20, 2000, rng)

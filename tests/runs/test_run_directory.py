@@ -20,13 +20,15 @@ def a_run(mark: str, *, optimality: bool = False) -> Results:
     """A small run whose every file tells which run it is of."""
     number = float(len(mark))
     curves = {"signal": SignalCurves(np.arange(4.0), {"u1": np.array([1.0, -1.0, 1.0, -1.0]) * number})}
+    tables = {"signal": Table({"time_s": np.arange(4.0), "u1": np.full(4, number)})}
     if optimality:
         w = np.array([0.1, 1.0, 3.0])
         curves["optimality"] = OptimalityCurves(w, np.array([0.5, 1.0, 0.5]), np.array([1.0]))
+        tables["optimality"] = Table({"frequency_rad_per_s": w, "ratio": curves["optimality"].ratio})
     return Results(
         result={"format": 1, "title": mark, "objective": {"value": np.float64(number)}},
         resolved_spec=f"title: {mark}\n",
-        tables={"signal": Table({"time_s": np.arange(4.0), "u1": np.full(4, number)})},
+        tables=tables,
         curves=curves,
     )
 

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from inputdesign_cli.diagnostics import as_json, render
-from inputdesign_cli.error_codes import CODES
+from inputdesign_cli.error_codes import explanations
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import parse_spec
 
@@ -43,7 +43,7 @@ def read_or_complain(text, overrides=()):
         return
     assert error.diagnostics
     for diagnostic in error.diagnostics:
-        assert diagnostic.code in CODES, diagnostic
+        assert diagnostic.code in explanations(), diagnostic
         assert diagnostic.message
         assert diagnostic.location is not None, diagnostic
         assert diagnostic.location.line >= 1

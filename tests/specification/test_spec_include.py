@@ -5,7 +5,7 @@ import yaml
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.draft import read_draft
+from inputdesign_cli.specification.template import read_template
 
 MODEL = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 2}\n"
 REST = "accuracy: {standard_deviation: {b1: 0.1}}\nexperiment: {samples: 200}\n"
@@ -32,7 +32,7 @@ def test_blocks_stand_as_if_they_were_pasted(tmp_path):
     included = load_spec(path)
     assert included.sha256 == spec.sha256
     assert yaml.safe_load(included.to_yaml()) == yaml.safe_load(spec.to_yaml())
-    assert read_draft(path).data == yaml.safe_load(spec.to_yaml())
+    assert read_template(path).data == yaml.safe_load(spec.to_yaml())
 
 
 def test_several_files_are_joined_key_by_key(tmp_path):

@@ -10,10 +10,9 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, identify, load_spec, parse_spec, validate
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.plant import caused_by_inputs, caused_by_noise
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text
-from inputdesign_cli.tasks.build.channels import build_channel_model, channel_experiment
+from inputdesign_cli.tasks.build.system import build_experiment, build_model
 
 SPEC = "specs/two_by_two_arx.yaml"
 SHORT = ["spectrum.order=4", "accuracy.model_error.relative=0.3"]
@@ -31,7 +30,7 @@ spectrum: {type: fir, order: 4}
 
 def record(spec, samples=500, power=1.0, seed=0):
     """Columns of an experiment with white inputs on the plant of a spec."""
-    u, y = simulated(build_channel_model(spec), samples, np.random.default_rng(seed), power=power)
+    u, y = simulated(build_model(spec), samples, np.random.default_rng(seed), power=power)
     columns = {"time_s": np.arange(samples, dtype=float)}
     for letter, x in (("u", u[0]), ("y", y[0])):
         columns |= {f"{letter}{i + 1}": column for i, column in enumerate(x.T)}
@@ -51,7 +50,7 @@ def data(tmp_path):
 @pytest.mark.parametrize("given", ["arx", "jenkins"])
 def test_the_blocks_can_be_pasted(given, tmp_path):
     spec = load_spec(SPEC, ["spectrum.order=4"]) if given == "arx" else parse_spec(JENKINS)
-    model = build_channel_model(spec)
+    model = build_model(spec)
     outcome = identify(spec, write(tmp_path / "d.csv", record(spec, 1000)))
     found = outcome.result["identification"]
     for name, true in zip(model.names, model.theta, strict=True):
@@ -60,7 +59,7 @@ def test_the_blocks_can_be_pasted(given, tmp_path):
     pasted = yaml.safe_load(outcome.files["model.yaml"].decode())
     content = {**yaml.safe_load(spec.to_yaml()), **pasted}
     again = parse_spec(yaml.safe_dump(content))
-    estimated = build_channel_model(again)
+    estimated = build_model(again)
     assert estimated.names == model.names
     np.testing.assert_allclose(estimated.theta, list(found["theta"].values()))
     validate(again)
@@ -103,7 +102,7 @@ def recorded_in_s(spec, samples, hold, rng):
 def test_plants_in_s_come_back(hold, denominator, tmp_path):
     overrides = ["plant.sample=zoh"] if hold else []
     spec = parse_spec(IN_S.replace("DENOMINATOR", denominator), overrides=overrides)
-    model = build_channel_model(spec)
+    model = build_model(spec)
     columns = recorded_in_s(spec, 1500, hold, np.random.default_rng(1))
     outcome = identify(spec, write(tmp_path / "d.csv", columns))
     found = outcome.result["identification"]
@@ -113,8 +112,8 @@ def test_plants_in_s_come_back(hold, denominator, tmp_path):
     assert "notes" not in outcome.result
     pasted = yaml.safe_load(outcome.files["model.yaml"].decode())
     again = parse_spec(yaml.safe_dump({**yaml.safe_load(spec.to_yaml()), **pasted}))
-    assert build_channel_model(again).names == model.names
-    np.testing.assert_allclose(build_channel_model(again).theta, list(found["theta"].values()))
+    assert build_model(again).names == model.names
+    np.testing.assert_allclose(build_model(again).theta, list(found["theta"].values()))
 
 
 @pytest.mark.parametrize(("relative", "enough"), [(2.0, True), (0.1, False)])
@@ -136,7 +135,7 @@ def test_a_held_input_taken_for_its_interpolation_is_told(tmp_path):
 
 def recorded_in_loop(spec, samples, rng):
     """u and y of the loop of a spec, under white r; what it is made of is tested with the loop."""
-    experiment = channel_experiment(spec)
+    experiment = build_experiment(spec)
     e = rng.standard_normal((samples, 2)) @ np.linalg.cholesky(experiment.model.covariance).T
     y, u = experiment.loop.signals(10.0 * rng.standard_normal((samples, 2)), e)
     return {"time_s": np.arange(samples), "u1": u[:, 0], "u2": u[:, 1], "y1": y[:, 0], "y2": y[:, 1]}
@@ -146,7 +145,7 @@ def test_a_loop_is_identified_directly_and_topped_up(tmp_path):
     spec = load_spec("specs/two_by_two_loop.yaml", ["spectrum.order=4", "experiment.samples=1000"])
     data = write(tmp_path / "d.csv", recorded_in_loop(spec, 1000, np.random.default_rng(1)))
     outcome = identify(spec, data)
-    model, found = build_channel_model(spec), outcome.result["identification"]
+    model, found = build_model(spec), outcome.result["identification"]
     for name, true in zip(model.names, model.theta, strict=True):
         assert abs(found["theta"][name] - true) < 4.5 * found["standard_deviation"][name]
     assert found["fit_percent"][0] is None  # the plant alone is unstable there
@@ -160,19 +159,20 @@ def test_a_loop_is_identified_directly_and_topped_up(tmp_path):
 def test_the_files_hold_what_they_say(data):
     outcome = identify(load_spec(SPEC), data)
     columns = {name: np.asarray(values) for name, values in outcome.tables["fit"].columns.items()}
-    model = build_channel_model(load_spec(SPEC)).at(list(outcome.result["identification"]["theta"].values()))
+    model = build_model(load_spec(SPEC)).at(list(outcome.result["identification"]["theta"].values()))
     u = np.stack([columns["u1"], columns["u2"]], axis=1)
+    residuals = np.stack([columns["residual_1"], columns["residual_2"]], axis=1)
+    caused, noise = model.simulate(u, residuals, 1.0)
     for i in (1, 2):
         np.testing.assert_allclose(columns[f"y{i}_predicted"], columns[f"y{i}"] - columns[f"residual_{i}"])
-        expected = caused_by_inputs(model, u)[:, i - 1]
+        expected = caused[:, i - 1]
         np.testing.assert_allclose(columns[f"y{i}_simulated"], expected, atol=1e-8)
         off = np.linalg.norm(columns[f"y{i}"] - expected)
         share = 100 * (1 - off / np.linalg.norm(columns[f"y{i}"] - columns[f"y{i}"].mean()))
         assert outcome.result["identification"]["fit_percent"][i - 1] == pytest.approx(share)
     # What the estimate leaves unexplained, sent through its noise model, is the rest of the output.
-    residuals = np.stack([columns["residual_1"], columns["residual_2"]], axis=1)
-    rest = np.stack([columns["y1"], columns["y2"]], axis=1) - caused_by_inputs(model, u)
-    np.testing.assert_allclose(caused_by_noise(model, residuals), rest, atol=1e-8)
+    rest = np.stack([columns["y1"], columns["y2"]], axis=1) - caused
+    np.testing.assert_allclose(noise, rest, atol=1e-8)
     assert {f"cross_correlation_{i}{j}" for i in (1, 2) for j in (1, 2)} < set(
         outcome.tables["residuals"].columns
     )

@@ -5,6 +5,7 @@ import warnings
 import cvxpy as cp
 import numpy as np
 import pytest
+from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Absolute, LoopSensitivity, NormError, Sensitivity
@@ -17,8 +18,7 @@ from inputdesign_cli.plant import (
     Rational,
 )
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.design import by_exchange
+from inputdesign_cli.tasks.build.convex import build_convex
 
 SPEC = """
 plant:
@@ -43,7 +43,7 @@ GRID = np.linspace(1e-3, np.pi, 400)
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=list(overrides))
-    return by_exchange(spec, build_channel_task(spec))[0]
+    return by_exchange(spec, build_convex(spec))[0]
 
 
 @pytest.fixture(scope="module")
@@ -184,5 +184,5 @@ def test_the_norm_costs_more_than_the_entries_and_is_reported():
 )
 def test_what_cannot_be_asked_is_explained(override, code):
     with pytest.raises(SpecError) as caught:
-        build_channel_task(parse_spec(SPEC, overrides=[override]))
+        build_convex(parse_spec(SPEC, overrides=[override]))
     assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]

@@ -1,6 +1,6 @@
 """Z: how much a unit of variance of the plant estimate at a frequency hurts the loop.
 
-Rojas, Hjalmarsson and Hildebrand, equations (13), (17) and (19), without the factor n/(2 pi N), so that
+[rojas-asymptotic] (13), (17) and (19), without the factor n/(2 pi N), so that
 N E||y - y0||^2 = mean over frequency of tr(Z Phi^-T) for n = 1.
 """
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from inputdesign_cli.specification.checks import goal, plant, size
-from inputdesign_cli.specification.models.findings import Finding
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.places import Path, parse_key
 
-Check = Callable[[Spec], Iterator[Finding]]
+Check = Callable[[Spec], Iterator[PathDiagnostic]]
 
 # What each check reads. It is skipped where one of these could not be read: its answer would mislead.
 CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
@@ -39,7 +39,7 @@ def related(path: Path, broken: Iterable[Path]) -> bool:
     return any(path[: len(b)] == b or b[: len(path)] == path for b in broken)
 
 
-def run_checks(spec: Spec, broken: set[Path]) -> list[Finding]:
+def run_checks(spec: Spec, broken: set[Path]) -> list[PathDiagnostic]:
     """All findings of all checks whose inputs could be read."""
     return [
         finding

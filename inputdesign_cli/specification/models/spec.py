@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr
 
@@ -18,7 +18,7 @@ from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.realisation import Signal, Simulation, Solver
 from inputdesign_cli.specification.models.report import Report
 from inputdesign_cli.specification.models.section import Section
-from inputdesign_cli.specification.models.spectrum import GivenSpectrum, Spectrum
+from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.yaml.places import parse_key
 from inputdesign_cli.specification.yaml.source import Source
@@ -69,6 +69,8 @@ class Spec(Section):
     report: Report = Field(default=Report(), description="What the figures show.")
     sweep: Sweep | None = Field(default=None, description="What `idesign sweep` varies.")
 
+    phrase: ClassVar[str] = "a spec"
+
     _source: Source = PrivateAttr(default_factory=Source)
 
     @property
@@ -84,9 +86,16 @@ class Spec(Section):
         return self.experiment.controller is not None
 
     @property
+    def given(self) -> Given | None:
+        """The excitation that is given, if none is to be designed."""
+        if self.spectrum is None or self.spectrum.type != "given":
+            return None
+        return self.spectrum.given
+
+    @property
     def designs(self) -> bool:
         """Whether an excitation is to be designed (not given)."""
-        return not isinstance(self.spectrum, GivenSpectrum)
+        return self.given is None
 
     @property
     def signal_samples(self) -> int:
