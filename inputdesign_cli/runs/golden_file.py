@@ -121,11 +121,9 @@ class Golden:
 def load_golden(path: Path) -> Golden:
     """Read a golden file.
 
-    Raises
-    ------
-    SpecError
-        Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
-        `golden-path`, `golden-tolerance`, `golden-name`.
+    Raises:
+        SpecError: Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
+            `golden-path`, `golden-tolerance`, `golden-name`.
     """
     tree = read(read_text(path), str(path))
     try:

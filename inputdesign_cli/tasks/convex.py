@@ -245,7 +245,7 @@ class ConvexTask:
             )
         optimality = optimality_curves(units, design)
         if optimality is not None:
-            curves["optimality"] = optimality
+            tables["optimality"], curves["optimality"] = optimality
         shown = white if problem.needs_definite else None
         ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
         if ellipses is not None:

@@ -9,7 +9,6 @@ from inputdesign_cli.plant import ChannelLoop
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import (
     CloudCurves,
-    Entry,
     ErrorBandCurves,
     ErrorBandPanel,
     SignalCurves,
@@ -29,7 +28,7 @@ def error_bands(units: Units, predicted: PredictedError, errors: Array, name: st
     frequency = predicted.w / units.frequency
     r_u = predicted.r_u if name == "design" else None
 
-    def panel(own: Array, entry: Entry) -> ErrorBandPanel:
+    def panel(own: Array, entry: tuple[int, int] | None) -> ErrorBandPanel:
         return ErrorBandPanel(
             frequency=frequency[own],
             quantiles={q: np.quantile(errors[:, own], q, axis=0) for q in QUANTILES},
