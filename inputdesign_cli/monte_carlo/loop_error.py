@@ -21,9 +21,9 @@ from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
-from inputdesign_cli.plant import TransferMatrix, caused_by_inputs, caused_by_noise
+from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.signal.channels import Lines
+from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise
 
 # Batches stay in the cache of the processor.
@@ -102,7 +102,7 @@ def _losses(
     found = {}
     for name, root in trial.roots.items():
         u = shaped_noise(root, drive, samples)
-        theta = least_squares(plant, u, caused_by_inputs(plant, u) + noise)
+        theta = least_squares(plant, u, plant.simulate(u, np.zeros((1, 1, plant.outputs)), 1.0)[0] + noise)
         filters = error_filters(plant, target, *estimated_polynomials(plant, theta))
         radius = _largest_root(filters[1])
         loss = _simulated(*filters, entering, radius < 1)
@@ -115,7 +115,8 @@ def _noise(plant: MatrixPlant, runs: int, samples: int, rng: np.random.Generator
     """What e contributes to y, (runs, samples, p), from rest; channels come first in memory."""
     white = rng.standard_normal((plant.outputs, runs, samples))
     e = np.tensordot(np.linalg.cholesky(plant.covariance), white, axes=1)
-    return caused_by_noise(plant, np.moveaxis(e, 0, -1))
+    silent = np.zeros((1, 1, plant.inputs))
+    return plant.simulate(silent, np.moveaxis(e, 0, -1), 1.0)[1]
 
 
 def _largest_root(denominator: Array) -> Array:

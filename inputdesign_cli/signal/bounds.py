@@ -1,83 +1,109 @@
-"""Limits on single samples and on powers for a loop with one input, and what enforces them."""
+"""Limits on single samples and on powers, channel by channel, and what enforces them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.information import Experiment, PowerKind
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.signal.achieved import input_and_output
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.constraints import SignalConstraint
 from inputdesign_cli.signal.input_limits import InputLimits
 from inputdesign_cli.signal.limiter import Limiter
-from inputdesign_cli.signal.settings import SignalSettings
+from inputdesign_cli.signal.phases import LimitedResponse
+from inputdesign_cli.signal.settings import Quantiser, SignalSettings
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the record may not exceed; None where there is no limit.
+    """What a record (n, r) may not exceed, by channel: `amplitude` and `rate` (r,), `output` (p,).
 
-    `amplitude` and `rate` bound |u| and its moves, `output` bounds |y|, where u and y are what the record
-    causes from rest (in open loop u is the record). `powers` are the largest mean squares.
+    They bound |u|, its moves and |y|, where u and y are what the record causes from rest (in open loop u is
+    the record). `powers` are the largest mean squares: kind, channel (None is the sum over the channels),
+    bound. `quantisers` are the converters of the inputs, none when empty.
     """
 
-    amplitude: float | None = None
-    rate: float | None = None
-    output: float | None = None
-    powers: tuple[tuple[PowerKind, float], ...] = ()
+    amplitude: Array | None = None
+    rate: Array | None = None
+    output: Array | None = None
+    powers: tuple[tuple[PowerKind, int | None, float], ...] = ()
+    quantisers: tuple[Quantiser, ...] = ()
 
     @property
     def hard(self) -> bool:
-        """Whether single samples are limited."""
-        return any(bound is not None for bound in (self.amplitude, self.rate, self.output))
+        """Whether single samples are limited, or only some values of them can be made."""
+        limited = any(bound is not None for bound in (self.amplitude, self.rate, self.output))
+        return limited or bool(self.quantisers)
 
 
-def limiter_of(experiment: Experiment, recipe: SignalSettings, bounds: Bounds) -> Limiter:
-    """What enforces the bounds: limits on u are those of the record itself in open loop only."""
-    open_loop = experiment.loop.controller is None
+def limiter_of(plant: FiniteRecord, settings: SignalSettings, bounds: Bounds) -> Limiter:
+    """What enforces the bounds on records of the length of the `plant`'s.
+
+    Limits on u are those of the record itself in open loop only.
+    """
+    inputs, open_loop = plant.experiment.inputs, plant.experiment.loop is None
     amplitude, rate = (bounds.amplitude, bounds.rate) if open_loop else (None, None)
-    return Limiter(
-        recipe, (InputLimits(amplitude, rate, recipe.quantiser),), _watched(experiment, recipe.hold, bounds)
-    )
-
-
-def limited_gains(experiment: Experiment, bounds: Bounds, frequencies: Array) -> tuple[ComplexArray, ...]:
-    """(L,) each: the filters from the record to what is limited, over its bound, in steady state."""
-    responses = experiment.loop.responses(frequencies)
-    moves = 1.0 - np.exp(-1j * frequencies)
-    found = [
-        (bounds.amplitude, responses.u_x),
-        (bounds.rate, moves * responses.u_x),
-        (bounds.output, responses.y_x),
-    ]
-    return tuple(gain / bound for bound, gain in found if bound is not None)
-
-
-def _watched(experiment: Experiment, hold: int, bounds: Bounds) -> tuple[SignalConstraint, ...]:
-    closed = experiment.loop.controller is not None
-    found = []
-    if bounds.output is not None:
-        found.append(_watch(lambda r: input_and_output(experiment, r)[1], bounds.output, hold))
-    if bounds.amplitude is not None and (closed or found):
-        found.append(_watch(lambda r: input_and_output(experiment, r)[0], bounds.amplitude, hold))
-    if bounds.rate is not None and (closed or found):
-        found.append(
-            _watch(lambda r: np.diff(input_and_output(experiment, r)[0], prepend=0.0), bounds.rate, hold)
+    limits = tuple(
+        InputLimits(
+            None if amplitude is None else float(amplitude[a]),
+            None if rate is None else float(rate[a]),
+            bounds.quantisers[a] if bounds.quantisers else None,
         )
+        for a in range(inputs)
+    )
+    return Limiter(settings, limits, _constraints(plant, settings.hold, bounds))
+
+
+def limited_responses(
+    experiment: Experiment, bounds: Bounds, step: float, hold: int, frequencies: Array
+) -> list[LimitedResponse]:
+    """From sinusoids of the values to each signal that is limited, in steady state, and its bound.
+
+    `frequencies` (L,) are in rad per value. Of values that are held only the record itself is answered for.
+    """
+    at, moving = frequencies / (step * hold), (1.0 - np.exp(-1j * frequencies))[:, None, None]
+    found: list[LimitedResponse] = []
+    if experiment.loop is None or hold == 1:
+        u = experiment.response("input", at)
+        for response, limits in ((u, bounds.amplitude), (moving * u, bounds.rate)):
+            if limits is not None:
+                found += [(response[:, a], float(bound)) for a, bound in enumerate(limits)]
+    if bounds.output is not None and hold == 1:
+        y = experiment.response("output", at)
+        found += [(y[:, i], float(bound)) for i, bound in enumerate(bounds.output)]
+    return found
+
+
+def _constraints(plant: FiniteRecord, hold: int, bounds: Bounds) -> tuple[SignalConstraint, ...]:
+    """Limits that clipping the record cannot meet: on outputs, in closed loop on u.
+
+    Beside a limit on outputs those on u are stated as well, which meeting it might spoil.
+    """
+    if bounds.output is None and plant.experiment.loop is None:
+        return ()
+    found = [] if bounds.output is None else [_signals(plant, "output", hold, bounds.output)]
+    if bounds.amplitude is not None:
+        found.append(_signals(plant, "input", hold, bounds.amplitude))
+    if bounds.rate is not None:
+        found.append(_moves(_signals(plant, "input", hold, bounds.rate)))
     return tuple(found)
 
 
-def _watch(apply: Callable[[Array], Array], bound: float, hold: int) -> SignalConstraint:
-    """The map from the values, each held; a filter run backwards in time is its own transpose."""
+def _signals(plant: FiniteRecord, of: PowerKind, hold: int, bound: Array) -> SignalConstraint:
+    """The map from the values, each held, to what they cause."""
 
-    def forwards(values: Array) -> Array:
-        return apply(np.repeat(values, hold))
+    def adjoint(weights: Array) -> Array:
+        each = plant.adjoint(of, weights)
+        return each.reshape(-1, hold, each.shape[1]).sum(axis=1)
 
-    def backwards(weights: Array) -> Array:
-        reversed_time = apply(weights[::-1])[::-1]
-        return reversed_time.reshape(-1, hold).sum(axis=1)
+    return SignalConstraint(lambda values: plant.signals(of, np.repeat(values, hold, axis=0)), adjoint, bound)
 
-    return SignalConstraint(forwards, backwards, bound)
+
+def _moves(signals: SignalConstraint) -> SignalConstraint:
+    """From one sample of each signal to the next, the first from rest."""
+    return SignalConstraint(
+        lambda values: np.diff(signals.apply(values), axis=0, prepend=0.0),
+        lambda weights: signals.adjoint(weights - np.append(weights[1:], 0.0 * weights[:1], axis=0)),
+        signals.bound,
+    )

@@ -20,15 +20,18 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class SignalConstraint:
-    """A signal (n,) that is linear in the record, such as an output, and the largest modulus it may have.
+    """Signals (n, q) that are linear in the record, such as outputs, and the largest modulus (q,) of each.
 
-    Several signals (n, q) have a bound (q,) each. `adjoint` is the transpose of `apply`: it answers in the
-    shape of the record.
+    `adjoint` is the transpose of `apply`: it answers in the shape of the record.
     """
 
     apply: LinearMap
     adjoint: LinearMap
-    bound: float | Array
+    bound: Array
+
+    def tightened(self, factor: float) -> SignalConstraint:
+        """The same with this share of its bound."""
+        return SignalConstraint(self.apply, self.adjoint, factor * self.bound)
 
 
 def slow_moves(values: Array, rate: float) -> Array:
@@ -54,7 +57,7 @@ def largest_move(values: Array) -> float:
 
 
 def compressed(values: Array, peak: float) -> Array:
-    """A record of the same periodogram, and with its peak lowered towards `peak`.
+    """The values (n,) of the same periodogram, and with their peak lowered towards `peak`.
 
     Clip and restore: E. van der Ouderaa, J. Schoukens and J. Renneboog, IEEE Trans. Instrumentation and
     Measurement 37 (1988) 145-147. The moduli of the discrete Fourier transform are kept, its phases
@@ -77,43 +80,43 @@ def compressed(values: Array, peak: float) -> Array:
     return best
 
 
-def restrained(values: Array, watched: tuple[SignalConstraint, ...]) -> Array:
-    """The record near `values` (n,) or (n, r) whose `watched` signals all keep to their bounds.
+def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Array:
+    """The record near `values` (n, r) that keeps to all constraints.
 
     Least squares, each input in its own root mean square, with the excess penalised ever more (a
     quasi-Newton method), scaled down at the end so that the bounds hold exactly.
     """
     record = values
-    if peak_ratio(record, watched) > 1.0:
+    if peak_ratio(record, constraints) > 1.0:
         rms = np.sqrt(np.mean(values**2, axis=0))
         scale = np.where(rms > 0.0, rms, 1.0)
         for penalty in _PENALTIES:
             found = scipy.optimize.minimize(
                 _penalised,
                 (record / scale).ravel(),
-                args=(values, scale, watched, penalty),
+                args=(values, scale, constraints, penalty),
                 jac=True,
                 method="L-BFGS-B",
                 options={"maxiter": _STEPS},
             )
             record = found.x.reshape(values.shape) * scale
-    excess = peak_ratio(record, watched)
+    excess = peak_ratio(record, constraints)
     return record if excess <= 1.0 else record * (_INSIDE / excess)
 
 
-def peak_ratio(values: Array, watched: tuple[SignalConstraint, ...]) -> float:
-    """The largest modulus of any watched signal relative to its bound."""
-    return max((float((np.abs(w.apply(values)) / w.bound).max()) for w in watched), default=0.0)
+def peak_ratio(values: Array, constraints: tuple[SignalConstraint, ...]) -> float:
+    """The largest modulus of any constrained signal relative to its bound."""
+    return max((float((np.abs(c.apply(values)) / c.bound).max()) for c in constraints), default=0.0)
 
 
 def _penalised(
-    relative: Array, wanted: Array, scale: Array, watched: tuple[SignalConstraint, ...], penalty: float
+    relative: Array, wanted: Array, scale: Array, constraints: tuple[SignalConstraint, ...], penalty: float
 ) -> tuple[float, Array]:
     """Half the squared distance, relative to `scale`, with the penalties, and its slope."""
     record = relative.reshape(wanted.shape) * scale
     away = (record - wanted) / scale
     value, slope = 0.5 * float(np.sum(away**2)), away
-    for signal in watched:
+    for signal in constraints:
         ratio = signal.apply(record) / signal.bound
         excess = ratio - np.clip(ratio, -_INSIDE, _INSIDE)
         value += 0.5 * penalty * float(np.sum(excess**2))

@@ -37,28 +37,28 @@ def optimise_phases(
         powers: the p, even numbers; with 4 alone the modulus comes out as even as can be.
         steps: of the quasi-Newton method, for each p.
     """
-    watched: list[ComplexArray | None] = list(gains) or [None]
+    signals: list[ComplexArray | None] = list(gains) or [None]
     phases, best = start, np.inf
     kept = start
     for p in powers:
         found = scipy.optimize.minimize(
             _log_norm,
             phases,
-            args=(lines, watched, p),
+            args=(lines, signals, p),
             jac=True,
             method="L-BFGS-B",
             options={"maxiter": steps, "maxcor": 20},
         )
         phases = found.x
-        peak = joint_peak(lines, phases, watched)
+        peak = joint_peak(lines, phases, signals)
         if peak < best:
             kept, best = phases, peak
     return kept
 
 
-def joint_peak(lines: Sinusoids, phases: Array, watched: Sequence[ComplexArray | None] = (None,)) -> float:
-    """The largest modulus over all samples of all the signals watched."""
-    return max(float(np.abs(lines.record(phases, gains)).max()) for gains in watched)
+def joint_peak(lines: Sinusoids, phases: Array, signals: Sequence[ComplexArray | None] = (None,)) -> float:
+    """The largest modulus over all samples of all the signals."""
+    return max(float(np.abs(lines.record(phases, gains)).max()) for gains in signals)
 
 
 def crest_factor(record: Array) -> float:
@@ -67,10 +67,10 @@ def crest_factor(record: Array) -> float:
 
 
 def _log_norm(
-    phases: Array, lines: Sinusoids, watched: Sequence[ComplexArray | None], p: int
+    phases: Array, lines: Sinusoids, signals: Sequence[ComplexArray | None], p: int
 ) -> tuple[float, Array]:
     """log of the p-norm (a mean) of all the signals, and its gradient with respect to the phases."""
-    records = [lines.record(phases, gains) for gains in watched]
+    records = [lines.record(phases, gains) for gains in signals]
     peak = max(np.abs(record).max() for record in records)
     count = sum(record.size for record in records)
     # Without those that do not matter: powers that underflow are slow.
@@ -79,6 +79,6 @@ def _log_norm(
     powers = [np.abs(record) ** (p - 2) * record for record in relative]
     total = sum(float(power @ record) for power, record in zip(powers, relative, strict=True))
     slope = np.zeros(phases.size)
-    for power, gains in zip(powers, watched, strict=True):
+    for power, gains in zip(powers, signals, strict=True):
         slope += lines.slopes(phases, power / (peak * total), gains)
     return float(np.log(peak) + np.log(total / count) / p), slope

@@ -1,141 +1,142 @@
-"""One draw of a record's shape: the values of the recipe's kind of signal with the designed spectrum."""
+"""Records with a designed spectrum, of the kind that the settings ask for."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.signal.channels import Lines, is_real, merged
-from inputdesign_cli.signal.crest import optimise_phases
-from inputdesign_cli.signal.generate import filtered_noise, line_powers
-from inputdesign_cli.signal.levels import pseudo_random, register_length, three_level, two_level
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal.designed import DesignedSpectrum
+from inputdesign_cli.signal.levels import few_levels
+from inputdesign_cli.signal.lines import Lines
+from inputdesign_cli.signal.multisine import blocks_of, gaussian_record, multisine_record
+from inputdesign_cli.signal.phases import LimitedResponse, low_peak_phases, schroeder_phases
 from inputdesign_cli.signal.settings import Method, SignalSettings
-from inputdesign_cli.signal.sinusoids import Sinusoids, select
+from inputdesign_cli.signal.shift_register import register_length, shifted_sequences
+from inputdesign_cli.signal.sinusoids import select
 from inputdesign_cli.signal.spectral_factor import SpectralFactor, spectral_factor
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 # Beyond this relative error of its autocovariances a factor no longer has the designed spectrum.
 _FACTOR_RESIDUAL = 1e-8
 
+LimitedResponses = Callable[[Array], Sequence[LimitedResponse]]
+
 
 @dataclass(frozen=True)
 class SignalGenerator:
-    """Draws records of `samples` samples of the spectrum with coefficients `x` on `basis`."""
+    """Makes records of `samples` samples, each from random numbers of its own; other processes can have it.
 
-    basis: FirBasis | LinesBasis
-    x: Array
-    recipe: SignalSettings
+    Args:
+        band: where white excitation has its power, in rad per sample.
+        limited: what optimised phases keep low, at frequencies in rad per value; the inputs when None.
+    """
+
+    spectrum: DesignedSpectrum
+    settings: SignalSettings
     samples: int
-
-    @property
-    def total(self) -> float:
-        """The power of the design."""
-        return float(self.x[0]) if isinstance(self.basis, FirBasis) else float(np.sum(self.x))
+    band: tuple[float, float] = (0.0, np.pi)
+    limited: LimitedResponses | None = None
 
     @cached_property
     def factor(self) -> SpectralFactor | None:
-        """For filtered noise."""
-        if isinstance(self.basis, FirBasis) and self.recipe.method == "filtered_noise":
-            return spectral_factor(self.x)
-        return None
+        """For filtered noise of one input whose spectrum is that of a moving average."""
+        if self.settings.method != "filtered_noise" or self.spectrum.autocovariances is None:
+            return None
+        return spectral_factor(self.spectrum.autocovariances)
 
     @property
     def method(self) -> Method:
-        """What is made: a multisine where noise was asked for, but no spectral factor can be had to 1e-8."""
-        if self.recipe.method != "filtered_noise":
-            return self.recipe.method
-        usable = self.factor is not None and self.factor.residual <= _FACTOR_RESIDUAL
-        return "filtered_noise" if usable else "multisine"
+        """What is made.
+
+        A multisine where noise was asked for, but the spectrum consists of sinusoids, or no spectral factor
+        can be had to 1e-8 (a spectrum with deep zeros).
+        """
+        if self.settings.method != "filtered_noise":
+            return self.settings.method
+        unusable = self.factor is not None and self.factor.residual > _FACTOR_RESIDUAL
+        return "multisine" if unusable or self.spectrum.sinusoids is not None else "filtered_noise"
+
+    @property
+    def period(self) -> int:
+        """Values in one period of the record, all of its blocks."""
+        return self.settings.period(self.samples)
 
     @cached_property
-    def lines(self) -> Sinusoids:
-        """The sinusoids of one period that stand for the spectrum.
+    def lines(self) -> Lines:
+        """Those of one block of values: a period of the multisine, as many as there are inputs.
 
-        Those of a line spectrum keep their own frequencies when the record is one period of
-        single samples; otherwise they move to the nearest harmonics.
+        Lines of a design of sinusoids keep their own frequencies in a multisine of single samples that is
+        not repeated; otherwise they move to the nearest harmonics.
         """
-        period = self.recipe.period(self.samples)
-        free = self.recipe.block == 1 and self.recipe.lines is None and self.method == "multisine"
-        if isinstance(self.basis, LinesBasis) and free:
-            return Sinusoids(*_apart(self.basis, self.x, period), period)
-        return Sinusoids.on_grid(select(self._grid_powers(period), self.recipe.lines), period)
+        settings, blocks = self.settings, 1
+        if self.method == "multisine":
+            blocks = blocks_of(self.settings.vectors, self.spectrum.inputs)
+        elif self.method in ("binary", "ternary"):
+            blocks = self.spectrum.inputs
+        block = self.period // blocks
+        lines = self.spectrum.lines(block, settings.hold)
+        if self.method == "multisine" and settings.block == 1 and settings.lines is None:
+            return lines
+        powers = select(lines.dense(block), settings.lines)
+        if settings.hold > 1:
+            powers = powers / self._hold_gain(block)[:, None, None]
+        return Lines.of_period(powers, block)
 
-    def values(self, rng: np.random.Generator, gains: tuple[ComplexArray, ...] = ()) -> Array:
-        """(samples // hold,): one record, faded in and out, before each value is held.
-
-        Args:
-            gains: what optimised phases keep low besides the record, see `optimise_phases`.
-        """
-        recipe = self.recipe
-        length = self.samples // recipe.hold
-        if recipe.method == "given":
-            raise ValueError("a given record is not drawn")
-        if self.method == "filtered_noise" and self.factor is not None and recipe.periods == 1:
-            noise = filtered_noise(self.factor.taps, self.samples, rng)
-            return noise[:: recipe.hold] * recipe.taper(length)
-        if self.method == "filtered_noise":
-            one = self._gaussian(rng)
-        elif self.method == "white":
-            one = rng.standard_normal(recipe.period(self.samples))
-        elif self.method == "prbs":
-            period = recipe.period(self.samples)
-            one = pseudo_random(recipe.bits or register_length(period), period, rng)
-        elif self.method == "multisine":
-            one = self.lines.record(self._phases(rng, gains))
+    def values(self, rng: np.random.Generator) -> Array:
+        """(samples // hold, r): one record, faded in and out, before each value is held."""
+        settings = self.settings
+        if self.factor is not None and self.method == "filtered_noise" and settings.periods == 1:
+            whole = self.factor.filtered(self.samples, rng)[:: settings.hold, None]
         else:
-            one = (two_level if self.method == "binary" else three_level)(self.lines, rng)
-        return np.tile(one, recipe.periods) * recipe.taper(length)
+            whole = np.tile(self._period(rng), (settings.periods, 1))
+        return whole * settings.taper(len(whole))[:, None]
 
-    def _phases(self, rng: np.random.Generator, gains: tuple[ComplexArray, ...]) -> Array:
-        if self.recipe.phases == "schroeder":
-            return self.lines.schroeder_phases()
-        start = self.lines.random_phases(rng)
-        return optimise_phases(self.lines, start, gains=gains) if self.recipe.phases == "optimised" else start
+    def _period(self, rng: np.random.Generator) -> Array:
+        method, lines, length = self.method, self.lines, self.period
+        if method == "multisine":
+            return multisine_record(
+                lines, length, rng, self.settings.vectors, angles=self._phases(lines, rng)
+            )
+        if method == "binary" or method == "ternary":
+            return few_levels(lines, length, rng, method)
+        if method == "filtered_noise":
+            return gaussian_record(lines, rng)
+        if method == "white":
+            return gaussian_record(self._white(lines), rng)
+        if method == "prbs":
+            bits = self.settings.bits or register_length(length)
+            return shifted_sequences(bits, length, lines.inputs, rng) * np.sqrt(lines.mean_squares)
+        raise ValueError("a given record is not drawn")
 
-    def _gaussian(self, rng: np.random.Generator) -> Array:
-        """One period of Gaussian noise: random amplitudes at all of its lines, not only random phases."""
-        period = self.recipe.period(self.samples)
-        lines = Sinusoids.on_grid(self._grid_powers(period), period)
-        random = rng.standard_normal((2, lines.powers.size))
-        weight = np.where(lines.real, random[0] ** 2, 0.5 * np.sum(random**2, axis=0))
-        scaled = Sinusoids(lines.frequencies, lines.powers * weight, period, lines.harmonics)
-        return scaled.record(lines.random_phases(rng))
+    def _phases(self, lines: Lines, rng: np.random.Generator) -> Array | None:
+        """The common phases (L,) of the lines; None for uniform ones."""
+        if self.settings.phases == "schroeder":
+            return schroeder_phases(lines, self.period)
+        if self.settings.phases != "optimised":
+            return None
+        start = 2.0 * np.pi * rng.random(lines.frequencies.size)
+        limited = [] if self.limited is None else self.limited(lines.frequencies)
+        return low_peak_phases(lines, self.period, start, limited=limited)
 
-    def _grid_powers(self, period: int) -> Array:
-        """(period // 2 + 1,): powers of the harmonics of a period of values, the hold allowed for.
+    def _hold_gain(self, block: int) -> Array:
+        """(block // 2 + 1,): what holding each value k times does to the powers of the harmonics.
 
-        Holding each value k times multiplies the spectrum by |sum_{i<k} e^{-jwi} / k|^2, which is undone
-        here; what that leaves above pi / k is lost.
+        |sum_{i<k} e^{-jwi} / k|^2, which is undone up to pi / k; what lies above is lost.
         """
-        hold = self.recipe.hold
-        harmonics = np.arange(period // 2 + 1)
-        if isinstance(self.basis, FirBasis):
-            w = 2.0 * np.pi * harmonics / (period * hold)
-            power = line_powers(self.basis.density(self.x, w), period) / hold
-        else:
-            power = np.zeros(harmonics.size)
-            nearest = np.rint(self.basis.frequencies * hold * period / (2.0 * np.pi)).astype(int)
-            np.add.at(power, np.minimum(nearest, period // 2), self.x)
-            w = 2.0 * np.pi * harmonics / (period * hold)
-        if hold == 1:
-            return power
-        kernel = np.abs(np.exp(-1j * np.outer(w, np.arange(hold))).mean(axis=1)) ** 2
-        return power / kernel
+        w = 2.0 * np.pi * np.arange(block // 2 + 1) / (block * self.settings.hold)
+        return np.abs(np.exp(-1j * np.outer(w, np.arange(self.settings.hold))).mean(axis=1)) ** 2
 
-
-def _apart(basis: LinesBasis, x: Array, samples: int) -> tuple[Array, Array]:
-    """Frequencies and powers of the sinusoids to be made; those given by the user are left as they are.
-
-    Free lines next to 0 or pi become constant or alternating: over the record they have no phase, and with a
-    random one might vanish.
-    """
-    carrying = x > 0
-    if not basis.free:
-        return basis.frequencies[carrying], x[carrying]
-    lines = merged(Lines(basis.frequencies[carrying], x[carrying, None, None].astype(complex)), samples)
-    w = lines.frequencies
-    ends = np.where(w < 0.5 * np.pi, 0.0, np.pi)
-    return np.where(is_real(w, samples), ends, w), lines.powers[:, 0, 0].real
+    def _white(self, lines: Lines) -> Lines:
+        """Flat over the band, each input with its designed power, not correlated."""
+        harmonics = np.arange(self.period // 2 + 1)
+        w = 2.0 * np.pi * harmonics / (self.period * self.settings.hold)
+        inside = (w >= self.band[0] * (1 - 1e-9)) & (w <= self.band[1] * (1 + 1e-9))
+        ends = (harmonics == 0) | (2 * harmonics == self.period)
+        share = np.where(inside, np.where(ends, 0.5, 1.0), 0.0)
+        share = share / max(float(share.sum()), 1e-300)
+        return Lines.of_period(
+            share[:, None, None] * np.diag(lines.mean_squares).astype(complex), self.period
+        )

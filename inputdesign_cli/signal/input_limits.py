@@ -1,4 +1,4 @@
-"""The room that the values of one input have: their amplitude, their moves, the values of a converter."""
+"""What limits the values of one input: their amplitude, their moves, the values of a converter."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class InputLimits:
     @property
     def reach(self) -> float | None:
         """The largest modulus, by the bound and by the range of the converter."""
-        rooms = [self.amplitude, None if self.quantiser is None else self.quantiser.room()]
-        known = [room for room in rooms if room is not None]
-        return min(known) if known else None
+        converter = None if self.quantiser is None else self.quantiser.reach()
+        known = [reach for reach in (self.amplitude, converter) if reach is not None]
+        return min(known, default=None)
 
     def limited(self, values: Array) -> Array:
         """(m,): the values clipped, then brought to slow moves."""
@@ -43,7 +43,7 @@ class InputLimits:
 
     def converted(self, values: Array) -> Array:
         """(m,): the nearest values of the converter."""
-        return values if self.quantiser is None else self.quantiser.step * self.quantiser.codes(values)
+        return values if self.quantiser is None else self.quantiser.step * self.quantiser.steps(values)
 
     def factor(self, values: Array) -> float:
         """The largest factor on the values (m,) that the bounds leave; infinite without any."""
@@ -60,7 +60,7 @@ class InputLimits:
             return wanted
         steps = np.floor(wanted / self.quantiser.step + (0.5 if rounded else 1e-12))
         return float(
-            self.quantiser.step * min(steps, np.floor(self.quantiser.room() / self.quantiser.step + 0.5))
+            self.quantiser.step * min(steps, np.floor(self.quantiser.reach() / self.quantiser.step + 0.5))
         )
 
     @cached_property

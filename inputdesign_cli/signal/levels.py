@@ -1,61 +1,70 @@
-"""Signals of two or three levels with a wanted spectrum, and pseudo-random binary sequences.
+"""Signals of two or three levels with a wanted spectrum.
 
 A two-level signal cannot have any spectrum that one likes. These start from a multisine of the wanted line
 powers whose phases make its fourth power small, so that its modulus hardly varies and little is lost by
 taking signs. Then they alternate between the two things wanted: the nearest signal of these levels, and the
-nearest one with these line powers, its own phases kept. Discrete-interval binary signals of specified line
-powers are due to A. van den Bos and R. G. Krol, Int. J. Control 30 (1979) 871-884. What is lost against the
-designed spectrum is measured on the record's own information.
+nearest one with these line powers. Discrete-interval binary signals of specified line powers are due to
+A. van den Bos and R. G. Krol, Int. J. Control 30 (1979) 871-884. What is lost against the designed spectrum
+is measured on the record's own information.
+
+The record has one period a block, as many blocks as inputs. The transforms of the blocks at a line are the
+columns of a matrix Z (r x r); the record has the power matrix P there when Z Z^* is proportional to P. The
+matrix of that kind nearest to Z is P^(1/2) times the unitary factor of P^(1/2) Z (the orthogonal Procrustes
+problem: G. H. Golub and C. F. Van Loan, Matrix Computations, Section 6.4.1). With one input that keeps the
+phase of the line and restores its modulus.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
-import scipy.signal
 
-from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.crest import optimise_phases
-from inputdesign_cli.signal.sinusoids import Sinusoids
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.signal.lines import Lines
+from inputdesign_cli.signal.multisine import multisine_record
+from inputdesign_cli.signal.phases import low_peak_phases
 
 # The 4-norm alone makes the modulus even.
-EVEN, EVEN_STEPS = (4,), 60
+_EVEN, _EVEN_STEPS = (4,), 60
 _ROUNDS = 60
-_LONGEST_REGISTER = 32
 
 
-def two_level(lines: Sinusoids, rng: np.random.Generator) -> Array:
-    """(samples,) of +1 and -1: one period whose line powers are near those of `lines` (on the grid)."""
-    return _of_lines(lines, rng, signs)
+def few_levels(
+    lines: Lines, samples: int, rng: np.random.Generator, kind: Literal["binary", "ternary"]
+) -> Array:
+    """(samples, r): `lines.inputs` blocks of a period each, every input of two or three levels of its own.
 
-
-def three_level(lines: Sinusoids, rng: np.random.Generator) -> Array:
-    """(samples,) of +1, 0 and -1 likewise; the share of zeros is what fits best."""
-    return _of_lines(lines, rng, signs_and_zeros)
-
-
-def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:
-    """(samples,) of +1 and -1: a maximum length sequence of 2^bits - 1 values, repeated, from a random start.
-
-    Its spectrum is flat, whatever was designed.
+    The powers of the inputs are those of the lines. What remains beyond the last period continues it.
     """
-    if not 2 <= bits <= _LONGEST_REGISTER:
-        raise ValueError(f"no register of {bits} bits")
-    state = rng.integers(0, 2, bits)
-    if not state.any():
-        state[0] = 1
-    length = min(samples, 2**bits - 1)
-    sequence, _ = scipy.signal.max_len_seq(bits, state=state, length=length)
-    return np.resize(2.0 * sequence - 1.0, samples)
+    assert lines.period is not None
+    period, r = lines.period, lines.inputs
+    rms = np.sqrt(lines.mean_squares)
+    roots = np.zeros((period // 2 + 1, r, r), dtype=complex)
+    roots[np.rint(lines.frequencies * period / (2.0 * np.pi)).astype(int)] = lines.roots
+    angles = low_peak_phases(
+        lines, r * period, 2.0 * np.pi * rng.random(len(lines.powers)), powers=_EVEN, steps=_EVEN_STEPS
+    )
+    start = multisine_record(lines, r * period, rng, "orthogonal", angles=angles)
+
+    def restored(levels: Array) -> tuple[Array, float]:
+        transform = np.fft.rfft(levels.reshape(r, period, r), axis=1).transpose(1, 2, 0)
+        wanted = _restored(roots, transform, period)
+        fit = float(np.vdot(transform, wanted).real / np.vdot(transform, transform).real)
+        blocks = np.fft.irfft(wanted.transpose(2, 0, 1), period, axis=1)
+        return blocks.reshape(r * period, r), float(np.sum(np.abs(wanted - fit * transform) ** 2))
+
+    nearest = {"binary": signs, "ternary": signs_and_zeros}[kind]
+    record = _alternate(start, lambda values: _each(values, nearest, rms), restored)
+    edges = np.linspace(0, samples, r + 1).astype(int)
+    lengths = np.diff(edges)
+    return np.concatenate(
+        [record[b * period + np.arange(length) % period] for b, length in enumerate(lengths)]
+    )
 
 
-def register_length(samples: int) -> int:
-    """The shortest register whose sequence does not repeat within `samples`."""
-    return min(max(2, int(np.ceil(np.log2(samples + 1)))), _LONGEST_REGISTER)
-
-
-def alternate(
+def _alternate(
     start: Array, nearest: Callable[[Array], Array], restored: Callable[[Array], tuple[Array, float]]
 ) -> Array:
     """The best signal of few levels that is met on the way between the two things wanted.
@@ -78,21 +87,23 @@ def alternate(
     return best
 
 
-def _of_lines(lines: Sinusoids, rng: np.random.Generator, nearest: Callable[[Array], Array]) -> Array:
-    """The levels whose line powers, at their best scale, fit best."""
-    phases = optimise_phases(lines, lines.random_phases(rng), powers=EVEN, steps=EVEN_STEPS)
-    magnitude = np.zeros(lines.samples // 2 + 1)
-    magnitude[lines.harmonics] = lines.samples * lines.amplitudes * np.where(lines.real, 1.0, 0.5)
+def _restored(roots: ComplexArray, transform: ComplexArray, period: int) -> ComplexArray:
+    """(L, r, r): the matrices of the wanted powers nearest to those of the blocks (columns)."""
+    line = np.full(len(roots), np.sqrt(0.5))
+    line[0] = 1.0
+    if period % 2 == 0:
+        line[-1] = 1.0
+    # Columns of the orthogonal multisine: vectors root(P) q_b, q of modulus sqrt(r) in all.
+    size = line * period * np.sqrt(roots.shape[1])
+    return np.asarray(size[:, None, None] * (roots @ _unitary(roots @ transform)))
 
-    def restored(levels: Array) -> tuple[Array, float]:
-        transform = np.fft.rfft(levels)
-        modulus = np.abs(transform)
-        fit = float(magnitude @ modulus / (modulus @ modulus))
-        misfit = float(np.sum((magnitude - fit * modulus) ** 2))
-        direction = np.where(modulus > 0, transform, 1.0) / np.where(modulus > 0, modulus, 1.0)
-        return np.fft.irfft(magnitude * direction, lines.samples), misfit
 
-    return alternate(lines.record(phases), nearest, restored)
+def _unitary(matrices: ComplexArray) -> ComplexArray:
+    """(L, r, r): the unitary factors of their polar decompositions."""
+    if matrices.shape[-1] == 1:
+        return np.exp(1j * np.angle(matrices))
+    left, _, right = np.linalg.svd(matrices)
+    return np.asarray(left @ right)
 
 
 def signs(record: Array) -> Array:
@@ -106,3 +117,13 @@ def signs_and_zeros(record: Array) -> Array:
     order = np.sort(size)[::-1]
     kept = np.argmax(np.cumsum(order) / np.sqrt(np.arange(1, size.size + 1)))
     return np.where(size >= order[kept], np.sign(record), 0.0)
+
+
+def _each(values: Array, nearest: Callable[[Array], Array], rms: Array) -> Array:
+    """Input by input the nearest levels, of the wanted root mean square."""
+    columns = []
+    for column, size in zip(values.T, rms, strict=True):
+        levels = nearest(column) if size > 0.0 else np.zeros_like(column)
+        now = float(np.sqrt(np.mean(levels**2)))
+        columns.append(levels * (size / now) if now > 0.0 else levels)
+    return np.stack(columns, axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.fft
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.signal.channels import Lines, roots_of
+from inputdesign_cli.signal.lines import Lines
 
 
 def harmonics(samples: int) -> Array:
@@ -25,7 +25,7 @@ def periodogram(signal: Array) -> Lines:
 
 def dense_roots(lines: Lines, samples: int) -> ComplexArray:
     """(samples // 2 + 1, r, r): Hermitian roots of the powers on all harmonics, zero without a line."""
-    return roots_of(Lines(harmonics(samples), lines.dense(samples), samples), samples)
+    return Lines(harmonics(samples), lines.dense(samples), samples).roots
 
 
 def even_multisine(lines: Lines, samples: int, rng: np.random.Generator, *, periods: int) -> Array:

@@ -1,4 +1,4 @@
-"""How a spectrum is to be turned into a record: plain settings, and what they demand of its length."""
+"""How a spectrum is to be turned into a record: plain settings, and what they ask of its length."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.sinusoids import Selection
 
 Method = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "given"]
-Phases = Literal["random", "schroeder", "optimised"]
+Phases = Literal["orthogonal", "random", "schroeder", "optimised"]
+LineVectors = Literal["orthogonal", "random"]
 LEVELLED = ("binary", "ternary", "prbs")
 
 
@@ -41,12 +42,12 @@ class Quantiser:
         half = 2.0 ** (self.bits - 1)
         return float(np.clip(np.floor(self.offset / self.step + 0.5), -half, half - 1))
 
-    def room(self) -> float:
+    def reach(self) -> float:
         """The largest deviation that the converter reaches to both sides."""
         half = 2.0 ** (self.bits - 1)
         return self.step * min(half - 1 - self._centre, self._centre + half)
 
-    def codes(self, deviation: Array) -> Array:
+    def steps(self, deviation: Array) -> Array:
         """The nearest deviations that the converter has, in steps."""
         half = 2.0 ** (self.bits - 1)
         nearest = np.floor(deviation / self.step + 0.5)
@@ -55,24 +56,30 @@ class Quantiser:
 
 @dataclass(frozen=True)
 class SignalSettings:
-    """What is drawn, and how it is dressed.
+    """What is generated.
 
-    `hold`: each value stands for this many samples; `periods`: equal ones in the record; `ramp`: samples
-    over which it fades in and out; `bits`: register of a pseudo-random sequence; `level`: the peak that
-    the record is to have (or the peaks of its inputs), whatever that buys; `quantiser`: of a single input.
-    Up to `most_candidates` are drawn while the best of the first `candidates` costs more than a twentieth
-    beyond the design.
+    Args:
+        phases: of a multisine. `orthogonal`: uniform, with vectors across the inputs that make the matrix
+            spectrum exact over as many periods as inputs; so do `schroeder` and `optimised`. `random`:
+            uniform and independent in each input, exact on average only.
+        lines: harmonics of a period that are used.
+        periods: equal ones in the record.
+        hold: each value stands for this many samples.
+        ramp: samples over which the record fades in and out.
+        bits: register of a pseudo-random sequence.
+        level: (r,) the peaks that the inputs are to have, whatever that buys.
+        candidates, most_candidates: up to the second number are tried while the best of the first costs more
+            than a twentieth beyond the design.
     """
 
     method: Method = "filtered_noise"
-    phases: Phases = "random"
+    phases: Phases = "orthogonal"
     lines: Selection = None
     periods: int = 1
     hold: int = 1
     ramp: int = 0
     bits: int | None = None
-    level: float | Array | None = None
-    quantiser: Quantiser | None = None
+    level: Array | None = None
     candidates: int = 20
     most_candidates: int = 80
     seed: int = 0
@@ -81,6 +88,11 @@ class SignalSettings:
     def block(self) -> int:
         """The length of a record is a multiple of this."""
         return self.periods * self.hold
+
+    @property
+    def vectors(self) -> LineVectors:
+        """Of the lines of a multisine over the inputs, see `multisine_record`."""
+        return "random" if self.phases == "random" else "orthogonal"
 
     def period(self, samples: int) -> int:
         """Values a period."""

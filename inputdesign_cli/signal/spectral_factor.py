@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.signal
 
 from inputdesign_cli.plant.polynomial import Array
 
@@ -23,6 +24,11 @@ class SpectralFactor:
 
     taps: Array
     residual: float
+
+    def filtered(self, samples: int, rng: np.random.Generator) -> Array:
+        """(samples,): stationary Gaussian noise, white noise of variance one through the taps."""
+        noise = rng.standard_normal(samples + self.taps.size - 1)
+        return scipy.signal.lfilter(self.taps, [1.0], noise)[self.taps.size - 1 :]
 
 
 def spectral_factor(autocovariances: Array) -> SpectralFactor:

@@ -1,114 +1,157 @@
-"""Design -> the record to be applied, and what the result says of it."""
+"""Design -> the record to be applied."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, Requirement
+from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
+    Bounds,
+    DesignedSpectrum,
     Record,
+    SignalGenerator,
+    SignalSettings,
     Target,
-    input_and_output,
-    largest_move,
-    realise,
-    record_information,
+    best_record,
+    limited_responses,
 )
-from inputdesign_cli.specification import Spec
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
-from inputdesign_cli.tasks.build.signal_settings import build_bounds, build_signal_settings, operating_points
-from inputdesign_cli.tasks.build.task import Task
-from inputdesign_cli.tasks.result.result import powers
-from inputdesign_cli.tasks.result.signal_files import wav_scale
+from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.shortest_record import shortest_record
 
-_LAGS = 50
+
+@dataclass(frozen=True)
+class Delivery:
+    """How a record is handed over.
+
+    Args:
+        operating_points: (r,) what is added to the record of each input; None when nothing was asked.
+        also: files beside signal.csv: "mat", "wav".
+        full_scale: what full scale stands for in a WAV file; the largest value when None.
+        sampling_rate: samples a second.
+    """
+
+    operating_points: Array | None = None
+    also: tuple[str, ...] = ()
+    full_scale: float | None = None
+    sampling_rate: float = 1.0
 
 
-def make_record(spec: Spec, task: Task, design: Design, experiment: Experiment) -> Record | None:
-    """The best of several records of the designed spectrum; None when no excitation is needed.
+@dataclass(frozen=True)
+class RecordRequest:
+    """What a spec asks of its record.
 
-    Best is the least power that meets the requirements by the record itself, or the best criterion.
+    Args:
+        bounds: on single samples; those on powers are the design's.
+        cost: weights of the powers, see `Target`.
+        band: of the excitation, in rad per sample.
+        step: time between samples in the unit of the experiment's frequencies.
+        samples: length; that of the experiment when None.
+        meets: whether the record itself is to meet the accuracy; else it has the power of the design.
+        most_samples: the longest experiment, where one is looked for.
+        limit_keys: of the spec, for what limits single samples.
+    """
+
+    settings: SignalSettings
+    bounds: Bounds
+    cost: Mapping[PowerKind, Weight]
+    band: tuple[float, float] = (0.0, np.pi)
+    step: float = 1.0
+    samples: int | None = None
+    meets: bool = True
+    most_samples: int | None = None
+    limit_keys: tuple[str, ...] = ()
+    delivery: Delivery = Delivery()
+
+    def length(self, experiment: int) -> int:
+        """Samples of the record of an experiment of so many: whole periods of held values."""
+        block = self.settings.block
+        return -(-(self.samples or experiment) // block) * block
+
+
+def make_record(request: RecordRequest, design: Design, experiment: Experiment) -> Record | None:
+    """The best of several records of the designed spectrum.
+
+    Best is the least power that meets the requirements by the record itself, or the best criterion. None when
+    no excitation is needed, or when the record would be too short (criteria per sample without
+    `signal.samples`).
 
     Raises:
-        InfeasibleError: no record of this length within the limits on single samples meets them.
+        InfeasibleError: no record of this length within the limits on single samples meets the accuracy.
     """
-    if not np.any(design.result.x):
+    problem, settings = design.problem, request.settings
+    samples = request.length(experiment.samples)
+    if not design.result.x.any() or settings.period(samples) < least_period(experiment.inputs):
         return None
-    problem = design.problem
-    basis = design.result.basis
-    assert isinstance(basis, FirBasis | LinesBasis)
-    if isinstance(basis, FirBasis):
-        basis = FirBasis(design.result.x.size - 1)
-    length = experiment.samples if problem.goal == "samples" else spec.signal_samples
-    recipe = build_signal_settings(spec)
-    samples = -(-(spec.signal.samples or length) // recipe.block) * recipe.block
-    cost = {kind: float(np.sum(weight)) for kind, weight in problem.cost.items()} or {"excitation": 1.0}
-    spent = powers(problem, design.result.basis, design.result.x)
-    demand = Target(
-        worst_ratio(problem.requirements),
-        meets=problem.goal != "factor" and spec.signal.scale != "design",
-        cost=cost,
-        designed=sum(weight * sum(spent[kind]) for kind, weight in cost.items()),
+    upper = tuple((limit.kind, limit.channel, limit.bound) for limit in problem.limits if limit.upper)
+    bounds = replace(request.bounds, powers=upper)
+    target = Target(
+        _score(problem.requirements),
+        meets=problem.goal != "factor" and request.meets,
+        cost=request.cost,
+        designed=_cost(problem, design.result.basis, design.result.x, request.cost),
     )
-    bounds = build_bounds(spec, list(task.question.limits))
+    spectrum = designed_spectrum(request, design, experiment.inputs)
 
     def made(samples: int, candidates: int | None = None) -> Record:
-        tried = (
-            recipe
-            if candidates is None
-            else replace(recipe, candidates=candidates, most_candidates=candidates)
-        )
-        return realise(experiment, basis, design.result.x, demand, tried, samples=samples, bounds=bounds)
+        tried = settings
+        if candidates is not None:
+            tried = replace(settings, candidates=candidates, most_candidates=candidates)
+        limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
+        generator = SignalGenerator(spectrum, tried, samples, request.band, limited)
+        return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
 
     record = made(samples)
-    if record.met or recipe.level is not None or not (bounds.hard or recipe.quantiser):
+    if record.met or settings.level is not None or not bounds.hard:
         return record
-    return shortest_record(spec, design, record, recipe.block, made)
+    longest = request.most_samples if problem.goal == "samples" and request.samples is None else 0
+    return shortest_record(record, settings.block, made, longest, request.limit_keys)
 
 
-def record_notes(spec: Spec, length: int, record: Record) -> list[str]:
-    """What a user should know before applying the record; `length` is that of the experiment."""
-    notes = []
-    if not record.met:
-        notes.append(
-            f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.4g}; the limits on the "
-            "powers, or the level asked for, leave no room to raise it: a little more power or a few more "
-            "samples would do"
-        )
-    asked = spec.signal.samples or length
-    if record.method != "given" and len(record.samples) > asked + build_signal_settings(spec).block:
-        notes.append(
-            f"within the limits on single samples the accuracy takes {len(record.samples)} samples; the "
-            f"spectrum alone would take {asked}"
-        )
-    return notes
+def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGenerator:
+    """What generates other records of the designed spectrum, as long, phases of sinusoids uniformly."""
+    settings = request.settings
+    if settings.phases != "random":
+        settings = replace(settings, phases="orthogonal")
+    samples, inputs = record.samples.shape
+    return SignalGenerator(designed_spectrum(request, design, inputs), settings, samples, request.band)
 
 
 def given_record(
-    spec: Spec,
+    request: RecordRequest,
     experiment: Experiment,
-    basis: FirBasis | LinesBasis,
-    x: Array,
+    spectrum: DesignedSpectrum,
     ratio: Callable[[Array], float],
-) -> Record:
-    """One record of a spectrum that was given, of its power as far as the limits on samples allow."""
-    recipe = replace(build_signal_settings(spec), candidates=1, most_candidates=1)
-    return realise(
-        experiment,
-        basis,
-        x,
-        Target(ratio),
-        recipe,
-        samples=spec.signal_samples,
-        bounds=build_bounds(spec, []),
-    )
+) -> Record | None:
+    """One record of a spectrum that was given, of its power as far as the limits on samples allow.
+
+    None when it would be too short.
+    """
+    settings = replace(request.settings, candidates=1, most_candidates=1)
+    samples = request.length(experiment.samples)
+    if settings.period(samples) < least_period(experiment.inputs):
+        return None
+    limited = partial(limited_responses, experiment, request.bounds, request.step, settings.hold)
+    generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
+    plant = FiniteRecord(experiment, samples, request.step)
+    return best_record(generator, plant, Target(ratio), request.bounds)
+
+
+def designed_spectrum(request: RecordRequest, design: Design, inputs: int) -> DesignedSpectrum:
+    """The spectrum of a design, for values as far apart as asked."""
+    return DesignedSpectrum.of(design.result.basis, design.result.x, inputs=inputs, step=request.step)
+
+
+def least_period(inputs: int) -> int:
+    """Values that a period must have: two, and with several inputs eight in the block of each."""
+    return 2 if inputs == 1 else 8 * inputs
 
 
 def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
@@ -120,70 +163,32 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
     return ratio
 
 
-def signal_entry(
-    spec: Spec,
-    experiment: Experiment,
-    record: Record,
-    requirements: Sequence[Requirement] = (),
-    basis: tuple[FirBasis | LinesBasis, Array] | None = None,
-) -> dict[str, Any]:
-    """What `result.json` says of a record.
-
-    For a criterion it gives the criterion that the record reaches, per as many samples as the experiment
-    has; for other requirements their worst ratio. `basis` and coefficients are those of the design.
-    """
-    samples = record.samples
-    u, y = input_and_output(experiment, samples)
-    peak = float(np.abs(samples).max())
-    rms = float(np.sqrt(np.mean(samples**2)))
-    entry: dict[str, Any] = {
-        "type": record.method,
-        "samples": samples.size,
-        "power": [rms**2],
-        "peak": [peak],
-        "crest_factor": [peak / rms],
-        "input_power": [float(np.mean(u**2))],
-        "output_power": [float(np.mean(y**2))],
-        "input_peak": [float(np.abs(u).max())],
-        "input_move": [largest_move(u)],
-        "output_peak": [float(np.abs(y).max())],
-    }
-    if record.method == "multisine":
-        entry["phases"] = build_signal_settings(spec).phases
-    first = requirements[0] if requirements else None
-    if isinstance(first, Criterion):
-        per_sample = experiment.samples / samples.size
-        entry["criterion"] = first.value(per_sample * first.level(record_information(experiment, samples)))
-    elif requirements and np.isfinite(record.worst_ratio):
-        entry["worst_ratio"] = record.worst_ratio
-    if record.method != "given":
-        entry["extra_power"] = record.extra_power
-    if basis is not None:
-        entry["spectrum_error"] = spectrum_error(*basis, samples)
-    entry |= applied_entry(spec, samples, given=record.method == "given")
-    if record.factor_residual is not None:
-        entry["spectral_factor_residual"] = record.factor_residual
-    return entry
+def record_notes(request: RecordRequest, experiment: int, record: Record) -> list[str]:
+    """What a user should know before applying the record; the experiment has so many samples."""
+    notes = []
+    if not record.met:
+        notes.append(
+            f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.4g}; the limits on the "
+            "powers, or the level asked for, leave no room to raise it: a little more power or a few more "
+            "samples would do"
+        )
+    asked = request.samples or experiment
+    if record.method != "given" and len(record.samples) > asked + request.settings.block:
+        notes.append(
+            f"within the limits on single samples the accuracy takes {len(record.samples)} samples; the "
+            f"spectrum alone would take {asked}"
+        )
+    return notes
 
 
-def applied_entry(spec: Spec, samples: Array, *, given: bool = False) -> dict[str, Any]:
-    """What must be known to read the files of the record as its deviations."""
-    entry: dict[str, Any] = {}
-    if spec.signal.offset is not None and not given:
-        entry["operating_point"] = operating_points(spec).tolist()
-    if "wav" in (spec.signal.also or ()):
-        entry["wav_full_scale"] = wav_scale(spec, samples, given=given)
-    return entry
+def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
+    """What ranks records: a criterion by itself, to be large, other requirements by their worst ratio."""
+    criterion = requirements[0].criterion if requirements else None
+    if criterion is None:
+        return worst_ratio(requirements)
+    return lambda information: -criterion.level(information)
 
 
-def spectrum_error(basis: FirBasis | LinesBasis, x: Array, samples: Array) -> float:
-    """The largest error of the record's autocorrelations, lags 1 to 50, against those of the design."""
-    lags = np.arange(min(_LAGS, samples.size // 4) + 1)
-    if isinstance(basis, FirBasis):
-        wanted = np.zeros(lags.size)
-        kept = min(lags.size, x.size)
-        wanted[:kept] = x[:kept]
-    else:
-        wanted = np.cos(np.outer(lags, basis.frequencies)) @ x
-    found = np.array([np.mean(samples[: samples.size - lag] * samples[lag:]) for lag in lags])
-    return float(np.abs(found / found[0] - wanted / wanted[0]).max())
+def _cost(problem: Problem, basis: Basis, x: Array, weights: Mapping[PowerKind, Weight]) -> float:
+    at = problem.on(basis)
+    return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))

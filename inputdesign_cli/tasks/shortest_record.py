@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
-from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.signal import Record
-from inputdesign_cli.specification import Spec
 
 _LONGEST = 64  # times the length that was asked for
 _CANDIDATES = 1
@@ -17,26 +16,35 @@ _GROWTH = 1.1
 _FINE = 0.01
 
 
+class MakeRecord(Protocol):
+    """Makes the best record of a length, of so many candidates."""
+
+    def __call__(self, samples: int, candidates: int | None = None) -> Record: ...
+
+
 def shortest_record(
-    spec: Spec, design: Design, missed: Record, block: int, made: Callable[..., Record]
+    missed: Record, block: int, made: MakeRecord, most_samples: int | None, limit_keys: Sequence[str]
 ) -> Record:
-    """For `shortest_experiment` the longer record; otherwise the error that says how long it would be.
+    """The longer record that does what `missed` does not, or the error that says how long it would be.
 
     The longer record has the shape of the designed spectrum at the lower power that it then needs.
+
+    Args:
+        block: its length is a multiple of this.
+        most_samples: the longest that may be delivered; None for any, 0 when no other length is wanted.
+        limit_keys: of the spec, for what limits single samples.
 
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
     found = _search(missed, block, made)
-    seeking = design.problem.goal == "samples" and spec.signal.samples is None
-    most = spec.limits.samples
-    if seeking and found is not None and (most is None or len(found.samples) <= most):
+    if found is not None and (most_samples is None or len(found.samples) <= most_samples):
         return found
-    raise _complaint(spec, design, missed, found)
+    raise _too_tight(missed, found, most_samples, limit_keys)
 
 
-def _search(missed: Record, block: int, made: Callable[..., Record]) -> Record | None:
-    """The shortest record that meets the demand, to one per cent, by trying; None when none does.
+def _search(missed: Record, block: int, made: MakeRecord) -> Record | None:
+    """The shortest record that meets the target, to one per cent, by trying; None when none does.
 
     A record at its limits gathers information in proportion to its length: that is where the search begins.
     """
@@ -74,25 +82,18 @@ def _expected(missed: Record) -> float:
     return len(missed.samples) * (missed.worst_ratio**2 if np.isfinite(missed.worst_ratio) else 1.0)
 
 
-def _power(record: Record) -> float:
-    """Of all inputs."""
-    return float(np.sum(np.mean(record.samples**2, axis=0)))
-
-
 def _rounded(length: float, block: int) -> int:
     return int(np.ceil(length / block)) * block
 
 
-def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None) -> InfeasibleError:
-    limits = spec.limits
-    keys = [f"limits.{name}" for name in ("amplitude", "rate") if getattr(limits, name) is not None]
-    if spec.signal.quantisation is not None:
-        keys.append("signal.quantisation")
-    names = " and ".join(keys)
+def _too_tight(
+    missed: Record, found: Record | None, most_samples: int | None, limit_keys: Sequence[str]
+) -> InfeasibleError:
+    names = " and ".join(limit_keys)
     size = len(missed.samples)
     message = (
         f"no record of {size} samples within {names} meets the accuracy: the best found reaches "
-        f"r_u / r_adm = {missed.worst_ratio:.4g} with power {_power(missed):.4g}"
+        f"r_u / r_adm = {missed.worst_ratio:.4g} with power {missed.power:.4g}"
         if np.isfinite(missed.worst_ratio)
         else f"no record of {size} samples within {names} excites every parameter"
     )
@@ -104,9 +105,9 @@ def _complaint(spec: Spec, design: Design, missed: Record, found: Record | None)
         )
     else:
         hint = (
-            f"{len(found.samples)} samples can (power {_power(found):.4g}): set "
+            f"{len(found.samples)} samples can (power {found.power:.4g}): set "
             f"experiment.samples and signal.samples, raise the limits, or loosen the accuracy"
         )
-        if limits.samples is not None and len(found.samples) > limits.samples:
-            hint += f"; limits.samples is {limits.samples}"
-    return InfeasibleError(Diagnostic("limits-too-tight", message, hint, keys[0], spec.locate(keys[0])))
+        if most_samples:
+            hint += f"; limits.samples is {most_samples}"
+    return InfeasibleError(Diagnostic("limits-too-tight", message, hint, limit_keys[0]))

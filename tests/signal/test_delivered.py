@@ -1,20 +1,20 @@
 """The delivered records of random designs: they meet the accuracy by themselves, at little extra power."""
 
-import numpy as np
 import pytest
+from inputdesign_cli.signal.single import as_channels
 from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.design.convex.designs import Question, solve_design
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.signal import SignalSettings, Target, input_and_output, realise, record_information
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
 from inputdesign_cli.spectrum import FirBasis
 from inputdesign_cli.tasks.record import worst_ratio
 
 EXTRA = {500: 0.10, 5000: 0.03}
 
 
-def delivered(seed, samples, **recipe):
+def delivered(seed, samples, **settings):
     """The design of a random case for so many samples, its record, and what that attains, all recomputed."""
     case = random_case(seed)
 
@@ -27,19 +27,17 @@ def delivered(seed, samples, **recipe):
     design = solve_design(question, tolerance=1e-6)
     problem, x = design.problem, design.result.x
     designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
-    demand = Target(worst_ratio(problem.requirements), True, case.cost, designed)
-    record = realise(
-        problem.experiment, FirBasis(x.size - 1), x, demand, SignalSettings(**recipe), samples=samples
-    )
-    u, y = input_and_output(problem.experiment, record.samples)
-    means = {"input": np.mean(u**2), "output": np.mean(y**2), "excitation": np.mean(record.samples**2)}
-    cost = sum(weight * means[kind] for kind, weight in case.cost.items())
-    ratio = demand.worst_ratio(record_information(problem.experiment, record.samples))
+    target = Target(worst_ratio(problem.requirements), True, case.cost, designed)
+    plant = FiniteRecord(as_channels(problem.experiment), samples)
+    spectrum = DesignedSpectrum.of(FirBasis(x.size - 1), x)
+    record = best_record(SignalGenerator(spectrum, SignalSettings(**settings), samples), plant, target)
+    cost = sum(weight * plant.mean_squares(kind, record.samples)[0] for kind, weight in case.cost.items())
+    ratio = target.worst_ratio(plant.information(record.samples))
     return record, ratio, cost / designed - 1
 
 
-def check(seed, samples, **recipe):
-    record, ratio, extra = delivered(seed, samples, **recipe)
+def check(seed, samples, **settings):
+    record, ratio, extra = delivered(seed, samples, **settings)
     assert record.met
     assert ratio <= 1 + 1e-9
     assert extra == pytest.approx(record.extra_power, abs=1e-9)

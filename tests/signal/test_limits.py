@@ -2,16 +2,19 @@
 
 import numpy as np
 import pytest
+from channel_plants import arx
+from inputdesign_cli.signal.single import as_channels
 
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import (
     Bounds,
+    DesignedSpectrum,
     Quantiser,
+    SignalGenerator,
     SignalSettings,
     Target,
-    input_and_output,
+    best_record,
     largest_move,
-    realise,
-    record_information,
 )
 from inputdesign_cli.signal.constraints import compressed, slow_moves
 from inputdesign_cli.signal.level_search import first_level, last_level, least_level, level_of_power
@@ -91,96 +94,129 @@ def test_a_level_of_some_power():
     assert level_of_power(lambda a: min(a, 1.5) ** 2, 4.0, 1.0) >= 1.4
 
 
-def demand():
-    """A condition on the information in white coordinates: its least eigenvalue is at least one half."""
-    return Target(lambda M: float(np.sqrt(0.5 / np.linalg.eigvalsh(M)[0])), meets=True)
+TARGET = Target(lambda M: float(np.sqrt(0.45 / np.linalg.eigvalsh(M)[0])), meets=True)
+"""A condition on the information in white coordinates: its least eigenvalue is at least 0.45."""
 
 
-RECIPES = {
-    "noise": SignalSettings(candidates=3),
-    "random": SignalSettings(method="multisine", candidates=3),
-    "optimised": SignalSettings(method="multisine", phases="optimised", candidates=2),
-    "binary": SignalSettings(method="binary", candidates=3),
-    "ternary": SignalSettings(method="ternary", candidates=3),
-    "prbs": SignalSettings(method="prbs", candidates=3),
-    "white": SignalSettings(method="white", candidates=3),
-    "held": SignalSettings(hold=4, candidates=3),
-    "periods": SignalSettings(periods=2, candidates=3),
-    "ramp": SignalSettings(ramp=20, candidates=3),
-    "converter": SignalSettings(candidates=3, quantiser=Quantiser(8, 4.0)),
-    "binary converter": SignalSettings(method="binary", candidates=3, quantiser=Quantiser(8, 4.0)),
-    "held converter": SignalSettings(candidates=3, hold=2, quantiser=Quantiser(7, 4.0)),
+def two_inputs(w):
+    """A moving average of two taps at each of two inputs, correlated with a phase that turns."""
+    phi = np.zeros((w.size, 2, 2), dtype=complex)
+    for tap, phase in ((1.0, 0), (0.5, 1)):
+        h = tap * np.exp(-1j * np.outer(w, [phase, 2 * phase])) @ np.array([[1.0, 0.2], [0.4, 3.0]])
+        phi += h[:, :, None] * h[:, None, :].conj()
+    return phi + 0.2 * np.eye(2)
+
+
+SPECTRA = {1: DesignedSpectrum.of(FirBasis(2), COLOURED), 2: DesignedSpectrum(2, 13.1, density=two_inputs)}
+SETTINGS = {
+    "noise": {},
+    "random": {"method": "multisine", "phases": "random"},
+    "multisine": {"method": "multisine"},
+    "optimised": {"method": "multisine", "phases": "optimised"},
+    "binary": {"method": "binary"},
+    "ternary": {"method": "ternary"},
+    "prbs": {"method": "prbs"},
+    "white": {"method": "white"},
+    "held": {"hold": 4},
+    "periods": {"periods": 2},
+    "ramp": {"ramp": 20},
 }
-BOUNDS = {
-    "amplitude": Bounds(amplitude=1.3),
-    "rate": Bounds(rate=0.9),
-    "both": Bounds(amplitude=1.4, rate=1.2),
-    "output": Bounds(output=14.0),
-    "all": Bounds(amplitude=1.4, rate=1.2, output=14.0),
+CONVERTERS = {"noise": 8, "binary": 8, "held": 7}
+
+
+def bounds_of(inputs, **figures):
+    """Figures of one input as they are; of two, both for units of their own."""
+    units = {"amplitude": [1.25, 3.1], "rate": [1.4, 3.5], "output": [0.6, 0.45]}
+    scale = {key: np.ones(1) if inputs == 1 else np.array(units[key]) for key in figures}
+    return Bounds(**{key: figure * scale[key] for key, figure in figures.items()})
+
+
+LIMITS = {
+    "amplitude": {"amplitude": 1.3},
+    "rate": {"rate": 0.9},
+    "both": {"amplitude": 1.4, "rate": 1.2},
+    "output": {"output": 14.0},
+    "all": {"amplitude": 1.4, "rate": 1.2, "output": 14.0},
 }
 
 
-@pytest.mark.parametrize("limited", BOUNDS)
-@pytest.mark.parametrize("kind", RECIPES)
-def test_limits_hold_exactly(first_order, kind, limited):
-    check(first_order.whitened(1.0), RECIPES[kind], BOUNDS[limited])
+def made(experiment, settings, bounds, candidates=2):
+    """The plant and its best record, of as many samples as the experiment."""
+    settings = SignalSettings(**settings, candidates=candidates, most_candidates=candidates)
+    generator = SignalGenerator(SPECTRA[experiment.inputs], settings, experiment.samples)
+    plant = FiniteRecord(experiment, experiment.samples)
+    return plant, best_record(generator, plant, TARGET, bounds)
 
 
-@pytest.mark.parametrize("limited", ["amplitude", "rate", "output"])
-@pytest.mark.parametrize("kind", ["noise", "optimised", "binary"])
-def test_limits_in_closed_loop_are_those_of_what_r_causes(flexible, kind, limited):
-    bounds = {"amplitude": Bounds(amplitude=2.0), "rate": Bounds(rate=2.5), "output": Bounds(output=2.5)}
-    check(flexible.whitened(1.0), RECIPES[kind], bounds[limited])
-
-
-def check(experiment, recipe, bounds):
-    record = realise(
-        experiment, FirBasis(2), COLOURED, demand(), recipe, samples=experiment.samples, bounds=bounds
-    )
-    u, y = input_and_output(experiment, record.samples)
+def check(experiment, settings, bounds):
+    plant, record = made(experiment, settings, bounds)
+    assert record.samples.shape == (experiment.samples, experiment.inputs)
+    u, y = (plant.signals(kind, record.samples) for kind in ("input", "output"))
     if bounds.amplitude is not None:
-        assert np.abs(u).max() <= bounds.amplitude
+        assert np.all(np.abs(u).max(axis=0) <= bounds.amplitude)
     if bounds.rate is not None:
-        assert largest_move(u) <= bounds.rate * (1 + 1e-15)
+        moves = np.array([largest_move(column) for column in u.T])
+        assert np.all(moves <= bounds.rate * (1 + 1e-15))
     if bounds.output is not None:
-        assert np.abs(y).max() <= bounds.output
-    if recipe.quantiser is not None:
-        codes = record.samples / recipe.quantiser.step
-        np.testing.assert_allclose(codes, np.rint(codes), atol=1e-9)
-        assert np.abs(record.samples).max() <= recipe.quantiser.room() + 1e-12
-    blocks = record.samples.reshape(-1, recipe.hold)
+        assert np.all(np.abs(y).max(axis=0) <= bounds.output)
+    for quantiser, column in zip(bounds.quantisers, record.samples.T, strict=bool(bounds.quantisers)):
+        steps = column / quantiser.step
+        np.testing.assert_allclose(steps, np.rint(steps), atol=1e-9)
+        assert np.abs(column).max() <= quantiser.reach() + 1e-12
+    blocks = record.samples.reshape(-1, settings.get("hold", 1), experiment.inputs)
     assert np.all(blocks == blocks[:, :1])
-    attained = demand().worst_ratio(record_information(experiment, record.samples))
+    attained = TARGET.worst_ratio(plant.information(record.samples))
     assert record.worst_ratio == pytest.approx(attained, rel=1e-12)
     assert record.met == (attained <= 1 + 1e-9)
 
 
+@pytest.fixture(params=[1, 2], ids=["one input", "two inputs"])
+def experiment(request, first_order):
+    """The first-order system, or an ARX system of two inputs and outputs, in white coordinates."""
+    if request.param == 1:
+        return as_channels(first_order).whitened(1.0)
+    return Experiment(arx(), 240).whitened(1.0)
+
+
+@pytest.mark.parametrize("limited", LIMITS)
+@pytest.mark.parametrize("kind", SETTINGS)
+def test_limits_hold_exactly(experiment, kind, limited):
+    check(experiment, SETTINGS[kind], bounds_of(experiment.inputs, **LIMITS[limited]))
+
+
+@pytest.mark.parametrize("limited", ["amplitude", "both", "output"])
+@pytest.mark.parametrize("kind", CONVERTERS)
+def test_converters_hold_the_limits_too(experiment, kind, limited):
+    bounds = bounds_of(experiment.inputs, **LIMITS[limited])
+    quantisers = (Quantiser(CONVERTERS[kind], 4.0), Quantiser(CONVERTERS[kind], 10.0))[: experiment.inputs]
+    check(
+        experiment,
+        SETTINGS[kind],
+        Bounds(bounds.amplitude, bounds.rate, bounds.output, quantisers=quantisers),
+    )
+
+
+@pytest.mark.parametrize("limits", [{"amplitude": 2.0}, {"rate": 2.5}, {"output": 2.5}])
+@pytest.mark.parametrize("kind", ["noise", "optimised", "binary"])
+def test_limits_in_closed_loop_are_those_of_what_r_causes(flexible, kind, limits):
+    check(as_channels(flexible).whitened(1.0), SETTINGS[kind], bounds_of(1, **limits))
+
+
 def test_a_looser_limit_never_costs_more(first_order):
     """The cheapest record within the limit, from 1.0 (clipped hard) to none."""
-    experiment = first_order.whitened(1.0)
     costs = []
-    for amplitude in (1.0, 1.3, 2.0, None):
-        record = realise(
-            experiment,
-            FirBasis(2),
-            COLOURED,
-            demand(),
-            SignalSettings(candidates=5),
-            samples=500,
-            bounds=Bounds(amplitude=amplitude),
-        )
+    for amplitude in (1.0, 1.3, 2.0, np.inf):
+        _, record = made(as_channels(first_order).whitened(1.0), {}, Bounds(np.array([amplitude])), 5)
         assert record.met
-        costs.append(np.mean(record.samples**2))
+        costs.append(record.power)
     assert costs[0] * 1.02 > costs[-1]
     assert max(costs) < 1.5 * min(costs)
 
 
-def test_powers_are_kept_below_their_limits(first_order):
+def test_powers_of_each_channel_are_kept_below_their_limits(experiment):
     """With less power than the accuracy needs the record takes what there is and says so."""
-    experiment = first_order.whitened(1.0)
-    short = Bounds(powers=(("input", 0.1),))
-    record = realise(
-        experiment, FirBasis(2), COLOURED, demand(), SignalSettings(candidates=3), samples=500, bounds=short
-    )
+    last = experiment.inputs - 1
+    bounds = Bounds(powers=(("input", last, 0.02), ("output", None, 50.0)))
+    _, record = made(experiment, {"method": "multisine"}, bounds)
     assert not record.met
-    assert np.mean(record.samples**2) == pytest.approx(0.1)
+    assert np.mean(record.samples[:, last] ** 2) == pytest.approx(0.02)

@@ -19,7 +19,7 @@ from inputdesign_cli.design.loop_error import (
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.least_squares import is_arx
-from inputdesign_cli.plant import PolynomialChannels, Rational, TransferMatrix, hold_entries, zero_order_hold
+from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix, hold_entries, zero_order_hold
 from inputdesign_cli.specification import (
     ClosedLoopError,
     ContinuousMatrixTransfer,
@@ -38,9 +38,9 @@ from inputdesign_cli.specification import (
     TrueParameters,
 )
 from inputdesign_cli.specification.models.experiment import covariance_of
-from inputdesign_cli.tasks.build.channels import polynomial_channels, rows_of
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.refusals import refuse, stated
+from inputdesign_cli.tasks.build.system import polynomial_model, rows_of
 from inputdesign_cli.tasks.loop_error import LoopErrorTask, LossTrial
 from inputdesign_cli.tasks.loop_error_signal import LoopErrorSignalSettings
 from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms
@@ -115,7 +115,7 @@ def _plant(
         )
     if isinstance(plant, PolynomialPlant):
         covariance = covariance_of(noise.variance, plant.outputs)
-        return MatrixPlant.of(polynomial_channels(plant, noise, covariance))
+        return MatrixPlant.of(polynomial_model(plant, noise, covariance))
     if not isinstance(plant, ContinuousPlant) or not plant.sampled:
         raise bad_spec(
             "not-supported",
@@ -125,7 +125,7 @@ def _plant(
         )
     matrix = plant.continuous
     held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, spec.sample_time)
-    sampled = PolynomialChannels(
+    sampled = PolynomialModel(
         B=tuple(tuple(entry.numerator for entry in row) for row in held),
         A=(np.ones(1),),
         F=tuple(tuple(entry.denominator_polynomial for entry in row) for row in held),

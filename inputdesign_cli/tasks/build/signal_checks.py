@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.signal import Quantiser, SignalSettings
+from inputdesign_cli.signal import Quantiser, SignalSettings, blocks_of
 from inputdesign_cli.signal.settings import LEVELLED
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.channels import has_channels
 from inputdesign_cli.tasks.build.signal_settings import (
-    build_channel_bounds,
-    build_quantisers,
+    build_bounds,
     build_signal_settings,
     per_channel,
     sampling_rate,
 )
+from inputdesign_cli.tasks.record import least_period
 
 _STEPS_ROUNDING = 1e-12
-SHORTEST_BLOCK = 8  # values
 
 
 def check_signal(spec: Spec) -> None:
@@ -27,82 +25,77 @@ def check_signal(spec: Spec) -> None:
             levels; `coarse-converter` when a limit is below the converter's step;
             `no-sample-rate` for a WAV file of a sampling rate that is not a whole number of hertz.
     """
-    recipe = build_signal_settings(spec)
+    settings = build_signal_settings(spec)
     samples = spec.signal_samples
     fixed = spec.goal != "shortest_experiment" or spec.signal.samples is not None
-    if fixed and samples % recipe.block:
-        below = samples - samples % recipe.block
-        nearest = " or ".join(str(n) for n in (below, below + recipe.block) if n)
-        key = "signal.periods" if recipe.periods > 1 else "signal.hold"
+    if fixed and samples % settings.block:
+        below = samples - samples % settings.block
+        nearest = " or ".join(str(n) for n in (below, below + settings.block) if n)
+        key = "signal.periods" if settings.periods > 1 else "signal.hold"
         raise spec.complain(
             "conflicting-keys",
             f"{samples} samples do not make "
-            + (f"{recipe.periods} equal periods" if recipe.periods > 1 else "a whole number")
-            + (f" of values held for {recipe.hold} samples" if recipe.hold > 1 else ""),
+            + (f"{settings.periods} equal periods" if settings.periods > 1 else "a whole number")
+            + (f" of values held for {settings.hold} samples" if settings.hold > 1 else ""),
             hint=f"write signal.samples: {nearest}, or another number of periods",
             key=key,
         )
-    least, period = _least_period(spec), samples // recipe.block
-    if fixed and recipe.block > 1 and period < least:
+    least, period = least_period(spec.plant.inputs), samples // settings.block
+    if fixed and settings.block > 1 and period < least:
         raise spec.complain(
             "conflicting-keys",
             f"one period has {period} {'value' if period == 1 else 'values'}, and needs at least {least}",
             hint="ask for more samples, fewer periods or a shorter hold",
-            key="signal.periods" if recipe.periods > 1 else "signal.hold",
+            key="signal.periods" if settings.periods > 1 else "signal.hold",
         )
-    if recipe.ramp and recipe.method in LEVELLED:
+    if settings.ramp and settings.method in LEVELLED:
         raise spec.complain(
             "unsuitable-key",
-            f"ramp does not go with type: {recipe.method}, whose values are of a few levels",
+            f"ramp does not go with type: {settings.method}, whose values are of a few levels",
             hint="remove it, or use filtered_noise or multisine",
             key="signal.ramp",
         )
-    if 2 * recipe.ramp > samples and fixed:
+    if 2 * settings.ramp > samples and fixed:
         raise spec.complain(
             "out-of-range",
-            f"ramp is {recipe.ramp}, but the signal has {samples} samples to fade in and out",
+            f"ramp is {settings.ramp}, but the signal has {samples} samples to fade in and out",
             hint=f"write at most {samples // 2}",
             key="signal.ramp",
         )
-    _check_harmonics(spec, recipe, samples if fixed else None)
-    _check_register(spec, recipe)
+    _check_harmonics(spec, settings, samples if fixed else None)
+    _check_register(spec, settings)
     _check_files(spec)
-    bounds = build_channel_bounds(spec, [])
-    for channel, quantiser in enumerate(build_quantisers(spec)):
+    bounds = build_bounds(spec)
+    for channel in range(spec.plant.inputs):
         amplitude = None if bounds.amplitude is None else float(bounds.amplitude[channel])
         rate = None if bounds.rate is None else float(bounds.rate[channel])
         _check_level(spec, channel, amplitude)
-        if quantiser is not None:
-            _check_converter(spec, quantiser, amplitude, rate)
+        if bounds.quantisers:
+            _check_converter(spec, bounds.quantisers[channel], amplitude, rate)
 
 
-def _check_harmonics(spec: Spec, recipe: SignalSettings, samples: int | None) -> None:
-    if samples is None or not isinstance(recipe.lines, tuple):
+def _check_harmonics(spec: Spec, settings: SignalSettings, samples: int | None) -> None:
+    if samples is None or not isinstance(settings.lines, tuple):
         return
-    blocks = spec.plant.inputs if spec.signal.phases != "random" else 1
-    block = recipe.period(samples) // blocks
+    block = settings.period(samples) // blocks_of(settings.vectors, spec.plant.inputs)
     top = block // 2
-    if recipe.lines[-1] > top:
+    if settings.lines[-1] > top:
         raise spec.complain(
             "out-of-range",
-            f"lines reaches harmonic {recipe.lines[-1]}, but a period of {block} values has "
+            f"lines reaches harmonic {settings.lines[-1]}, but a period of {block} values has "
             f"harmonics 0 to {top}",
             hint="remove the higher ones, or make the period longer",
             key="signal.lines",
         )
 
 
-def _least_period(spec: Spec) -> int:
-    """Values that a period must have: two, and eight in every block of a record of several inputs."""
-    return SHORTEST_BLOCK * spec.plant.inputs if has_channels(spec) else 2
-
-
-def _check_register(spec: Spec, recipe: SignalSettings) -> None:
+def _check_register(spec: Spec, settings: SignalSettings) -> None:
     """Several inputs are shifted against each other by parts of one sequence."""
-    if recipe.method == "prbs" and recipe.bits is not None and 2**recipe.bits - 1 < _least_period(spec):
+    least = least_period(spec.plant.inputs)
+    if settings.method == "prbs" and settings.bits is not None and 2**settings.bits - 1 < least:
         raise spec.complain(
             "out-of-range",
-            f"a register of {recipe.bits} bits repeats after {2**recipe.bits - 1} values, too few for "
+            f"a register of {settings.bits} bits repeats after {2**settings.bits - 1} values, too few for "
             f"{spec.plant.inputs} inputs",
             hint="take more bits, or remove the key",
             key="signal.bits",
@@ -125,7 +118,7 @@ def _check_level(spec: Spec, channel: int, most: float | None) -> None:
 
 def _check_converter(spec: Spec, quantiser: Quantiser, amplitude: float | None, rate: float | None) -> None:
     step = quantiser.step
-    if quantiser.room() < step:
+    if quantiser.reach() < step:
         raise spec.complain(
             "coarse-converter",
             f"the offset {quantiser.offset:g} leaves the converter no room: its values reach from "

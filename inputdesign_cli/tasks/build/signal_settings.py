@@ -1,94 +1,127 @@
-"""`signal:` and the limits on single samples -> recipe and bounds of the record."""
+"""`signal:` and the limits on single samples -> what is asked of the record."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import Bounds, ChannelBounds, Quantiser, SignalSettings
+from inputdesign_cli.runs.results import Table
+from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.channels import has_channels
+from inputdesign_cli.specification.models.plant import PolynomialPlant
+from inputdesign_cli.specification.models.spectrum import GivenSignal, GivenSpectrum, PolynomialSpectrum
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
+from inputdesign_cli.tasks.record import Delivery, RecordRequest
 
-_CANDIDATES = 20
-_PATIENCE = 4  # times as many at most, where noise happens to fit badly
+# Noise happens to fit badly now and then: many are tried, and more while the best costs much.
+_NOISE, _MOST_NOISE = 20, 80
+# Sinusoids, and levels that come near their powers, vary little from one to the next.
+_OTHERS, _MOST_OTHERS = 8, 20
 # Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
-_OPTIMISED_CANDIDATES = 4
+_OPTIMISED = 4
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
+def build_record_request(spec: Spec) -> RecordRequest:
+    """All that the spec asks of its record.
+
+    Raises:
+        SpecError: `needs-band`; `beyond-nyquist` when samples are too far apart for the band.
+    """
+    step, limits, signal = record_step(spec), spec.limits, spec.signal
+    lo, hi = excitation_band(spec)
+    stated = {
+        "limits.amplitude": limits.amplitude,
+        "limits.rate": limits.rate,
+        "signal.quantisation": signal.quantisation,
+    }
+    return RecordRequest(
+        settings=build_signal_settings(spec),
+        bounds=build_bounds(spec),
+        cost=build_cost(spec) or {"excitation": 1.0},
+        band=(lo * step, hi * step),
+        step=step,
+        samples=signal.samples,
+        meets=signal.scale != "design",
+        most_samples=limits.samples,
+        limit_keys=tuple(key for key, value in stated.items() if value is not None),
+        delivery=Delivery(
+            operating_points=None if signal.offset is None else _operating_points(spec),
+            also=signal.also or (),
+            full_scale=None if signal.quantisation is None else float(np.max(signal.quantisation.range)),
+            sampling_rate=sampling_rate(spec),
+        ),
+    )
+
+
 def build_signal_settings(spec: Spec) -> SignalSettings:
-    """What is to be drawn; kinds and phases that the spec leaves open follow from the rest."""
-    signal = spec.signal
+    """What is to be generated; kinds and phases that the spec leaves open follow from the rest."""
+    signal, inputs = spec.signal, spec.plant.inputs
     method = _method(spec)
     limited = spec.limits.amplitude is not None or spec.limits.rate is not None
-    phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else "random")
-    optimised = method == "multisine" and phases == "optimised"
-    candidates = signal.candidates or (_OPTIMISED_CANDIDATES if optimised else _CANDIDATES)
-    patient = signal.candidates is None and method == "filtered_noise"
+    uniform: Phases = "orthogonal" if inputs > 1 else "random"
+    phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else uniform)
+    noise = method in ("filtered_noise", "white")
+    candidates, most = (_NOISE, _MOST_NOISE) if noise else (_OTHERS, _MOST_OTHERS)
+    if method == "multisine" and phases == "optimised":
+        candidates = most = _OPTIMISED
     return SignalSettings(
         method=method,
         phases=phases,
-        lines=signal.lines,  # type: ignore[arg-type]
+        lines=signal.lines,
         periods=signal.periods or 1,
         hold=signal.hold or 1,
         ramp=signal.ramp or 0,
         bits=signal.bits,
-        level=None if signal.amplitudes is None else _level(spec, signal.amplitudes),
-        quantiser=None if spec.plant.inputs > 1 else build_quantisers(spec)[0],
-        candidates=candidates,
-        most_candidates=_PATIENCE * candidates if patient else candidates,
+        level=None if signal.amplitudes is None else per_channel(signal.amplitudes, inputs),
+        candidates=signal.candidates or candidates,
+        most_candidates=signal.candidates or most,
         seed=signal.seed or 0,
     )
 
 
-def _level(spec: Spec, amplitudes: float | tuple[float, ...]) -> float | Array:
-    return _one(amplitudes) if spec.plant.inputs == 1 else per_channel(amplitudes, spec.plant.inputs)
-
-
-def build_quantisers(spec: Spec) -> list[Quantiser | None]:
-    """The converter of each input; all have the same number of bits."""
-    stated, inputs = spec.signal.quantisation, spec.plant.inputs
-    if stated is None:
-        return [None] * inputs
-    spans = per_channel(stated.range, inputs)
-    offsets = per_channel(spec.signal.offset or 0.0, inputs)
-    return [
-        Quantiser(stated.bits, float(span), float(offset))
-        for span, offset in zip(spans, offsets, strict=True)
-    ]
-
-
-def build_bounds(spec: Spec, power_limits: list[PowerLimit]) -> Bounds:
-    """What the record may not exceed."""
-    amplitude = spec.limits.amplitude
-    return Bounds(
-        amplitude=None if amplitude is None or amplitude.input is None else _one(amplitude.input),
-        rate=None if spec.limits.rate is None else _one(spec.limits.rate),
-        output=None if amplitude is None or amplitude.output is None else _one(amplitude.output),
-        powers=tuple((limit.kind, limit.bound) for limit in power_limits if limit.upper),
-    )
-
-
-def build_channel_bounds(spec: Spec, power_limits: list[PowerLimit]) -> ChannelBounds:
-    """What a record of several inputs may not exceed, channel by channel."""
+def build_bounds(spec: Spec) -> Bounds:
+    """What single samples of the record may not exceed, channel by channel."""
     amplitude, rate = spec.limits.amplitude, spec.limits.rate
     inputs, outputs = spec.plant.inputs, spec.plant.outputs
     most = (None, None) if amplitude is None else (amplitude.input, amplitude.output)
-    return ChannelBounds(
+    return Bounds(
         amplitude=None if most[0] is None else per_channel(most[0], inputs),
         rate=None if rate is None else per_channel(rate, inputs),
         output=None if most[1] is None else per_channel(most[1], outputs),
-        powers=tuple((limit.kind, limit.channel, limit.bound) for limit in power_limits if limit.upper),
+        quantisers=_quantisers(spec),
     )
 
 
-def operating_points(spec: Spec) -> Array:
+def _quantisers(spec: Spec) -> tuple[Quantiser, ...]:
+    """The converter of each input; all have the same number of bits."""
+    stated, inputs = spec.signal.quantisation, spec.plant.inputs
+    if stated is None:
+        return ()
+    spans = per_channel(stated.range, inputs)
+    offsets = per_channel(spec.signal.offset or 0.0, inputs)
+    return tuple(
+        Quantiser(stated.bits, float(span), float(offset))
+        for span, offset in zip(spans, offsets, strict=True)
+    )
+
+
+def _operating_points(spec: Spec) -> Array:
     """(r,): the offset of each input, or the value of its converter next to it."""
-    offsets = per_channel(spec.signal.offset or 0.0, spec.plant.inputs)
-    pairs = zip(build_quantisers(spec), offsets, strict=True)
-    return np.array([float(offset) if q is None else q.operating_point for q, offset in pairs])
+    quantisers = _quantisers(spec)
+    if quantisers:
+        return np.array([quantiser.operating_point for quantiser in quantisers])
+    return per_channel(spec.signal.offset or 0.0, spec.plant.inputs)
+
+
+def deviations(spec: Spec, table: Table) -> Array:
+    """(n, r): the samples of signal.csv from their operating points; a record that was given as it is."""
+    columns = build_units(spec).excitations
+    values = np.stack([np.asarray(table.columns[name]) for name in columns], axis=1)
+    given = isinstance(spec.spectrum, GivenSpectrum) and isinstance(spec.spectrum.given, GivenSignal)
+    return values if given else values - _operating_points(spec)
 
 
 def sampling_rate(spec: Spec) -> float:
@@ -97,6 +130,7 @@ def sampling_rate(spec: Spec) -> float:
 
 
 def _method(spec: Spec) -> Method:
+    """The kind of signal; noise where a spectral factor may be had: one input and output in q^-1."""
     signal = spec.signal
     if signal.type is not None:
         return signal.type
@@ -104,14 +138,11 @@ def _method(spec: Spec) -> Method:
         return "multisine"
     if signal.bits is not None:
         return "prbs"
-    return "multisine" if has_channels(spec) else "filtered_noise"
+    single = isinstance(spec.plant, PolynomialPlant) and spec.plant.inputs == spec.plant.outputs == 1
+    banded = isinstance(spec.spectrum, PolynomialSpectrum) and not spec.closed_loop
+    return "filtered_noise" if single and not banded else "multisine"
 
 
 def per_channel(value: float | tuple[float, ...], channels: int) -> Array:
     """(channels,): a number holds for every channel."""
     return np.broadcast_to(np.asarray(value, dtype=float), channels)
-
-
-def _one(value: float | tuple[float, ...]) -> float:
-    """The entry for the only channel."""
-    return value[0] if isinstance(value, tuple) else value

@@ -12,7 +12,7 @@ from inputdesign_cli.monte_carlo.loop_error import LossStudy
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, LossCurves
-from inputdesign_cli.signal.channels import Lines
+from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.tasks.result.loop_error import Entry, theory_entry
 
 

@@ -1,0 +1,75 @@
+"""What a finite record tells: its own information matrix, not that of the spectrum it was drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.information.experiment import Experiment, PowerKind
+from inputdesign_cli.information.record_filters import RecordFilters
+from inputdesign_cli.information.record_transforms import RecordTransforms
+from inputdesign_cli.plant.polynomial import Array
+
+
+class _Answers(Protocol):
+    """What a plant, or its loop, answers to a record from rest."""
+
+    def signals(self, of: PowerKind, record: Array) -> Array: ...
+
+    def adjoint(self, of: PowerKind, weights: Array) -> Array: ...
+
+    def gradient(self, record: Array) -> NDArray[np.float64]: ...
+
+
+@dataclass(frozen=True)
+class FiniteRecord:
+    """The plant or its loop, from rest, as it answers records of `samples` samples of the excitation.
+
+    Args:
+        step: time between samples in the unit of time of the experiment's frequencies (1 for rad/sample).
+    """
+
+    experiment: Experiment
+    samples: int
+    step: float = 1.0
+
+    def information(self, record: Array) -> Array:
+        """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (n, r), in these coordinates."""
+        psi = self.gradient(record)
+        flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
+        return self.known + flat @ flat.T
+
+    def gradient(self, record: Array) -> NDArray[np.float64]:
+        """(n, k, p): psi of the prediction, from rest, in these coordinates, noise whitened to I."""
+        return self._answers.gradient(record)
+
+    @cached_property
+    def known(self) -> Array:
+        """(k, k): M0, what is known without any excitation; that of the noise is scaled to the samples."""
+        share = self.samples / self.experiment.samples
+        return self.experiment.prior_information + share * self.experiment.noise_information
+
+    def signals(self, of: PowerKind, record: Array) -> Array:
+        """(n, channels): what the samples (n, r) alone cause at inputs or outputs, from rest."""
+        return record if self._is_record(of) else self._answers.signals(of, record)
+
+    def mean_squares(self, of: PowerKind, record: Array) -> Array:
+        """(channels,): the powers of these signals."""
+        return np.mean(self.signals(of, record) ** 2, axis=0)
+
+    def adjoint(self, of: PowerKind, weights: Array) -> Array:
+        """(n, r): the transpose of `signals`, applied to weights (n, channels)."""
+        return weights if self._is_record(of) else self._answers.adjoint(of, weights)
+
+    def _is_record(self, of: PowerKind) -> bool:
+        """Whether a signal is the excitation itself."""
+        return of == "excitation" or (of == "input" and self.experiment.loop is None)
+
+    @cached_property
+    def _answers(self) -> _Answers:
+        filters = RecordFilters.of(self.experiment)
+        return filters or RecordTransforms(self.experiment, self.samples, self.step)

@@ -1,0 +1,85 @@
+"""What one input and one output in q^-1 answer to a finite record, by their difference equations.
+
+The same answers as `RecordTransforms` in a tenth of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from inputdesign_cli.information.experiment import Experiment, PowerKind
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.polynomial import Array
+
+Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
+
+
+@dataclass(frozen=True)
+class RecordFilters:
+    """Filters records of one channel; `model` is that of the experiment."""
+
+    experiment: Experiment
+    model: PolynomialModel
+
+    @classmethod
+    def of(cls, experiment: Experiment) -> RecordFilters | None:
+        """The filters of an experiment, None where it is not of this kind."""
+        model = experiment.model
+        if not isinstance(model, PolynomialModel) or model.inputs > 1 or model.outputs > 1:
+            return None
+        return cls(experiment, model)
+
+    def signals(self, of: PowerKind, record: Array) -> Array:
+        """(n, 1): what the samples (n, 1) alone cause at the input or the output."""
+        numerator, denominator = self._responses[of]
+        return scipy.signal.lfilter(numerator, denominator, record, axis=0)
+
+    def adjoint(self, of: PowerKind, weights: Array) -> Array:
+        """(n, 1): the transpose of `signals`; a filter run backwards in time is its own."""
+        return self.signals(of, weights[::-1])[::-1]
+
+    def gradient(self, record: Array) -> NDArray[np.float64]:
+        """(n, k, 1): psi of the prediction, in the coordinates of the experiment, noise whitened to 1."""
+        sources, samples = self._sources(record), len(record)
+        raw = np.zeros((samples, self.experiment.size))
+        for column, parameter in enumerate(self.model.parameters):
+            if parameter.letter in sources and parameter.power < samples:
+                raw[parameter.power :, column] = sources[parameter.letter][: samples - parameter.power]
+        return self.experiment.whiten_rows(raw)[:, :, None] / np.sqrt(self.model.covariance[0, 0])
+
+    @cached_property
+    def _responses(self) -> dict[PowerKind, Filter]:
+        """From the excitation to each kind of signal."""
+        m, loop, one = self.model, self.experiment.loop, np.ones(1)
+        B, AF = m.B[0][0], np.convolve(m.A[0], m.F[0][0])
+        if loop is None:
+            return {"excitation": (one, one), "input": (one, one), "output": (B, AF)}
+        P, Q = loop.controller.numerator[0, 0], loop.controller.denominator[0]
+        around = np.polynomial.polynomial.polyadd(np.convolve(AF, Q), np.convolve(B, P))
+        characteristic = np.asarray(around, dtype=np.float64)
+        return {
+            "excitation": (one, one),
+            "input": (np.convolve(AF, Q), characteristic),
+            "output": (np.convolve(B, Q), characteristic),
+        }
+
+    def _sources(self, record: Array) -> dict[str, Array]:
+        """(n,) each: the gradient with respect to a coefficient of A, B or F, but for its delay.
+
+        Minus the derivatives of the prediction error epsilon = (D / C) (A y - (B / F) u). Filters follow each
+        other: in one product of their denominators twice the same pole costs half the digits.
+        """
+        m, letters = self.model, {p.letter for p in self.model.parameters}
+        B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]
+        by_b = scipy.signal.lfilter(D, np.convolve(C, F), self.signals("input", record)[:, 0])
+        sources = {"b": by_b}
+        if "a" in letters:
+            sources["a"] = scipy.signal.lfilter(-D, C, self.signals("output", record)[:, 0])
+        if "f" in letters:
+            sources["f"] = scipy.signal.lfilter(-B, F, by_b)
+        return sources

@@ -1,0 +1,69 @@
+"""The spectrum that records are made of, whatever family it was designed in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal.lines import Lines, grid_lines, merged
+from inputdesign_cli.spectrum import Basis, TabulatedSpectrum
+
+
+@dataclass(frozen=True)
+class DesignedSpectrum:
+    """A density over frequency or sinusoids, for records of values `step` apart; other processes can have it.
+
+    Args:
+        inputs: r.
+        power: the mean square, of all inputs together.
+        step: time between samples in the unit of time of the frequencies (1 for rad/sample).
+        density: maps frequencies (n,) to Phi, (n,) for one input, else (n, r, r); None for sinusoids.
+        sinusoids: of such a spectrum, frequencies in its own unit.
+        free: whether their frequencies were found, not given.
+        autocovariances: (m + 1,) c_0 .. c_m of one input that a moving average can make.
+    """
+
+    inputs: int
+    power: float
+    step: float = 1.0
+    density: Callable[[Array], NDArray] | None = None
+    sinusoids: Lines | None = None
+    free: bool = False
+    autocovariances: Array | None = None
+
+    @classmethod
+    def of(
+        cls, basis: Basis | TabulatedSpectrum, x: Array, *, inputs: int = 1, step: float = 1.0
+    ) -> DesignedSpectrum:
+        """The spectrum with coefficients `x` on `basis`."""
+        power = float(x @ basis.integrals(partial(_unit, inputs), np.zeros(0, dtype=complex)))
+        if not basis.has_density:
+            return cls(inputs, power, step, sinusoids=Lines(*basis.lines(x)), free=basis.free)
+        moving_average = basis.moving_average(x)
+        return cls(inputs, power, step, partial(basis.density, x), autocovariances=moving_average)
+
+    def lines(self, period: int, hold: int = 1) -> Lines:
+        """The sinusoids of a period of so many values, each held for `hold` samples; in rad per value.
+
+        Those of a spectrum of sinusoids have their own frequencies. Free ones that the period cannot tell
+        apart are one; those that the user gave are left as they are.
+        """
+        step = hold * self.step
+        if self.density is not None:
+            w = np.asarray(2.0 * np.pi * np.arange(period // 2 + 1) / (period * step), dtype=np.float64)
+            return grid_lines(self.density(w), period, step)
+        if self.sinusoids is None:
+            raise ValueError("a spectrum has a density or sinusoids")
+        lines = Lines(self.sinusoids.frequencies * step, self.sinusoids.powers)
+        return merged(lines, period) if self.free else lines
+
+
+def _unit(inputs: int, w: Array) -> NDArray[np.float64]:
+    """The density of the power of all inputs together."""
+    unit = np.ones(w.shape)
+    return unit if inputs == 1 else unit[:, None, None] * np.eye(inputs)

@@ -1,0 +1,112 @@
+"""The sinusoids that stand for a spectrum: frequencies and Hermitian power matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_END = 1e-12
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Sinusoids at `frequencies` (L,) in rad per step with power matrices (L, r, r), Hermitian.
+
+    `period` in steps when all lines lie on its grid; None for lines anywhere.
+    """
+
+    frequencies: Array
+    powers: ComplexArray
+    period: int | None = None
+
+    def scaled(self, factor: float) -> Lines:
+        """The same with all powers multiplied."""
+        return Lines(self.frequencies, factor * self.powers, self.period)
+
+    @property
+    def inputs(self) -> int:
+        """How many signals share the lines."""
+        return int(self.powers.shape[1])
+
+    @property
+    def mean_squares(self) -> Array:
+        """(r,): the powers of the inputs."""
+        return np.asarray(np.einsum("naa->a", self.powers).real)
+
+    @property
+    def totals(self) -> Array:
+        """(L,): the power of each line in all inputs together."""
+        return np.asarray(np.einsum("naa->n", self.powers).real)
+
+    @cached_property
+    def real(self) -> NDArray[np.bool_]:
+        """(L,): the lines at 0 and pi, where a sinusoid has no phase, only a sign."""
+        return (self.frequencies < _END) | (self.frequencies > np.pi - _END)
+
+    @cached_property
+    def roots(self) -> ComplexArray:
+        """(L, r, r): Hermitian square roots of the powers, real ones at 0 and pi."""
+        powers = np.where(self.real[:, None, None], self.powers.real, self.powers)
+        if self.inputs == 1:
+            return np.asarray(np.sqrt(np.maximum(powers.real, 0.0)), dtype=complex)
+        values, vectors = np.linalg.eigh(powers)
+        half = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+        return np.asarray(half @ vectors.conj().swapaxes(1, 2))
+
+    def dense(self, period: int) -> ComplexArray:
+        """(period // 2 + 1, r, r): the powers, each at the harmonic of the period that is next to it."""
+        powers = np.zeros((period // 2 + 1, self.inputs, self.inputs), dtype=complex)
+        nearest = np.rint(self.frequencies * period / (2.0 * np.pi)).astype(int)
+        np.add.at(powers, np.minimum(nearest, period // 2), self.powers)
+        return powers
+
+    @classmethod
+    def of_period(cls, powers: ComplexArray, period: int) -> Lines:
+        """The harmonics of a period that carry power, from the matrices (period // 2 + 1, r, r) of all."""
+        kept = np.trace(powers, axis1=1, axis2=2).real > 0
+        return cls(2.0 * np.pi * np.flatnonzero(kept) / period, powers[kept], period)
+
+
+def merged(lines: Lines, samples: int) -> Lines:
+    """Lines that a record of so many samples cannot tell apart as one each, with the sum of their powers.
+
+    The exchange finds the same optimal frequency several times over, to within rounding; in a record such
+    lines would beat. Those that it cannot tell from 0 or pi become constant or alternating: over the record
+    they have no phase, and with a random one might vanish.
+    """
+    order = np.argsort(lines.frequencies)
+    w, powers, total = lines.frequencies[order], lines.powers[order], lines.totals[order]
+    groups: list[list[int]] = []
+    for index in range(w.size):
+        if groups and w[index] - w[groups[-1][0]] < np.pi / samples:
+            groups[-1].append(index)
+        else:
+            groups.append([index])
+    middle = np.array([np.average(w[group], weights=total[group]) for group in groups])
+    middle = np.where(
+        middle < np.pi / samples, 0.0, np.where(middle > np.pi - np.pi / samples, np.pi, middle)
+    )
+    return Lines(middle, np.array([powers[group].sum(axis=0) for group in groups]), lines.period)
+
+
+def grid_lines(density: NDArray, period: int, step: float) -> Lines:
+    """The lines of a period that stand for a spectrum.
+
+    They sample the circle evenly, so that the powers add up to that of the spectrum whenever its order is
+    below the period.
+
+    Args:
+        density: Phi, (n, r, r) or (n,), at the frequencies 2 pi l / (period step), l = 0 .. period // 2.
+        step: time between samples in the unit of time of the spectrum (1 for rad/sample).
+    """
+    phi = density[:, None, None] if density.ndim == 1 else density
+    power = phi.astype(complex) * (2.0 / (period * step))
+    power[0] *= 0.5
+    if period % 2 == 0:
+        power[-1] *= 0.5
+    return Lines.of_period(np.asarray(power, dtype=complex), period)

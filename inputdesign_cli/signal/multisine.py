@@ -1,0 +1,100 @@
+"""Multisines of any number of inputs with any Hermitian spectrum: a root of its power matrix for every line.
+
+Over one period a line is one complex vector, so that its spectrum has rank one whatever was designed.
+A record of r periods whose vectors are orthogonal has, on average over them, the full matrix.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.signal.lines import Lines
+from inputdesign_cli.signal.settings import LineVectors
+
+
+def orthogonal_columns(order: int) -> NDArray:
+    """(order, order), entries of modulus one, orthogonal columns: Hadamard where there is one, or Fourier."""
+    if order & (order - 1) == 0:
+        return scipy.linalg.hadamard(order).astype(float)
+    return np.exp(2j * np.pi * np.outer(np.arange(order), np.arange(order)) / order)
+
+
+def blocks_of(vectors: LineVectors, inputs: int) -> int:
+    """How many periods with vectors of their own a record has."""
+    return inputs if vectors == "orthogonal" else 1
+
+
+def multisine_record(
+    lines: Lines,
+    samples: int,
+    rng: np.random.Generator,
+    vectors: LineVectors,
+    *,
+    angles: Array | None = None,
+) -> Array:
+    """(samples, r): one block after the other, each with the same random phase a line.
+
+    Args:
+        vectors: `orthogonal`: r blocks, line vectors root(P) e^{j psi} q_b with q_b the columns of an
+            orthogonal matrix. `random`: one block, root(P) times independent uniform phases (spectral design
+            paper, Appendix B, its misprints mended: uniform phases, sqrt(N), H_im); P is met on average only.
+        angles: (L,) the phases psi, drawn uniformly when not given.
+    """
+    number, r = lines.powers.shape[:2]
+    columns, real = orthogonal_columns(r), lines.real
+    common = rng.random(number)
+    edges = np.linspace(0, samples, blocks_of(vectors, r) + 1).astype(int)
+    # At w = 0 and pi a sinusoid has no phase, only a sign, and its vector is real.
+    turn = np.where(real, np.where(common < 0.5, 1.0, -1.0), np.exp(2j * np.pi * common))
+    if angles is not None:
+        turn = np.where(real, np.where(np.cos(angles) >= 0, 1.0, -1.0), np.exp(1j * angles))
+    out = np.empty((samples, r))
+    for block in range(edges.size - 1):
+        if vectors == "random":
+            mix = np.exp(2j * np.pi * rng.random((number, r)))
+        else:
+            mix = np.broadcast_to(columns[:, block], (number, r)).astype(complex)
+        signs = np.where(rng.random((number, r)) < 0.5, 1.0, -1.0)
+        mix = np.where(real[:, None] & np.any(np.abs(mix.imag) > 1e-12, axis=1)[:, None], signs, mix)
+        amplitude = np.einsum("nab,nb->na", lines.roots, mix) * turn[:, None]
+        out[edges[block] : edges[block + 1]] = _sinusoids(lines, amplitude, edges[block + 1] - edges[block])
+    return out
+
+
+def gaussian_record(lines: Lines, rng: np.random.Generator) -> Array:
+    """(period, r): Gaussian noise that is periodic, with random amplitudes at all of its harmonics."""
+    assert lines.period is not None
+    random = rng.standard_normal((2, len(lines.powers), lines.inputs))
+    mix = np.where(lines.real[:, None], random[0], (random[0] + 1j * random[1]) / np.sqrt(2.0))
+    return _sinusoids(lines, np.einsum("nab,nb->na", lines.roots, mix), lines.period)
+
+
+def in_phase_record(frequencies: Array, amplitudes: Array, samples: int, rng: np.random.Generator) -> Array:
+    """(samples, r): sinusoids of these amplitudes (L, r), each of one random phase in all channels.
+
+    At 0 and pi a sinusoid is a constant or alternates; its sign is random.
+    """
+    phases = 2.0 * np.pi * rng.random(frequencies.size)
+    real = (frequencies <= 0.0) | (frequencies >= np.pi)
+    phases[real] = np.where(phases[real] < np.pi, 0.0, np.pi)
+    return np.cos(np.outer(np.arange(samples), frequencies) + phases) @ amplitudes
+
+
+def block_vectors(lines: Lines, block: int) -> ComplexArray:
+    """(L, r): root(P) q_b, the line vectors of a period of an orthogonal record but for the common phase."""
+    return np.asarray(lines.roots @ orthogonal_columns(lines.inputs)[:, block].astype(complex))
+
+
+def _sinusoids(lines: Lines, vectors: ComplexArray, samples: int) -> Array:
+    """(samples, r): the sum of sinusoids whose mean squares are those of `vectors` (L, r)."""
+    if lines.period is None:
+        amplitude = np.where(lines.real, 1.0, np.sqrt(2.0))[:, None] * vectors
+        return (np.exp(1j * np.outer(np.arange(samples), lines.frequencies)) @ amplitude).real
+    spectrum = np.zeros((lines.period // 2 + 1, vectors.shape[1]), dtype=complex)
+    index = np.rint(lines.frequencies * lines.period / (2 * np.pi)).astype(int)
+    spectrum[index] = vectors * np.where(lines.real, 1.0, np.sqrt(0.5))[:, None] * lines.period
+    one = np.fft.irfft(spectrum, lines.period, axis=0)
+    return one if samples == lines.period else one[np.arange(samples) % lines.period]

@@ -1,0 +1,37 @@
+"""Pseudo-random binary sequences: a flat spectrum, whatever was designed."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.signal
+
+from inputdesign_cli.plant.polynomial import Array
+
+_LONGEST_REGISTER = 32
+
+
+def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:
+    """(samples,) of +1 and -1: a sequence of 2^bits - 1 values from a random start, repeated."""
+    if not 2 <= bits <= _LONGEST_REGISTER:
+        raise ValueError(f"no register of {bits} bits")
+    state = rng.integers(0, 2, bits)
+    if not state.any():
+        state[0] = 1
+    length = min(samples, 2**bits - 1)
+    sequence, _ = scipy.signal.max_len_seq(bits, state=state, length=length)
+    return np.resize(2.0 * sequence - 1.0, samples)
+
+
+def register_length(samples: int) -> int:
+    """The shortest register whose sequence does not repeat within `samples`."""
+    return min(max(2, int(np.ceil(np.log2(samples + 1)))), _LONGEST_REGISTER)
+
+
+def shifted_sequences(bits: int, samples: int, inputs: int, rng: np.random.Generator) -> Array:
+    """(samples, inputs): one sequence, for each input shifted by an equal part of its length.
+
+    Over a whole sequence the inputs are correlated by -1 over its length, but for lags at the shifts.
+    """
+    shift = min((2**bits - 1) // inputs, samples)
+    sequence = pseudo_random(bits, (inputs - 1) * shift + samples, rng)
+    return np.stack([sequence[a * shift : a * shift + samples] for a in range(inputs)], axis=1)

@@ -1,0 +1,145 @@
+"""The record as it is applied: what `result.json` says of it, its table, other files of it."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import SignalCurves, Table
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.signal import DesignedSpectrum, Lines, Record
+from inputdesign_cli.tasks.record import Delivery, RecordRequest
+
+_LAGS = 50
+
+
+def signal_entry(
+    request: RecordRequest,
+    units: Units,
+    experiment: Experiment,
+    record: Record,
+    requirements: Sequence[Requirement] = (),
+    *,
+    designed: Array | None = None,
+    spectrum: DesignedSpectrum | None = None,
+) -> dict[str, Any]:
+    """What `result.json` says of a record: powers and peaks by channel, and what it achieves.
+
+    For a criterion that is the criterion that the record reaches, per as many samples as the experiment has,
+    and its share of that of the design; for other requirements their worst ratio.
+
+    Args:
+        designed: information matrix (k, k) of the design.
+        spectrum: of the design, for the error of that of the record.
+    """
+    samples = record.samples
+    plant = FiniteRecord(experiment, len(samples), units.step)
+    entry: dict[str, Any] = {"type": record.method}
+    if record.method == "multisine":
+        entry["phases"] = request.settings.phases
+    entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
+    criterion = requirements[0].criterion if requirements else None
+    if criterion is not None:
+        reached = criterion.level(experiment.samples / len(samples) * plant.information(samples))
+        entry["criterion"] = criterion.value(reached)
+        if designed is not None:
+            entry["efficiency"] = reached / criterion.level(designed)
+    elif requirements and np.isfinite(record.worst_ratio):
+        entry["worst_ratio"] = record.worst_ratio
+    if record.method != "given":
+        entry["extra_power"] = record.extra_power
+    if spectrum is not None:
+        entry["spectrum_error"] = _spectrum_error(spectrum.lines(len(samples)), samples)
+    if record.factor_residual is not None:
+        entry["spectral_factor_residual"] = record.factor_residual
+    delivery = request.delivery
+    if delivery.operating_points is not None and record.method != "given":
+        entry["operating_point"] = delivery.operating_points.tolist()
+    if "wav" in delivery.also:
+        entry["wav_full_scale"] = _full_scale(delivery, record)
+    return entry
+
+
+def signal_curves(request: RecordRequest, units: Units, record: Record) -> tuple[Table, SignalCurves]:
+    """signal.csv, with time stamps in the unit of the spec, and its plot with the limits on u."""
+    time = units.sample_time * np.arange(len(record.samples), dtype=np.float64)
+    channels = dict(zip(units.excitations, applied(request.delivery, record).T, strict=True))
+    most, limits = request.bounds.amplitude, {}
+    if most is not None and not units.closed_loop and record.method != "given":
+        around = request.delivery.operating_points
+        middle = np.zeros(most.size) if around is None else around
+        limits = dict(zip(units.excitations, zip(middle - most, middle + most, strict=True), strict=True))
+    return Table({units.time_header: time, **channels}), SignalCurves(time, channels, limits)
+
+
+def applied(delivery: Delivery, record: Record) -> Array:
+    """(n, r): the samples shifted to the operating points; a record that was given is left as it is."""
+    points = delivery.operating_points
+    return record.samples if points is None or record.method == "given" else record.samples + points
+
+
+def other_files(request: RecordRequest, units: Units, record: Record) -> dict[str, bytes]:
+    """signal.mat (time, u1, .. or r1, sample_time) and signal.wav (32-bit float, 1 being full scale)."""
+    delivery, files = request.delivery, {}
+    if "mat" in delivery.also:
+        import scipy.io
+
+        table, _ = signal_curves(request, units, record)
+        content: dict[str, Any] = {name: values[:, None] for name, values in table.columns.items()}
+        buffer = io.BytesIO()
+        scipy.io.savemat(buffer, content | {"sample_time": units.sample_time})
+        # The first 116 bytes are a text with the date, which would make equal runs differ.
+        files["signal.mat"] = b"MATLAB 5.0 MAT-file".ljust(116) + buffer.getvalue()[116:]
+    if "wav" in delivery.also:
+        import scipy.io.wavfile
+
+        buffer = io.BytesIO()
+        values = applied(delivery, record) / _full_scale(delivery, record)
+        scipy.io.wavfile.write(buffer, round(delivery.sampling_rate), values.astype(np.float32))
+        files["signal.wav"] = buffer.getvalue()
+    return files
+
+
+def _full_scale(delivery: Delivery, record: Record) -> float:
+    """What full scale stands for in signal.wav, in all channels: the largest range or the largest value."""
+    if delivery.full_scale is not None and record.method != "given":
+        return delivery.full_scale
+    return float(np.abs(applied(delivery, record)).max())
+
+
+def _sizes(plant: FiniteRecord, samples: Array) -> dict[str, list[float]]:
+    """Powers and peaks by channel of a record (n, r)."""
+    y, u = plant.signals("output", samples), plant.signals("input", samples)
+    peak, rms = np.abs(samples).max(axis=0), np.sqrt(np.mean(samples**2, axis=0))
+    return {
+        "power": (rms**2).tolist(),
+        "peak": peak.tolist(),
+        "crest_factor": (peak / np.maximum(rms, 1e-300)).tolist(),
+        "input_power": np.mean(u**2, axis=0).tolist(),
+        "output_power": np.mean(y**2, axis=0).tolist(),
+        "input_peak": np.abs(u).max(axis=0).tolist(),
+        "input_move": np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0).tolist(),
+        "output_peak": np.abs(y).max(axis=0).tolist(),
+    }
+
+
+def _spectrum_error(lines: Lines, samples: Array) -> float:
+    """The largest error of the record's correlations, lags 0 to 50, against those of the design.
+
+    Those of inputs i and j are relative to the roots of their powers; the total power does not count.
+    """
+    n = len(samples)
+    lags = np.arange(min(_LAGS, n // 4) + 1)
+    turn = np.exp(1j * np.outer(lags, lines.frequencies))
+    wanted = np.einsum("tn,nab->tab", turn, lines.powers).real
+    found = np.array([samples[lag:].T @ samples[: n - lag] / (n - lag) for lag in lags])
+    found *= np.trace(wanted[0]) / np.trace(found[0])
+    size = np.sqrt(np.diag(wanted[0]))
+    scale = np.where(size > 0.0, size, np.inf)
+    return float(np.abs((found - wanted) / np.outer(scale, scale)).max())

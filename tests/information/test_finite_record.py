@@ -1,0 +1,172 @@
+"""What a finite record tells is what a simulation of the same samples measures."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.signal
+from channel_plants import arrays, arx, paper_experiment
+from inputdesign_cli.signal.single import as_channels
+from plants import random_case
+
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.information.record_transforms import RecordTransforms
+from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix
+from inputdesign_cli.signal import grid_lines, multisine_record
+
+
+@pytest.mark.parametrize("seed", [1, 5, 7, 9, 15])
+def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
+    """Finite differences of epsilon = (D/C)(A y - (B/F) u) on noise-free data, open and closed loop."""
+    case = random_case(seed)
+    experiment = as_channels(Experiment(case.loop, 50))
+    model = case.loop.model
+    r = np.random.default_rng(seed).normal(size=50)
+    controller = case.loop.controller
+    u, y = np.zeros(50), np.zeros(50)
+    den, nc = (controller.denominator_polynomial, controller.numerator) if controller else ([1.0], [0.0])
+    plant = np.convolve(model.A, model.F)
+    feedback = np.zeros(50)
+    for t in range(50):  # the loop, sample by sample
+        y[t] = sum(model.B[i] * u[t - i] for i in range(1, len(model.B)) if t >= i) - sum(
+            plant[i] * y[t - i] for i in range(1, len(plant)) if t >= i
+        )
+        feedback[t] = sum(nc[i] * y[t - i] for i in range(len(nc)) if t >= i) - sum(
+            den[i] * feedback[t - i] for i in range(1, len(den)) if t >= i
+        )
+        u[t] = r[t] - feedback[t]
+
+    def residual(theta):
+        values = dict(zip(model.names, theta, strict=True))
+        p = {}
+        for letter in "ABCDF":
+            p[letter] = np.array(getattr(model, letter), dtype=float)
+            for lag in range(len(p[letter])):
+                p[letter][lag] = values.get(f"{letter.lower()}{lag}", p[letter][lag])
+        clean = scipy.signal.lfilter(p["A"], [1.0], y) - scipy.signal.lfilter(p["B"], p["F"], u)
+        return scipy.signal.lfilter(p["D"], p["C"], clean)
+
+    found = FiniteRecord(experiment, 50).gradient(r[:, None])[:, :, 0] * np.sqrt(model.variance)
+    h = 1e-6
+    for k in range(len(model.names)):
+        if model.names[k][0] in "cd":
+            continue  # the noise parameters act on epsilon, which is zero here
+        step = h * np.eye(len(model.names))[k]
+        difference = -(residual(model.theta + step) - residual(model.theta - step)) / (2 * h)
+        np.testing.assert_allclose(found[:, k], difference, rtol=1e-4, atol=1e-6 * np.abs(found).max())
+
+
+def test_record_information_tends_to_that_of_the_spectrum(first_order):
+    """A long white record of power two has the information of the spectrum to a few per cent."""
+    N = 100_000
+    experiment = as_channels(dataclasses.replace(first_order, samples=N)).whitened(2.0)
+    record = np.sqrt(2.0) * np.random.default_rng(0).standard_normal(N)
+    np.testing.assert_allclose(FiniteRecord(experiment, N).information(record[:, None]), np.eye(3), atol=0.03)
+
+
+def test_information_of_a_record_is_that_of_simulated_regressors():
+    """For ARX the gradient of the prediction is the regressor itself, filtered by nothing."""
+    model = arx()
+    experiment = Experiment(model, 100).whitened(1.0)
+    rng = np.random.default_rng(3)
+    u = rng.normal(size=(300, 2))
+    y = np.stack(
+        [sum(scipy.signal.lfilter(model.B[i][j], model.A[i], u[:, j]) for j in range(2)) for i in range(2)],
+        axis=1,
+    )
+    np.testing.assert_allclose(FiniteRecord(experiment, 300).signals("output", u), y, atol=1e-9)
+
+    def late(x, lag):
+        return np.concatenate([np.zeros(lag), x[: x.size - lag]])
+
+    psi = np.zeros((300, experiment.size, 2))
+    for index, parameter in enumerate(model.parameters):
+        for i, j in set(parameter.places):
+            source = late(u[:, j], parameter.power) if parameter.letter == "b" else -late(y[:, i], 1)
+            psi[:, index, i] = source
+    precision = np.linalg.inv(model.covariance)
+    expected = np.einsum("tki,ij,tlj->kl", psi, precision, psi)
+    noise = Experiment(model, 300).baseline_information
+    ours = experiment.to_raw(FiniteRecord(experiment, 300).information(u))
+    np.testing.assert_allclose(ours, expected + noise, atol=1e-8 * np.abs(expected).max())
+
+
+def test_a_long_record_in_continuous_time_has_the_information_of_its_spectrum():
+    experiment = paper_experiment()
+    period, step = 2048, 1.0
+    w = 2 * np.pi * np.arange(period // 2 + 1) / (period * step)
+    phi = np.where((w > 0.1) & (w < 1.8), 1.0, 0.0)[:, None, None] * np.array([[2.0, 0.5], [0.5, 1.0]])
+    lines = grid_lines(phi, period, step)
+    record = multisine_record(lines, 2 * period, np.random.default_rng(4), "orthogonal")
+    densities = experiment.information_density(lines.frequencies / step)
+    expected = np.einsum("nklab,nba->kl", densities, lines.powers).real
+    ours = FiniteRecord(experiment, len(record), step).information(record) / len(record)
+    np.testing.assert_allclose(ours, expected, atol=0.02 * np.abs(expected).max())
+
+
+SLOW = PolynomialModel(
+    arrays([[[0, 1.0, 0.4], [0, 0.3]], [[0, 0.5], [0, 1.2]]]),
+    (np.array([1.0, -0.99999]), np.array([1.0, -0.5])),
+    arrays([[[1.0], [1.0]], [[1.0], [1.0, -1.9, 0.9995]]]),
+    (np.ones(1),),
+    (np.ones(1),),
+    np.eye(2),
+)
+
+
+def test_a_plant_that_remembers_longer_than_the_record_is_filtered_exactly():
+    """An almost integrating and a lightly damped entry, against the difference equations."""
+    u = np.random.default_rng(0).standard_normal((300, 2))
+    plant = FiniteRecord(Experiment(SLOW, 300), 300, 1.0)
+    wanted = np.zeros((300, 2))
+    for i in range(2):
+        right = sum(scipy.signal.lfilter(SLOW.B[i][j], SLOW.F[i][j], u[:, j]) for j in range(2))
+        wanted[:, i] = scipy.signal.lfilter([1.0], SLOW.A[i], right)
+    np.testing.assert_allclose(plant.signals("output", u), wanted, atol=1e-11 * np.abs(wanted).max())
+    v = np.random.default_rng(1).standard_normal((300, 2))
+    assert np.sum(plant.adjoint("output", v) * u) == pytest.approx(np.sum(wanted * v), rel=1e-10)
+
+
+def test_a_slow_loop_is_filtered_exactly_and_at_once():
+    """Integrators of gain 1e-5 settle in a million samples; the record has 200."""
+    model = arx()
+    gains = 1e-5 * np.linalg.inv(model.plant_at(np.zeros(1))[0].real)
+    controller = TransferMatrix.build([[[g] for g in row] for row in gains], [[[1, -1]] * 2] * 2)
+    loop = PolynomialLoop(model, controller)
+    loop.check_stability()
+    r = np.random.default_rng(1).standard_normal((200, 2))
+    plant = FiniteRecord(Experiment(model, 200, loop=loop), 200, 1.0)
+    y, u = loop.signals(r, np.zeros((200, 2)))
+    np.testing.assert_allclose(plant.signals("output", r), y, atol=1e-10)
+    np.testing.assert_allclose(plant.signals("input", r), u, atol=1e-10)
+    assert plant._answers._length <= 2048
+
+
+def test_the_adjoint_of_an_output():
+    plant = FiniteRecord(Experiment(arx(), 240).whitened(1.0), 240, 1.0)
+    u, weights = (
+        np.random.default_rng(0).normal(size=(240, 2)),
+        np.random.default_rng(1).normal(size=(240, 2)),
+    )
+    model = arx()
+    y = np.zeros((240, 2))
+    for i, j in np.ndindex(2, 2):
+        y[:, i] += scipy.signal.lfilter(model.B[i][j], model.A[i], u[:, j])
+    np.testing.assert_allclose(plant.signals("output", u), y, atol=1e-10)
+    assert np.sum(weights * y) == pytest.approx(np.sum(plant.adjoint("output", weights) * u))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_difference_equations_and_transforms_agree(seed):
+    """Open and closed loops of one channel: signals, their adjoints and gradients, two ways."""
+    experiment = as_channels(Experiment(random_case(seed).loop, 200))
+    fast, general = FiniteRecord(experiment, 200), RecordTransforms(experiment, 200, 1.0)
+    record, weights = np.random.default_rng(seed).normal(size=(2, 200, 1))
+    for kind in ("input", "output"):
+        wanted = general.signals(kind, record)
+        np.testing.assert_allclose(fast.signals(kind, record), wanted, atol=1e-9 * np.abs(wanted).max())
+        wanted = general.adjoint(kind, weights)
+        np.testing.assert_allclose(fast.adjoint(kind, weights), wanted, atol=1e-9 * np.abs(wanted).max())
+    wanted = general.gradient(record)
+    for found, column in zip(fast.gradient(record).T[0], wanted.T[0], strict=True):
+        np.testing.assert_allclose(found, column, atol=1e-9 * np.abs(column).max())
