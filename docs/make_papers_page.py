@@ -13,10 +13,12 @@ import tempfile
 from itertools import zip_longest
 from pathlib import Path
 
-import inputdesign_cli
-from inputdesign_cli.runs.golden import Row, compare, load_golden
-from inputdesign_cli.runs.golden_file import Golden
+from inputdesign_cli.runs.golden import Row, compare
+from inputdesign_cli.runs.golden_file import Golden, load_golden
 from inputdesign_cli.runs.results import Results
+from inputdesign_cli.specification import load_spec
+from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.sweep.verbs import run_verb
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "papers.md"
@@ -51,12 +53,11 @@ def golden_file(name: str) -> Path:
     return DOCS.parent / "golden" / f"{name}.yaml"
 
 
-def outcomes_of(golden: Golden) -> dict[str, Results]:
+def results_of(golden: Golden) -> dict[str, Results]:
     """Every run of a golden file."""
     found = {}
     for run in golden.runs:
-        spec = inputdesign_cli.load_spec(golden.spec_of(run), list(run.overrides))
-        found[run.name] = getattr(inputdesign_cli, run.command)(spec)
+        found[run.name] = run_verb(run.command, load_spec(golden.spec_of(run), list(run.overrides)))
     return found
 
 
@@ -105,10 +106,10 @@ def page(*, images: bool) -> str:
     parts = [INTRODUCTION]
     for name, text in sections().items():
         golden = load_golden(golden_file(name))
-        outcomes = outcomes_of(golden)
-        rows = compare(golden, {run: outcome.result for run, outcome in outcomes.items()})
+        found = results_of(golden)
+        rows = compare(golden, {run: results.result for run, results in found.items()})
 
-        def fill(match: re.Match[str], name=name, golden=golden, outcomes=outcomes, rows=rows) -> str:
+        def fill(match: re.Match[str], name=name, golden=golden, found=found, rows=rows) -> str:
             kind, run, what = match.groups()
             if kind == "table":
                 return table(rows)
@@ -116,7 +117,7 @@ def page(*, images: bool) -> str:
             if images:
                 IMAGES.mkdir(parents=True, exist_ok=True)
                 if kind == "figure":
-                    draw_figure(outcomes[run], what, file)
+                    draw_figure(found[run], what, file)
                 else:
                     draw_sweep(golden, run, what, file)
             return f"![{run}: {what}]({file.relative_to(DOCS).as_posix()})\n"
@@ -130,11 +131,11 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.strip().lower()).strip("-")
 
 
-def draw_figure(outcome: Results, stem: str, file: Path) -> None:
+def draw_figure(results: Results, stem: str, file: Path) -> None:
     """A figure of a run."""
     from inputdesign_cli.figures.plots import draw
 
-    file.write_bytes(draw(outcome.curves[stem], outcome.time_unit))
+    file.write_bytes(draw(results.curves[stem], results.time_unit))
 
 
 def draw_sweep(golden: Golden, name: str, setting: str, file: Path) -> None:
@@ -142,7 +143,7 @@ def draw_sweep(golden: Golden, name: str, setting: str, file: Path) -> None:
     run = next(run for run in golden.runs if run.name == name)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "sweep"
-        inputdesign_cli.sweep(golden.spec_of(run), [*run.overrides, setting], directory=out)
+        sweep(golden.spec_of(run), [*run.overrides, setting], directory=out)
         file.write_bytes((out / "curves.png").read_bytes())
 
 

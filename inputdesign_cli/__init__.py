@@ -12,10 +12,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inputdesign_cli.monte_carlo.simulation import simulate
     from inputdesign_cli.specification import load_spec, parse_spec
     from inputdesign_cli.sweep.running import sweep
-    from inputdesign_cli.tasks import analyse, assess, identify, solve, validate
+    from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, validate
 
 __version__ = "0.1.0"
 
@@ -36,7 +35,7 @@ _HOME = {
     "load_spec": "inputdesign_cli.specification",
     "parse_spec": "inputdesign_cli.specification",
     "solve": "inputdesign_cli.tasks",
-    "simulate": "inputdesign_cli.monte_carlo.simulation",
+    "simulate": "inputdesign_cli.tasks",
     "analyse": "inputdesign_cli.tasks",
     "assess": "inputdesign_cli.tasks",
     "identify": "inputdesign_cli.tasks",

@@ -12,7 +12,7 @@ from inputdesign_cli.compute.threads import use_one_thread
 use_one_thread()  # before anything imports numpy
 
 from inputdesign_cli import load_spec  # noqa: E402
-from inputdesign_cli.tasks.build.experiment import build_experiment  # noqa: E402
+from inputdesign_cli.tasks.build.system import build_experiment  # noqa: E402
 
 SPECS = Path(__file__).parent.parent / "specs"
 

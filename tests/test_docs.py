@@ -1,4 +1,4 @@
-"""Links lead somewhere, and the spec that the README shows is valid."""
+"""Links lead somewhere, sources that are cited have an entry, and the spec that the README shows is valid."""
 
 import re
 from pathlib import Path
@@ -9,6 +9,15 @@ from inputdesign_cli import load_spec, parse_spec, validate
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+REFERENCES = ROOT / "docs" / "references.md"
+FILES = sorted((ROOT / "inputdesign_cli").rglob("*.py"))
+CITATION = re.compile(r"(?<!ignore)\[([a-z]{3,}(?:-[a-z]+)*-(?:[0-9]{4}|[a-z]{3,}))\]")
+
+
+def anchors(page):
+    """What a link to a heading of this page ends with."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -16,6 +25,20 @@ def test_links_lead_somewhere(page):
     links = re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8"))
     missing = [link for link in links if "://" not in link and not (page.parent / link).exists()]
     assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_to_headings_lead_to_one(page):
+    links = re.findall(r"\]\(([^)#:]*\.md)?#([^)]+)\)", page.read_text(encoding="utf-8"))
+    missing = [
+        (file, anchor) for file, anchor in links if anchor not in anchors(page.parent / (file or page.name))
+    ]
+    assert missing == []
+
+
+def test_every_source_cited_by_key_has_an_entry():
+    cited = {key for file in FILES for key in CITATION.findall(file.read_text(encoding="utf-8"))}
+    assert cited <= anchors(REFERENCES)
 
 
 def test_the_spec_of_the_readme_is_the_shipped_one():

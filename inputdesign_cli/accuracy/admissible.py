@@ -13,13 +13,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.accuracy.continuous_weight import ContinuousWeight, weight_singularities
-from inputdesign_cli.plant import Loop, PolynomialModel, Rational, logarithmic_distance
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z
+from inputdesign_cli.plant import Loop, Model, ScalarTransfer
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _NOWHERE = np.zeros(0)
 # Where the weight vanishes the requirement is void; a large finite r_adm says so without an infinity.
 _NO_WEIGHT = 1e-12
+_TINY = np.finfo(float).tiny
 
 
 class AdmissibleError(Protocol):
@@ -38,18 +38,24 @@ class AdmissibleError(Protocol):
 
 @dataclass(frozen=True)
 class Relative:
-    """r_adm = fraction |G|."""
+    """r_adm = fraction |G| of one entry (output, input), or of the Frobenius norm of all (None)."""
 
-    model: PolynomialModel
+    model: Model
     fraction: float
+    entry: tuple[int, int] | None = None
     knots = _NOWHERE
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        return logarithmic_distance(join_roots([self.model.poles, self.model.zeros]))
+        if self.entry is None:
+            return self.model.singularities
+        return self.model.entry_singularities(*self.entry)
 
     def at(self, w: ArrayLike) -> Array:
-        return self.fraction * np.abs(self.model.plant_at(w))
+        G = self.model.plant_at(w)
+        if self.entry is None:
+            return self.fraction * np.linalg.norm(G, axis=(1, 2))
+        return self.fraction * np.abs(G[:, self.entry[0], self.entry[1]])
 
 
 @dataclass(frozen=True)
@@ -87,38 +93,25 @@ class Table:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """r_adm = (|1 + C G| - |W|) / |C|: then |W S| <= 1 for every plant within r_adm of G.
+    """r_adm = (1 - |W| s(S)) / s(C S), s the largest singular value and S = (I + G C)^-1 of the nominal loop.
 
-    By the reverse triangle inequality |1 + C G'| >= |1 + C G| - |C| |G' - G| >= |W|. Multiplied
-    through with the controller's denominator, so that its slow poles do no harm.
+    For every plant G + D with s(D) <= r_adm then s(W S') <= 1: S' = S (I + D C S)^-1, so that
+    s(S') <= s(S) / (1 - s(D) s(C S)). With one channel that is (|1 + C G| - |W|) / |C|
+    ([bombois-least-costly], Illustration 2, by the reverse triangle inequality).
     """
 
-    model: PolynomialModel
-    controller: Rational
-    weight: Rational
-
+    loop: Loop
+    weight: ScalarTransfer
     knots = _NOWHERE
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        return logarithmic_distance(
-            join_roots(
-                [
-                    roots_in_z(Loop(self.model, self.controller).characteristic),
-                    self.model.poles,
-                    self.controller.poles,
-                    self.controller.zeros,
-                    self.weight.poles,
-                    self.weight.zeros,
-                ]
-            )
-        )
+        return np.concatenate([self.loop.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
-        numerator, denominator = self.controller.numerator_at(w), self.controller.denominator_at(w)
-        room = np.abs(denominator + numerator * self.model.plant_at(w))
-        used = np.abs(self.weight.at(w)) * np.abs(denominator)
-        return (room - used) / np.abs(numerator)
+        S, applied = self.loop.sensitivity(w)
+        left = 1.0 - np.abs(self.weight.at(w)) * largest_gain(S)
+        return left / np.maximum(largest_gain(applied), _TINY)
 
 
 @dataclass(frozen=True)
@@ -126,7 +119,7 @@ class Weighted:
     """r_adm / |W|, so that |W| r_u stays below r_adm."""
 
     inner: AdmissibleError
-    weight: Rational | ContinuousWeight
+    weight: ScalarTransfer
 
     @property
     def knots(self) -> Array:
@@ -134,7 +127,14 @@ class Weighted:
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        return np.concatenate([self.inner.singularities, weight_singularities(self.weight)])
+        return np.concatenate([self.inner.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
         return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)
+
+
+def largest_gain(G: ComplexArray) -> Array:
+    """Largest singular values (n,) of (n, p, r)."""
+    if G.shape[1:] == (1, 1):
+        return np.abs(G[:, 0, 0])
+    return np.linalg.norm(G, 2, axis=(1, 2))

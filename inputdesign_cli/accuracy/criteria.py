@@ -34,6 +34,14 @@ class Criterion(OneCondition):
     def name(self) -> str:
         return f"criterion {self.letter}"
 
+    @property
+    def definite(self) -> bool:
+        return self.letter != "T"
+
+    @property
+    def criterion(self) -> Criterion:
+        return self
+
     @cached_property
     def _inverse(self) -> Array:
         return np.asarray(np.linalg.inv(self.scaling), dtype=float)

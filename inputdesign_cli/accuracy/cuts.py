@@ -80,8 +80,8 @@ class MatrixCut:
 class VarianceCut:
     """tr(V^T M^-1 V) <= 1, V = `directions` (k, q): a sum of variances.
 
-    By a Schur complement [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The inequality is that of Cauchy and
-    Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear norm.
+    By a Schur complement ([boyd-vandenberghe-2004], A.5.5) [[M, V], [V^T, Z]] >= 0 with tr Z <= 1. The
+    inequality is that of Cauchy and Schwarz, tr(Y M) tr(V^T M^-1 V) >= |Y^{1/2} V|_*^2 with the nuclear norm.
     """
 
     directions: Array
@@ -197,8 +197,8 @@ class EllipsoidCut:
     """x^T Q x <= 0 for every x = (d, 1) with d^T M d <= alpha^2, Q = `form` (k + 1, k + 1).
 
     By the S-procedure this holds exactly when [[M / alpha^2, 0], [0, -1]] >= nu Q for some nu >= 0
-    (Yakubovich; the ellipsoid has an interior point, so nothing is lost). With a multiplier Z >= 0 of
-    tr(Z Q) >= 0, tr(Z_11 M) / alpha^2 >= Z_22.
+    ([polik-terlaky-2007]; the ellipsoid has an interior point, so nothing is lost). With a multiplier
+    Z >= 0 of tr(Z Q) >= 0, tr(Z_11 M) / alpha^2 >= Z_22.
     """
 
     form: Array

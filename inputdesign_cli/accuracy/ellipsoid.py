@@ -3,7 +3,7 @@
 For every theta with (theta - theta_0)^T M (theta - theta_0) <= alpha^2, at every frequency of a band:
 |W (G(theta) - G_0) / G(theta)| <= bound ("relative"), or |G(theta) - G_0| <= r_adm ("absolute"). With
 G = B / D both are |z^T d| <= |c_0 + c^T d| in d = theta - theta_0, an indefinite quadratic inequality,
-and the S-procedure turns it into one matrix inequality without loss.
+and the S-procedure turns it into one matrix inequality without loss ([polik-terlaky-2007]).
 """
 
 from __future__ import annotations
@@ -14,56 +14,37 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.admissible import AdmissibleError
 from inputdesign_cli.accuracy.cuts import EllipsoidCut
-from inputdesign_cli.accuracy.model_error import real_rows
-from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Fraction
+from inputdesign_cli.accuracy.model_error import OnModelError
+from inputdesign_cli.accuracy.over_frequency import real_rows
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _BISECTIONS = 80
 _FLOOR = 1e-150  # its square is a number still
 
 
-@dataclass(frozen=True)
-class EllipsoidError(OverFrequency):
-    """The requirement for one plant (SISO) whose free denominator is A or F, not both.
+@dataclass(frozen=True, kw_only=True)
+class EllipsoidError(OnModelError):
+    """The requirement for one entry of G that is a fraction affine in theta (`Model.is_fraction`).
 
-    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself.
-    `band` in rad/sample.
+    `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. The
+    ellipsoid is that of the parameters of all entries, which share it.
     """
 
-    experiment: Experiment
-    admissible: AdmissibleError
-    alpha: float
     against: Literal["relative", "absolute"] = "relative"
-    band: tuple[float, float] = (0.0, np.pi)
-
-    name = "model_error"
-
-    @property
-    def knots(self) -> Array:  # type: ignore[override]
-        return self.admissible.knots
-
-    @property
-    def own_singularities(self) -> ComplexArray:
-        return self.admissible.singularities
-
-    def _fraction(self, w: ArrayLike) -> Fraction:
-        return self.experiment.plant_fraction(w)
 
     def _forms(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """z (n, k), c (n, k), c_0 (n,)."""
-        part = self._fraction(w)
+        output, input = self.entry or (0, 0)
+        part = self.experiment.model.entry_fraction(output, input, w)
+        above = self.experiment.whiten_rows(part.numerator_gradient)
+        below = self.experiment.whiten_rows(part.denominator_gradient)
         G = part.numerator / part.denominator
-        z = (part.numerator_gradient - G[:, None] * part.denominator_gradient) / self.admissible.at(w)[
-            :, None
-        ]
+        z = (above - G[:, None] * below) / self.admissible.at(w)[:, None]
         if self.against == "relative":
             # r_adm = bound |G_0|, while the error is compared with bound |G(theta)|.
-            return z * np.abs(G)[:, None], part.numerator_gradient, part.numerator
-        return z, part.denominator_gradient, part.denominator
+            return z * np.abs(G)[:, None], above, part.numerator
+        return z, below, part.denominator
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, 4, k): real and imaginary parts of z, then of c, over |c_0|."""

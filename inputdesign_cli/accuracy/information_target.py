@@ -2,7 +2,7 @@
 
 This covers `information` itself, the standard deviation of a single parameter (R = e e^T / s^2) and
 application-oriented accuracy, R = (chi2 gamma / 2) V'': then the confidence ellipsoid lies within the
-set where the application's cost, to second order, is below 1 / gamma (MOOSE2 and its literature).
+set where the application's cost, to second order, is below 1 / gamma ([annergren-larsson-2016]).
 """
 
 from __future__ import annotations
@@ -21,7 +21,11 @@ class InformationTarget(OneCondition):
     """M >= `target` (k, k, symmetric), in the coordinates of the experiment."""
 
     target: Array
-    name: str = "information"
+    label: str = "information"
+
+    @property
+    def name(self) -> str:
+        return self.label
 
     def ratio(self, information: Array) -> float:
         """sqrt of the largest eigenvalue of the target relative to M."""

@@ -1,7 +1,12 @@
-"""Model error r_u(w) <= r_adm(w) at every frequency of a band.
+"""Model error r_u(w) <= r_adm(w) at every frequency of a band, of one entry of G or of its norm.
 
-Least-costly paper, (6), (10) and (12): r_u = alpha sqrt(lambda_max(T P T^T)) with T the real and
-imaginary parts of Lambda_G, equivalently M >= R_adm(w) = (alpha / r_adm)^2 T^T T.
+[bombois-least-costly], (6), (10) and (12): r_u = alpha sqrt(lambda_max(T P T^T)) with T the real and
+imaginary parts of the gradient of the entry, equivalently M >= R_adm(w) = (alpha / r_adm)^2 T^T T. With the
+gradients of all entries in T, r_u bounds the Frobenius norm of the error of G over the confidence ellipsoid,
+to first order, and with it the largest singular value, which is what a sensitivity asks for.
+
+Entries that are held to bounds of their own share the confidence factor alpha of all parameters of G, so
+that all of them hold at once with that probability.
 """
 
 from __future__ import annotations
@@ -13,50 +18,52 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.admissible import AdmissibleError
 from inputdesign_cli.accuracy.cuts import MatrixCut
-from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.accuracy.requirement import inverse_factor
+from inputdesign_cli.accuracy.over_frequency import OverFrequency, largest_singular
+from inputdesign_cli.accuracy.requirement import BoundedError, inverse_factor
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
-@dataclass(frozen=True)
-class ModelError(OverFrequency):
-    """The requirement for one plant (SISO); `band` in rad/sample."""
+@dataclass(frozen=True, kw_only=True)
+class OnModelError(OverFrequency):
+    """What requirements on a model error share: r_adm, the confidence factor alpha, r_u to first order."""
 
-    experiment: Experiment
     admissible: AdmissibleError
     alpha: float
-    band: tuple[float, float] = (0.0, np.pi)
-
-    name = "model_error"
 
     @property
-    def knots(self) -> Array:  # type: ignore[override]
+    def name(self) -> str:
+        return "model_error"
+
+    @property
+    def bounded_error(self) -> BoundedError:
+        return self
+
+    @property
+    def knots(self) -> Array:
         return self.admissible.knots
 
     @property
     def own_singularities(self) -> ComplexArray:
         return self.admissible.singularities
 
-    def check_positive(self) -> None:
-        """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 on the whole band."""
-        check_positive(self.admissible, self.grid)
+    def error_bound(self, information: Array, w: ArrayLike) -> Array:
+        """r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
+        return self.alpha * largest_singular(self.plant_rows(w) @ inverse_factor(information).T)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelError(OnModelError):
+    """The requirement to first order."""
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
-        """(n, 2, k): V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T."""
-        return (
-            real_rows(self.experiment.plant_gradient(w)) * (self.alpha / self.admissible.at(w))[:, None, None]
-        )
+        """(n, q, k): V(w)^T = (alpha / r_adm) T, so that the requirement reads M >= V V^T."""
+        return self.plant_rows(w) * (self.alpha / self.admissible.at(w))[:, None, None]
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """r_u / r_adm."""
-        return row_norms(half)
-
-    def error_bound(self, information: Array, w: ArrayLike) -> Array:
-        """r_u (n,) at frequencies `w`, inside or outside the band."""
-        return error_bound(self.experiment, information, self.alpha, w)
+        return largest_singular(half)
 
     def cut(self, frequency: float | None) -> MatrixCut:
         """M >= R_adm at this frequency."""
@@ -64,12 +71,10 @@ class ModelError(OverFrequency):
         return MatrixCut(rows.T @ rows, frequency)
 
 
-def check_positive(
-    admissible: AdmissibleError, grid: Array, *, unit: float = 1.0, named: str = "rad/sample"
-) -> None:
+def check_positive(admissible: AdmissibleError, grid: Array, *, unit: float, named: str) -> None:
     """Raise `SpecError` (`admissible-not-positive`) unless r_adm > 0 between the ends of the `grid`.
 
-    The diagnostic tells the frequency divided by `unit`, in the unit `named`.
+    The message tells the frequency divided by `unit`, in the unit `named`.
     """
     w, negative = local_maxima(lambda w: -admissible.at(w), grid, -admissible.at(grid))
     scale = np.median(np.abs(admissible.at(grid)))
@@ -83,22 +88,3 @@ def check_positive(
             "(a relative bound vanishes where G does; a sensitivity bound where |W S| already reaches 1)",
             key="accuracy.model_error",
         )
-
-
-def error_bound(experiment: Experiment, information: Array, alpha: float, w: ArrayLike) -> Array:
-    """r_u (n,) at frequencies `w`: the radius of the confidence ellipse of G, to first order."""
-    rows = real_rows(experiment.plant_gradient(w))
-    return alpha * row_norms(rows @ inverse_factor(information).T)
-
-
-def real_rows(gradient: ComplexArray) -> NDArray[np.float64]:
-    """(n, k) complex -> (n, 2, k): real and imaginary parts."""
-    return np.stack([gradient.real, gradient.imag], axis=1)
-
-
-def row_norms(half: NDArray[np.float64]) -> Array:
-    """Largest singular values (n,) of (n, 2, k), by the closed form for two rows."""
-    real, imaginary = half[:, 0], half[:, 1]
-    a, d = np.einsum("ni,ni->n", real, real), np.einsum("ni,ni->n", imaginary, imaginary)
-    b = np.einsum("ni,ni->n", real, imaginary)
-    return np.sqrt(0.5 * (a + d) + np.hypot(0.5 * (a - d), b))

@@ -2,67 +2,80 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.accuracy.requirement import Requirement, Violation, inverse_factor, worst
+from inputdesign_cli.accuracy.requirement import Entry, Requirement, Violation, inverse_factor, worst
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import graded_grid, local_maxima, logarithmic_distance
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots
+from inputdesign_cli.plant import Model, graded_grid, local_maxima
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
 _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
+_TINY = np.finfo(float).tiny
 
 
-def worst_violation(requirement: Requirement, information: Array) -> Violation:
-    """The largest of the violations, for reports: one beside frequency zero is told to be there.
-
-    Args:
-        information: M (k, k) in the coordinates of the experiment.
-    """
-    found = worst(requirement.violations(information))
-    if found.frequency is None or not isinstance(requirement, OverFrequency):
-        return found
-    lo, hi = requirement.band
-    if lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
-        return found
-    at_zero = float(requirement.ratios(information, np.zeros(1))[0])
-    return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _ROUNDING) else found
-
-
-class OverFrequency:
+@dataclass(frozen=True, kw_only=True)
+class OverFrequency(Requirement):
     """A requirement whose ratio at w depends on M through T(w) M^-1 T(w)^T, T = `rows` (q, k).
 
+    It is about one `entry` of G, or about all of them together; `band` is in the unit of the experiment.
     Subclasses give `rows` and `measure`, and the points of the frequency plane near which they change
     fast (`own_singularities`) or have a kink (`knots`).
     """
 
     experiment: Experiment
     band: tuple[float, float]
-    knots: Array = np.zeros(0)
+    entry: Entry | None = None
 
     @property
+    def of_the_norm(self) -> bool:
+        return self.entry is None and self.experiment.model.outputs * self.experiment.model.inputs > 1
+
+    @property
+    @abstractmethod
     def own_singularities(self) -> ComplexArray:
         """Beyond those of the plant and its loop."""
-        return np.zeros(0, dtype=complex)
 
+    @property
+    def knots(self) -> Array:
+        """Frequencies at which the ratio may have a kink."""
+        return np.zeros(0)
+
+    @abstractmethod
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, q, k): T(w)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """The ratio (n,) from half = T K^T (n, q, k), K^T K = M^-1."""
-        raise NotImplementedError
+
+    def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
+        """Real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k)."""
+        gradient = self.experiment.plant_gradient(w)
+        if self.entry is not None:
+            return real_rows(gradient[:, :, self.entry[0], self.entry[1]])
+        flat = np.moveaxis(gradient.reshape(*gradient.shape[:2], -1), 1, 2)
+        return np.concatenate([flat.real, flat.imag], axis=1)
+
+    def nominal_size(self, w: ArrayLike) -> Array:
+        """|G| (n,) of the entry, or the Frobenius norm."""
+        G = self.experiment.model.plant_at(w)
+        if self.entry is not None:
+            return np.abs(G[:, self.entry[0], self.entry[1]])
+        return np.linalg.norm(G, axis=(1, 2))
 
     @cached_property
     def grid(self) -> Array:
-        """Frequencies that see every resonance of G, of the requirement and of the loop."""
+        """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
         model = self.experiment.model
-        plant = logarithmic_distance(join_roots([model.poles, model.zeros]))
-        singular = np.concatenate([plant, self.experiment.singularities, self.own_singularities])
-        return graded_grid(singular, *self.band, knots=self.knots)
+        plant = model.singularities if self.entry is None else model.entry_singularities(*self.entry)
+        near = np.concatenate([plant, self.experiment.singularities, self.own_singularities])
+        return graded_grid(near, *self.band, knots=self.knots)
 
     @cached_property
     def _grid_rows(self) -> NDArray[np.float64]:
@@ -80,3 +93,33 @@ class OverFrequency:
             lambda w: self.measure(self.rows(w) @ turn, w), self.grid, on_grid, above=above
         )
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
+
+    def worst(self, information: Array) -> Violation:
+        """The largest of the violations; one beside frequency zero is told to be there."""
+        found = worst(self.violations(information))
+        lo, hi = self.band
+        if found.frequency is None or lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
+            return found
+        at_zero = float(self.ratios(information, np.zeros(1))[0])
+        return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _ROUNDING) else found
+
+
+def real_rows(gradient: ComplexArray) -> NDArray[np.float64]:
+    """(n, k) complex -> (n, 2, k): real and imaginary parts."""
+    return np.stack([gradient.real, gradient.imag], axis=1)
+
+
+def largest_singular(half: NDArray[np.float64]) -> Array:
+    """Largest singular values (n,) of (n, q, k): by the closed form for two rows, else by the Gram matrix."""
+    if half.shape[1] != 2:
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(half @ half.swapaxes(1, 2))[:, -1], 0.0))
+    real, imaginary = half[:, 0], half[:, 1]
+    a, d = np.einsum("ni,ni->n", real, real), np.einsum("ni,ni->n", imaginary, imaginary)
+    b = np.einsum("ni,ni->n", real, imaginary)
+    return np.sqrt(0.5 * (a + d) + np.hypot(0.5 * (a - d), b))
+
+
+def active_entries(model: Model, highest: float) -> list[Entry]:
+    """The entries of G that are not zero, probed below the frequency `highest`."""
+    probe = np.abs(model.plant_at(np.array([0.12, 0.39]) * highest)).max(axis=0)
+    return [(i, j) for i in range(model.outputs) for j in range(model.inputs) if probe[i, j] > 0.0]

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from inputdesign_cli.accuracy.cuts import Cut
 from inputdesign_cli.plant.polynomial import Array
+
+if TYPE_CHECKING:
+    from inputdesign_cli.accuracy.admissible import AdmissibleError
+
+Entry = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -19,37 +26,115 @@ class Violation:
     frequency: float | None = None
 
 
-class Requirement(Protocol):
-    """A convex condition on the information matrix M (k, k) in the coordinates of the experiment.
-
-    Its `ratio` is measured as an error is, in standard deviations: with ratio r, the matrix r^2 M just
-    meets the requirement (and no smaller multiple does).
-    """
+class BoundedError(Protocol):
+    """A model error r_u(w) that is held below an admissible one; see `Requirement.bounded_error`."""
 
     @property
-    def name(self) -> str:
-        """How the spec calls it, for reports."""
+    def entry(self) -> Entry | None:
+        """The entry (output, input) of G that it is about, from zero; None for the norm of all."""
+        ...
+
+    @property
+    def band(self) -> tuple[float, float]: ...
+
+    @property
+    def grid(self) -> Array: ...
+
+    @property
+    def admissible(self) -> AdmissibleError: ...
+
+    def error_bound(self, information: Array, w: ArrayLike) -> Array:
+        """r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
+        ...
+
+    def nominal_size(self, w: ArrayLike) -> Array:
+        """|G| (n,) of the entry, or the Frobenius norm."""
         ...
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
-        """Every local maximum over frequency of the ratio that must not exceed one, if above `above`."""
+        """As `Requirement.violations`."""
         ...
 
+
+class Level(Protocol):
+    """A criterion as a level that must reach one; see `Requirement.criterion`."""
+
+    @property
+    def letter(self) -> Literal["D", "A", "E", "T"]: ...
+
+    @property
+    def scaling(self) -> Array: ...
+
+    def level(self, information: Array) -> float:
+        """The quantity that must reach one."""
+        ...
+
+    def value(self, level: float) -> float:
+        """What a level stands for: log det M, -tr M^-1, lambda_min(M) or tr M."""
+        ...
+
+
+class Requirement(ABC):
+    """A convex condition on the information matrix M (k, k) in the coordinates of the experiment.
+
+    Its `ratio` is measured as an error is, in standard deviations: with ratio r, the matrix r^2 M just
+    meets the requirement (and no smaller multiple does). A new requirement is one file with a subclass that
+    answers `name`, `violations`, `ratios` and `cut`; the rest has answers that fit most.
+    """
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """How the spec calls it, for reports."""
+
+    @property
+    def entry(self) -> Entry | None:
+        """The entry (output, input) of G that it is about, from zero; None for G as a whole."""
+        return None
+
+    @property
+    def of_the_norm(self) -> bool:
+        """Whether it is about the Frobenius norm of all entries of G."""
+        return False
+
+    @property
+    def definite(self) -> bool:
+        """Whether it is out of the question that M is singular."""
+        return True
+
+    @property
+    def bounded_error(self) -> BoundedError | None:
+        """The requirement itself where it bounds a model error over frequency: what bound.csv shows."""
+        return None
+
+    @property
+    def criterion(self) -> Level | None:
+        """The requirement itself where it stands for a criterion to be maximised."""
+        return None
+
+    @abstractmethod
+    def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
+        """Every local maximum over frequency of the ratio that must not exceed one, if above `above`."""
+
+    @abstractmethod
     def ratios(self, information: Array, frequencies: Array) -> Array:
         """The ratio at given frequencies (n,): (n,)."""
-        ...
 
+    @abstractmethod
     def cut(self, frequency: float | None) -> Cut:
         """The cone that enforces the requirement at this frequency."""
-        ...
+
+    def worst(self, information: Array) -> Violation:
+        """The largest of the violations, for reports."""
+        return worst(self.violations(information))
 
 
-class OneCondition:
-    """The part of a requirement without a frequency: its single ratio stands for all."""
+class OneCondition(Requirement):
+    """A requirement without a frequency: its single ratio stands for all."""
 
+    @abstractmethod
     def ratio(self, information: Array) -> float:
         """The ratio, see `Requirement`."""
-        raise NotImplementedError
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """The one ratio, if above `above`."""

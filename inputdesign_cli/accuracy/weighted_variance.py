@@ -1,8 +1,7 @@
 """A weighted variance over frequency: |W|^2 Lambda^* P Lambda <= max at every frequency of a band.
 
-Lambda (k,) is the gradient of G, so that Lambda^* P Lambda is the variance of the complex frequency
-response, to first order (the weighted trace and variance bounds of Jansson and Hjalmarsson, IEEE
-Trans. Automat. Contr. 50 (2005) 1534-1549).
+Lambda (k,) is the gradient of one entry of G, so that Lambda^* P Lambda is the variance of the complex
+frequency response, to first order: the variance bounds of [jansson-hjalmarsson-2005].
 """
 
 from __future__ import annotations
@@ -13,40 +12,38 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.cuts import Cut, MatrixCut, VarianceCut
-from inputdesign_cli.accuracy.model_error import real_rows
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Rational, logarithmic_distance
-from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots
+from inputdesign_cli.plant import ScalarTransfer
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _REAL = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WeightedVariance(OverFrequency):
-    """The requirement for one plant (SISO); `band` in rad/sample.
+    """The requirement for one entry of G.
 
     With `relative` the variance is that of G relative to the nominal G, |W / G|^2 Lambda^* P Lambda.
     """
 
-    experiment: Experiment
-    weight: Rational
+    weight: ScalarTransfer
     limit: float
-    band: tuple[float, float] = (0.0, np.pi)
     relative: bool = False
 
-    name = "weighted_variance"
+    @property
+    def name(self) -> str:
+        return "weighted_variance"
 
     @property
     def own_singularities(self) -> ComplexArray:
-        return logarithmic_distance(join_roots([self.weight.poles, self.weight.zeros]))
+        return self.weight.singularities
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """(n, 2, k): |W| / sqrt(max) times the real and imaginary parts of Lambda."""
         size = np.abs(self.weight.at(w)) / np.sqrt(self.limit)
         if self.relative:
-            size = size / np.abs(self.experiment.model.plant_at(w))
-        return real_rows(self.experiment.plant_gradient(w)) * size[:, None, None]
+            size = size / self.nominal_size(w)
+        return self.plant_rows(w) * size[:, None, None]
 
     def measure(self, half: NDArray[np.float64], w: Array) -> Array:
         """The weighted standard deviation over its limit."""

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import typer
 
-import inputdesign_cli
 from inputdesign_cli.cli.options import DataFile, Figures, Json, Means, Output, Overrides, Quiet, SpecFile
-from inputdesign_cli.cli.run import show
+from inputdesign_cli.cli.run import keep
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED
 
@@ -30,14 +29,11 @@ def assess(
     meets it: its signal is ready to apply.
     """
     with status(f"{data}: computing ...", quiet=quiet):
-        known = inputdesign_cli.load_spec(spec, overrides or [])
-        assessment = inputdesign_cli.assess(known, data, remove_means=remove_means)
-    with status(f"{data}: writing ...", quiet=quiet):
-        from inputdesign_cli.figures.plots import draw_all
-        from inputdesign_cli.runs.run_directory import write_run
+        from inputdesign_cli.specification import load_spec
+        from inputdesign_cli.tasks import assess as assessed
 
-        directory = output or Path("runs") / f"{data.stem}_assessed"
-        files = write_run(assessment.outcome, directory, draw_all(assessment.outcome) if figures else {})
-    show(assessment.outcome, files, json_output=json_output, quiet=quiet)
+        assessment = assessed(load_spec(spec, overrides or []), data, remove_means=remove_means)
+    directory = output or Path("runs") / f"{data.stem}_assessed"
+    keep(assessment.outcome, directory, figures=figures, json_output=json_output, quiet=quiet)
     if not assessment.met:
         raise typer.Exit(EXIT_MISSED)

@@ -35,7 +35,9 @@ def check(
     Runs the specs that the golden files name. Prints computed and expected values with their deviation,
     tolerance and source; exits with 1 if a value lies outside its tolerance.
     """
-    from inputdesign_cli.runs.golden import compare, execute, load_golden
+    from inputdesign_cli.runs.golden import compare
+    from inputdesign_cli.runs.golden_file import load_golden
+    from inputdesign_cli.sweep.golden_runs import execute
 
     rows: list[Row] = []
     for golden in [load_golden(path) for path in files or _default_files()]:
@@ -75,12 +77,14 @@ def _default_files() -> list[Path]:
 
 def table(rows: Sequence[Row]) -> str:
     """The comparison as aligned text; where a number is missing, the reason follows its line."""
-    cells = [HEADER]
+    from rich.text import Text
+
+    cells: list[tuple[str | Text, ...]] = [tuple(Text(name, "bold") for name in HEADER)]
     for row in rows:
         quantity = row.quantity
         cells.append(
             (
-                "ok" if row.passed else "FAILS",
+                Text("ok", "green") if row.passed else Text("FAILS", "bold red"),
                 f"{row.golden}: {row.run}",
                 quantity.name,
                 "-" if row.computed is None else f"{row.computed:.8g}",

@@ -8,9 +8,10 @@ from typing import Any
 
 def error_codes(incomplete: str) -> list[tuple[str, str]]:
     """The codes that `idesign explain` knows, with their titles."""
-    from inputdesign_cli.error_codes import CODES
+    from inputdesign_cli.error_codes import explanations
 
-    return [(code, known.title) for code, known in sorted(CODES.items()) if code.startswith(incomplete)]
+    known = sorted(explanations().items())
+    return [(code, entry.title) for code, entry in known if code.startswith(incomplete)]
 
 
 def spec_keys(incomplete: str) -> list[str]:

@@ -24,9 +24,10 @@ def explain(
 
     Says what it means and what to do about it.
     """
-    from inputdesign_cli.error_codes import CODES, explanation
+    from inputdesign_cli.error_codes import explanation, explanations
 
     if code is None:
-        typer.echo("\n".join(aligned([(name, known.title) for name, known in sorted(CODES.items())])))
+        known = sorted(explanations().items())
+        typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
     else:
         typer.echo(explanation(code))

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-import inputdesign_cli
 from inputdesign_cli.cli.options import DataFile, Figures, Json, Means, Output, Overrides, Quiet
-from inputdesign_cli.cli.run import show
+from inputdesign_cli.cli.run import keep
 from inputdesign_cli.cli.terminal import status
 
 
@@ -33,12 +32,9 @@ def identify(
     closed loop the direct method is used, from u and y alone.
     """
     with status(f"{data}: computing ...", quiet=quiet):
-        known = inputdesign_cli.load_spec(spec, overrides or [])
-        outcome = inputdesign_cli.identify(known, data, remove_means=remove_means)
-    with status(f"{data}: writing ...", quiet=quiet):
-        from inputdesign_cli.figures.plots import draw_all
-        from inputdesign_cli.runs.run_directory import write_run
+        from inputdesign_cli.specification import load_spec
+        from inputdesign_cli.tasks import identify as identified
 
-        directory = output or Path("runs") / f"{data.stem}_identified"
-        files = write_run(outcome, directory, draw_all(outcome) if figures else {})
-    show(outcome, files, json_output=json_output, quiet=quiet)
+        results = identified(load_spec(spec, overrides or []), data, remove_means=remove_means)
+    directory = output or Path("runs") / f"{data.stem}_identified"
+    keep(results, directory, figures=figures, json_output=json_output, quiet=quiet)

@@ -4,49 +4,49 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import Any
+from datetime import timedelta
+from typing import TYPE_CHECKING
 
-from inputdesign_cli.cli.terminal import CLEAR_LINE
-
-_WIDTH = 24
-_EVERY = 0.1  # seconds
+if TYPE_CHECKING:
+    from inputdesign_cli.sweep.running import Progress
 
 
 class ProgressLine:
     """Shows progress on stderr, if anybody is looking; call it with each `Progress`, and `close` it."""
 
     def __init__(self, *, quiet: bool) -> None:
-        self.shown = sys.stderr.isatty() and not quiet
-        self.started = time.monotonic()
-        self.next = 0.0
+        self._started = time.monotonic()
+        self._bar = None
+        if sys.stderr.isatty() and not quiet:
+            from rich import progress
+            from rich.console import Console
 
-    def __call__(self, progress: Any) -> None:
-        """Draw the line anew, ten times a second at most."""
-        now = time.monotonic()
-        if self.shown and (now >= self.next or progress.passed == progress.total):
-            self.next = now + _EVERY
-            line = progress_text(progress, now - self.started)
-            print(f"{CLEAR_LINE}{line}", end="", file=sys.stderr, flush=True)
+            columns = (progress.BarColumn(24), progress.MofNCompleteColumn(), "{task.description}")
+            self._bar = progress.Progress(*columns, console=Console(stderr=True), transient=True)
+            self._task = self._bar.add_task("", total=None)
+            self._bar.start()
+            # A sweep may be killed at any moment, and nobody would bring a hidden cursor back.
+            self._bar.console.show_cursor(True)
+
+    def __call__(self, progress: Progress) -> None:
+        """Tell how far the sweep is."""
+        if self._bar is not None:
+            told = pace(progress, time.monotonic() - self._started)
+            self._bar.update(self._task, completed=progress.passed, total=progress.total, description=told)
 
     def close(self) -> None:
         """Clear the line."""
-        if self.shown:
-            print(CLEAR_LINE, end="", file=sys.stderr, flush=True)
+        if self._bar is not None:
+            self._bar.stop()
 
 
-def progress_text(progress: Any, seconds: float) -> str:
-    """The line: a bar, the count, the rate and the time left. Points done before do not count as speed."""
-    filled = _WIDTH * progress.passed // max(progress.total, 1)
-    text = f"[{'#' * filled}{'.' * (_WIDTH - filled)}] {progress.passed}/{progress.total}"
+def pace(progress: Progress, seconds: float) -> str:
+    """The rate, the time left and the failures. Points done before do not count as speed."""
+    told = []
     if progress.computed and seconds > 0:
         rate = progress.computed / seconds
-        left = (progress.total - progress.passed) / rate
-        text += f"  {rate:.3g} points/s  {duration(left)} left"
-    return text + (f"  {progress.failed} without a result" if progress.failed else "")
-
-
-def duration(seconds: float) -> str:
-    """Hours, minutes and seconds."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+        left = timedelta(seconds=round((progress.total - progress.passed) / rate))
+        told.append(f"{rate:.3g} points/s  {left} left")
+    if progress.failed:
+        told.append(f"{progress.failed} without a result")
+    return "  ".join(told)

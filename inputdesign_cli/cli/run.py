@@ -1,22 +1,22 @@
-"""What `solve`, `analyse` and `simulate` have in common: spec in, run directory and summary out."""
+"""What commands that make a run have in common: spec in, run directory and summary out."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import typer
 
-import inputdesign_cli
 from inputdesign_cli.cli.terminal import status
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.runs.results import Results
+    from inputdesign_cli.sweep.verbs import Verb
 
 
 def produce(
-    verb: Literal["solve", "analyse", "simulate"],
+    verb: Verb,
     spec_file: Path,
     overrides: list[str] | None,
     output: Path | None,
@@ -26,28 +26,30 @@ def produce(
     quiet: bool,
     executor: Executor | None = None,
 ) -> None:
-    """Run a verb of the package on a spec file, write the run, and print it or its summary.
-
-    Only `simulate` takes an executor.
-    """
-    where: dict[str, Any] = {} if executor is None else {"executor": executor}
+    """Run a verb on a spec file, write the run, and print it or its summary."""
     with status(f"{spec_file}: computing ...", quiet=quiet):
-        spec = inputdesign_cli.load_spec(spec_file, overrides or [])
-        outcome = getattr(inputdesign_cli, verb)(spec, **where)
-    with status(f"{spec_file}: writing ...", quiet=quiet):
-        from inputdesign_cli.figures.plots import draw_all
+        from inputdesign_cli.specification import load_spec
+        from inputdesign_cli.sweep.verbs import run_verb
+
+        results = run_verb(verb, load_spec(spec_file, overrides or []), executor)
+    directory = output or Path("runs") / spec_file.stem
+    keep(results, directory, figures=figures, json_output=json_output, quiet=quiet)
+
+
+def keep(results: Results, directory: Path, *, figures: bool, json_output: bool, quiet: bool) -> None:
+    """Write a run, with or without its figures, and print its result or its summary."""
+    with status(f"{directory}: writing ...", quiet=quiet):
         from inputdesign_cli.runs.run_directory import write_run
 
-        directory = output or Path("runs") / spec_file.stem
-        files = write_run(outcome, directory, draw_all(outcome) if figures else {})
-    show(outcome, files, json_output=json_output, quiet=quiet)
+        drawings = {}
+        if figures:
+            from inputdesign_cli.figures.plots import draw_all
 
-
-def show(outcome: Results, files: list[Path], *, json_output: bool, quiet: bool) -> None:
-    """Print the result, or its summary."""
+            drawings = draw_all(results)
+        files = write_run(results, directory, drawings)
     if json_output:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         from inputdesign_cli.cli.summary import summary
 
-        typer.echo(summary(outcome.result, outcome.time_unit, files))
+        typer.echo(summary(results.result, results.time_unit, files))

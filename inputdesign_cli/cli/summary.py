@@ -2,34 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from inputdesign_cli.cli.terminal import aligned
+from inputdesign_cli.runs.objectives import OBJECTIVES, objective
+from inputdesign_cli.runs.results import Json, Result
 
-Result = Mapping[str, Any]
-
-ASKED = {
-    "least_cost": "the cheapest experiment that meets the accuracy",
-    "shortest_experiment": "the shortest experiment that meets the accuracy",
-    "accuracy_factor": "the smallest multiple of the admissible error that the limits allow",
-    "D": "the most information within the limits: log det M",
-    "A": "the most information within the limits: -trace of M^-1",
-    "E": "the most information within the limits: smallest eigenvalue of M",
-    "T": "the most information within the limits: trace of M",
-    "closed_loop_error": "the least error of the loop with the controller designed on the model",
-    "mean_squared_error": "the least mean squared error",
-}
-QUANTITY = {
-    "least_cost": "cost",
-    "shortest_experiment": "samples",
-    "accuracy_factor": "factor",
-    "mean_squared_error": "error",
-}
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
-# Criteria are maximised: their bounds are from above.
-_MAXIMISED = ("D", "A", "E", "T")
 
 
 def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
@@ -52,7 +32,7 @@ def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
         ("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}"),
     ]
     title = result.get("title")
-    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap="   ")])
+    return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])
 
 
 def _identified(result: Result) -> list[tuple[str, str]]:
@@ -70,14 +50,14 @@ def _identified(result: Result) -> list[tuple[str, str]]:
     return lines
 
 
-def _variance(value: Any) -> str:
+def _variance(value: Json) -> str:
     """A variance, or a covariance matrix row by row."""
     if not isinstance(value, list):
         return f"variance {value:.5g}"
     return f"covariance [{'; '.join(_numbers(row) for row in value)}]"
 
 
-def _explained(value: Any) -> str:
+def _explained(value: Json) -> str:
     """The fit of the output, or of each output; a dash where the model cannot be simulated."""
     if not isinstance(value, list):
         return f"{value:.1f} % of the output"
@@ -104,19 +84,19 @@ def _assessed(result: Result, time_unit: str) -> list[tuple[str, str]]:
 
 
 def _objective(result: Result) -> list[tuple[str, str]]:
-    objective = result.get("objective", {})
-    kind = objective.get("kind")
-    lines = [("asked", ASKED[kind])] if kind in ASKED else []
+    found = result.get("objective", {})
+    kind = found.get("kind")
+    lines = [("asked", objective(kind).asked)] if kind in OBJECTIVES else []
     if result.get("status") in GIVEN and "identification" not in result:
         lines = [("asked", f"what the given excitation buys{GIVEN[result['status']]}")]
-    value = objective.get("value")
+    value = found.get("value")
     if value is not None:
         saving = _saving(result) if kind in ("least_cost", "closed_loop_error") else _white_value(result)
-        name = "energy" if "moments" in result and kind == "least_cost" else QUANTITY.get(kind, "value")
+        name = "energy" if "moments" in result and kind == "least_cost" else objective(kind).quantity
         lines.append((name, f"{_clean(value)}{saving}"))
     if kind != "least_cost" and "cost" in result:
         lines.append(("energy" if "moments" in result else "cost", f"{result['cost']:.7g}"))
-    lines += _proofs(result, objective)
+    lines += _proofs(result, found)
     powers = [f"{name} {_numbers(power)}" for name, power in result.get("power", {}).items()]
     if powers:
         lines.append(("power", ", ".join(powers)))
@@ -152,19 +132,19 @@ def _limits(result: Result) -> list[tuple[str, str]]:
     return [("limits", f"{', '.join(dict.fromkeys(binding))} exhausted")] if binding else []
 
 
-def _proofs(result: Result, objective: Result) -> list[tuple[str, str]]:
+def _proofs(result: Result, found: Result) -> list[tuple[str, str]]:
     lines = []
     for key, side in (("lower_bound", "below"), ("upper_bound", "above")):
-        if key in objective:
+        if key in found:
             kind = result.get("spectrum", {}).get("type", "such")
             family = f"no {kind} spectrum gets"
             if "moments" in result:
                 family = f"no {result['moments']['structure']} moments get"
-            gap = f", gap {objective['relative_gap']:.1e}" if "relative_gap" in objective else ""
-            lines.append(("proved", f"{family} {side} {objective[key]:.7g}{gap}"))
-    if "any_spectrum_bound" in objective:
-        side = "above" if objective.get("kind") in _MAXIMISED else "below"
-        text = f"no spectrum at all gets {side} {objective['any_spectrum_bound']:.7g}"
+            gap = f", gap {found['relative_gap']:.1e}" if "relative_gap" in found else ""
+            lines.append(("proved", f"{family} {side} {found[key]:.7g}{gap}"))
+    if "any_spectrum_bound" in found:
+        side = "above" if objective(found.get("kind")).maximised else "below"
+        text = f"no spectrum at all gets {side} {found['any_spectrum_bound']:.7g}"
         lines.append(("" if lines else "proved", text))
     return lines
 
@@ -272,6 +252,6 @@ def _within(entry: Result) -> str:
     return ", ".join([*parts, f"cost {entry['cost']:.4g}"])
 
 
-def _numbers(values: Any) -> str:
+def _numbers(values: Json) -> str:
     listed = values if isinstance(values, list | tuple) else [values]
     return " ".join(f"{value:.4g}" for value in listed)

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
-from typing import Any, TextIO
+from io import StringIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
 from inputdesign_cli.errors import EXIT_INTERRUPTED, IdesignError
 
+if TYPE_CHECKING:
+    from rich.text import Text
+
 EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
 EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
-CLEAR_LINE = "\r\x1b[K"
+_ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -70,29 +75,50 @@ def _run(command: Callable[..., None], *args: Any, **kwargs: Any) -> None:
 
 def colourful(stream: TextIO) -> bool:
     """Whether colours may go to `stream`: a terminal, and the user has not set NO_COLOR."""
-    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    from rich.console import Console
+
+    console = Console(file=stream)
+    return console.color_system is not None and not console.no_color
 
 
 @contextmanager
 def status(text: str, *, quiet: bool) -> Iterator[None]:
     """Show `text` on stderr while the block runs, if anybody is looking."""
-    shown = sys.stderr.isatty() and not quiet
-    if shown:
-        print(text, end="", file=sys.stderr, flush=True)
-    try:
+    if quiet or not sys.stderr.isatty():
         yield
-    finally:
-        if shown:
-            print(CLEAR_LINE, end="", file=sys.stderr, flush=True)
+        return
+    from rich.console import Console
+    from rich.text import Text
+
+    with Console(stderr=True).status(Text(text)):
+        yield
 
 
-def aligned(rows: Sequence[Sequence[str]], *, right: Sequence[int] = (), gap: str = "  ") -> list[str]:
-    """`rows` as lines with aligned columns; the columns numbered in `right` are flush right."""
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-    return [
-        gap.join(
-            cell.rjust(width) if i in right else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+def aligned(
+    rows: Sequence[Sequence[str | Text]], *, right: Container[int] = (), gap: int = 2, wrap: bool = False
+) -> list[str]:
+    """`rows` as lines with aligned columns, plain and each on one line unless they go to a terminal.
+
+    Args:
+        rows: the cells; styled ones have their colours on a terminal that may show them.
+        right: the columns that are flush right.
+        gap: spaces between columns.
+        wrap: break the last column at the width of a terminal.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    colours = colourful(sys.stdout)
+    width = shutil.get_terminal_size().columns if wrap and sys.stdout.isatty() else _ENDLESS
+    grid = Table.grid(padding=(0, gap, 0, 0))
+    for column in range(len(rows[0])):
+        last = column == len(rows[0]) - 1
+        grid.add_column(justify="right" if column in right else "left", no_wrap=not last)
+    for row in rows:
+        grid.add_row(*row)
+    page = Console(
+        file=StringIO(), width=width, markup=False, emoji=False, highlight=False, force_terminal=colours
+    )
+    with page.capture() as captured:
+        page.print(grid)
+    return [line.rstrip() for line in captured.get().splitlines()]

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-import inputdesign_cli
 from inputdesign_cli.cli.options import Json, Overrides, Quiet
 from inputdesign_cli.errors import IdesignError
 
@@ -23,10 +22,13 @@ def validate(
 
     A valid spec can be read and is well posed. All problems of all files are reported at once.
     """
+    from inputdesign_cli.specification import load_spec
+    from inputdesign_cli.tasks import validate as check
+
     errors: list[IdesignError] = []
     for path in specs:
         try:
-            inputdesign_cli.validate(inputdesign_cli.load_spec(path, overrides or []))
+            check(load_spec(path, overrides or []))
         except IdesignError as error:
             errors.append(error)
         else:

@@ -25,32 +25,16 @@ from inputdesign_cli.figures.sweep_axes import (
 )
 from inputdesign_cli.figures.sweep_moments import draw_moments, moment_entries
 from inputdesign_cli.figures.sweep_table import SweepTable
+from inputdesign_cli.runs.objectives import OBJECTIVES, objective
 from inputdesign_cli.runs.results import Array
 
 # What is drawn, if the results have it: the first of these.
 QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
-# What no design whatever does better, and what white excitation comes to, in the terms of each objective.
+# What no design whatever does better.
 BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structure_bound": "any moments"}
-_WHITE = {
-    "least_cost": "baseline.white.cost",
-    "shortest_experiment": "baseline.white.samples",
-    "mean_squared_error": "baseline.white.mean_squared_error",
-}
-_WHITE_OTHERWISE = "baseline.white.value"
 MOST_CURVES = len(PALETTE)
 MOST_LABELLED = 100  # cells of a map that carry their number
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
-_KINDS = {
-    "least_cost": "cost",
-    "shortest_experiment": "samples",
-    "accuracy_factor": "factor on the admissible error",
-    "closed_loop_error": "error of the loop",
-    "mean_squared_error": "mean squared error",
-    "D": "log det $M$",
-    "A": "-trace $M^{-1}$",
-    "E": "smallest eigenvalue of $M$",
-    "T": "trace $M$",
-}
 
 
 def draw_sweep(table: SweepTable, root: Path) -> list[Path]:
@@ -97,7 +81,8 @@ def _kind(table: SweepTable) -> str:
 
 
 def _label(table: SweepTable, quantity: str) -> str:
-    return _KINDS.get(_kind(table), quantity) if quantity == "objective.value" else quantity
+    kind = _kind(table)
+    return OBJECTIVES[kind].axis if quantity == "objective.value" and kind in OBJECTIVES else quantity
 
 
 def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, page: Figure) -> None:
@@ -122,7 +107,7 @@ def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | Non
         side = "ceiling" if _maximised(table) else "floor"
         label = f"{side}: {whatever}"
         handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
-    white = table.numbers(_WHITE.get(_kind(table), _WHITE_OTHERWISE))
+    white = table.numbers(f"baseline.white.{objective(_kind(table)).white}")
     if quantity == "objective.value" and not across and white is not None:
         handles += curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
         shown.append(white)

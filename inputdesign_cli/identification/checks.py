@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.information.coordinates import taking_part
 from inputdesign_cli.plant.polynomial import Array
 
 # Below this share of the largest eigenvalue (parameters scaled) a direction is not excited.
@@ -41,10 +42,11 @@ def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1
 
 
 def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
-    """No channel of u (samples, r) and y (samples, p) keeps one value throughout.
+    """No channel keeps one value throughout.
 
     Args:
         names: of the parameters, for the diagnostic.
+        u, y: (samples, r), (samples, p).
 
     Raises:
         SpecError: `constant-input`, `constant-output`.
@@ -114,12 +116,11 @@ def covariance_of(names: Sequence[str], information: Array) -> Array:
     """
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] <= _FAINT * values[-1]:
-        weak = np.abs(vectors[:, 0])
-        listed = [n for n, v in zip(names, weak, strict=True) if v > 0.05 * weak.max()]
+    faint = values <= _FAINT * values[-1]
+    if faint.any():
         raise bad_spec(
             "not-exciting",
-            f"the data cannot tell these parameters apart: {', '.join(listed)}",
+            f"the data cannot tell these parameters apart: {taking_part(names, vectors[:, faint])}",
             hint="the input is too simple (too few sinusoids, a short step), or the orders are too high",
             key="u",
         )

@@ -1,120 +1,108 @@
-"""One record -> one model: theta with its covariance, the noise variance, and how far to trust them."""
+"""Estimates of a model, whatever its kind, and how far to trust them: of one record, and of many."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
-from inputdesign_cli.identification.checks import (
-    check_length,
-    check_noisy,
-    check_varying,
-    covariance_of,
-    fit_percent,
-)
-from inputdesign_cli.identification.predictor import prediction_errors
-from inputdesign_cli.identification.problem import PredictionErrors
-from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlation, whiteness
-from inputdesign_cli.identification.search import best_run, minimise
-from inputdesign_cli.identification.starts import starting_points
-from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.identification.checks import covariance_of
+from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
 from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A prediction-error estimate.
+    """A prediction-error estimate of a model with p outputs, r inputs and k parameters.
 
     Attributes:
-        theta, names: (k,).
+        names, theta: (k,).
         covariance, information: (k, k) of theta; they are inverse to each other.
-        variance: of e.
-        errors: (samples,) prediction errors at theta.
+        noise: (p, p) covariance of e; of white noise on the samples where the model knows no other.
+        errors: (samples, p) prediction errors at theta.
         converged: whether the search settled; `steps` that it took, from the best of `starts`.
-        fit: per cent of the rms of y (its mean taken off) that the model's simulation explains; None where
-            the plant is unstable and cannot be simulated.
-        whiteness, independence: of the residuals, and of residuals and past inputs.
+        fit: output by output, per cent of the rms of y (its mean taken off) that the model's simulation
+            explains; None where the model is unstable and cannot be simulated.
+        whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
+            their correlations are (lags, p, p) and (lags, p, r).
     """
 
-    structure: Structure
+    names: tuple[str, ...]
     theta: Array
     covariance: Array
     information: Array
-    variance: float
+    noise: Array
     errors: Array
     converged: bool
     steps: int
     starts: int
-    fit: float | None
+    fit: tuple[float | None, ...]
     whiteness: ResidualTest
     independence: ResidualTest
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.structure.names
 
-    @property
-    def model(self) -> PolynomialModel:
-        """The estimate as a model."""
-        return self.structure.model(self.theta, self.variance)
+@dataclass(frozen=True)
+class BatchEstimate:
+    """Prediction-error estimates of many records.
+
+    Attributes:
+        theta: (runs, k).
+        noise: (runs, p, p) covariance of e, unbiased to first order.
+        information: (runs, k, k) sum over the samples of psi noise^-1 psi^T; its inverse is the covariance of
+            theta.
+        converged, steps: (runs,) of the search.
+    """
+
+    theta: Array
+    noise: NDArray[np.float64]
+    information: NDArray[np.float64]
+    converged: NDArray[np.bool_]
+    steps: NDArray[np.int64]
 
 
-def identify(
-    structure: Structure,
-    u: ArrayLike,
-    y: ArrayLike,
+def concluded(
+    names: tuple[str, ...],
+    theta: Array,
+    information: Array,
+    noise: Array,
+    errors: Array,
+    u: Array,
     *,
-    start: ArrayLike | None = None,
-    feedback: bool = False,
+    feedback: bool,
+    in_noise: int,
+    in_plant: int,
+    fit: tuple[float | None, ...],
+    converged: bool,
+    steps: int,
+    starts: int,
 ) -> Estimate:
-    """Prediction-error estimate from one record (samples,); in closed loop the direct method.
+    """The estimate with its covariance and the tests of its residuals.
 
-    Several starts are tried, `start` (k,) among them if given, and the least cost wins. A model without
-    C, D and F (ARX) is linear in its parameters: every start leads to the least-squares solution.
-    With `feedback` the residuals' test of past inputs leaves out u(t), which answers y(t).
+    Args:
+        names, theta: (k,).
+        information: (k, k) sum over the samples of psi(t) noise^-1 psi(t)^T.
+        noise: (p, p) covariance of e.
+        errors, u: (samples, p), (samples, r).
+        feedback: whether u(t) answers y(t).
+        in_noise: number of parameters that make residuals look whiter: those of A, C and D.
+        in_plant: number of parameters that take directions of past inputs away: those of B and F.
+        fit, converged, steps, starts: see `Estimate`.
 
     Raises:
-        SpecError: `too-few-samples`, `constant-input` or `not-exciting`.
+        SpecError: `not-exciting`.
     """
-    u, y = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
-    check_length(y.size, structure.size, structure.row.memory)
-    check_varying(structure.names, u[:, None], y[:, None])
-    record = PredictionErrors.single(structure.row, [u[:, None]], y[:, None])
-    points = starting_points(structure.row, [u], y)
-    if start is not None:
-        points = np.concatenate([np.asarray(start, dtype=float)[None], points])
-    found = minimise(record.repeated(len(points)), points)
-    best = best_run(found)
-    theta = found.theta[best]
-    errors = prediction_errors(structure.row, theta[None], record.u, record.y[0])[:, 0]
-    variance = float(errors @ errors) / (y.size - structure.size)
-    check_noisy(np.array([variance]), y[:, None])
-    information = found.hessian[best] / variance
     return Estimate(
-        structure=structure,
-        theta=theta,
-        covariance=covariance_of(structure.names, information),
+        names=names,
+        theta=np.asarray(theta, dtype=float),
+        covariance=covariance_of(names, information),
         information=information,
-        variance=variance,
+        noise=noise,
         errors=errors,
-        converged=bool(found.converged[best]),
-        steps=int(found.steps[best]),
-        starts=len(points),
-        fit=_fit(structure, theta, u, y),
-        whiteness=whiteness(errors, fitted=structure.a + structure.c + structure.d),
-        independence=cross_correlation(
-            errors, u, fitted=structure.b + 1 - structure.delay + structure.f, feedback=feedback
-        ),
+        converged=converged,
+        steps=steps,
+        starts=starts,
+        fit=fit,
+        whiteness=whiteness(errors, fitted=in_noise),
+        independence=cross_correlations(errors, u, fitted=in_plant, feedback=feedback),
     )
-
-
-def _fit(structure: Structure, theta: Array, u: Array, y: Array) -> float | None:
-    model = structure.model(theta, 1.0)
-    denominator = np.convolve(model.A, model.F)
-    if np.any(np.abs(model.poles) >= 1.0):
-        return None
-    return fit_percent(y, scipy.signal.lfilter(model.B, denominator, u))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.filters import FEW, Stream
-from inputdesign_cli.identification.structure import Polynomials, Row
+from inputdesign_cli.identification.orders import OutputOrders, Polynomials
 from inputdesign_cli.plant.polynomial import Array
 
 _BLOCK = 32
@@ -25,15 +25,19 @@ def block_length(samples: int, runs: int, order: int) -> int:
 
 
 def stream(
-    row: Row, theta: Array, u: Sequence[Array], y: Array, length: int, *, gradient: bool = True
+    row: OutputOrders, theta: Array, u: Sequence[Array], y: Array, length: int, *, gradient: bool = True
 ) -> Iterator[tuple[slice, Array, list[Array]]]:
     """Block by block: which samples, epsilon (n, runs), and k columns of psi (n, runs) each.
 
     The arrays are views that hold until the next block.
 
     Args:
+        row: the orders of the output.
+        theta: (runs, k), of this output alone.
         u: all inputs of the model, (samples, runs) each.
+        y: the output (samples, runs).
         length: samples of a block, see `block_length`.
+        gradient: whether psi is wanted.
     """
     p = row.polynomials(theta)
     samples, runs = y.shape
@@ -58,7 +62,7 @@ def stream(
         yield part, flow.now("errors"), columns
 
 
-def _sources(row: Row, flow: Stream, p: Polynomials) -> None:
+def _sources(row: OutputOrders, flow: Stream, p: Polynomials) -> None:
     """The signals of which the columns of psi are delays; see `Block.source`."""
     for e, entry in enumerate(row.entries):
         flow.divide(f"u/CF{e}", f"u/F{e}", p.C)
@@ -75,7 +79,7 @@ def _sources(row: Row, flow: Stream, p: Polynomials) -> None:
         flow.multiply("d", "v/C", -np.ones((p.C.shape[0], 1)))
 
 
-def prediction_errors(row: Row, theta: Array, u: Sequence[Array], y: Array) -> Array:
+def prediction_errors(row: OutputOrders, theta: Array, u: Sequence[Array], y: Array) -> Array:
     """epsilon (samples, runs) for theta (runs, k)."""
     out = np.empty(y.shape)
     length = block_length(y.shape[0], y.shape[1], row.polynomials(theta).order)
@@ -85,7 +89,7 @@ def prediction_errors(row: Row, theta: Array, u: Sequence[Array], y: Array) -> A
 
 
 def errors_and_gradient(
-    row: Row, theta: Array, u: Sequence[Array], y: Array
+    row: OutputOrders, theta: Array, u: Sequence[Array], y: Array
 ) -> tuple[Array, NDArray[np.float64]]:
     """epsilon (samples, runs) and psi (k, samples, runs)."""
     out, psi = np.empty(y.shape), np.empty((row.size, *y.shape))

@@ -1,10 +1,10 @@
 """Prediction errors of all outputs, weighed: what a search minimises, for many runs at once.
 
 With weights W (p, p) the cost is the sum over the samples of epsilon^T W epsilon. Without, it is
-N det(S / N)^(1/p), S the sum of epsilon epsilon^T: its minimiser is that of the cost with the inverse
-covariance of its own residuals, the maximum-likelihood estimate for Gaussian noise of unknown covariance;
-Ljung (1999), (7.87)-(7.96) and Section 15.2. Its gradient is that of the weighted cost at
-W = N det(S / N)^(1/p) S^-1 / p, and so is its Hessian up to what vanishes at the minimum.
+N det(S / N)^(1/p), S the sum of epsilon epsilon^T, which with one output is S itself. Its minimiser is that
+of the cost with the inverse covariance of its own residuals, the maximum-likelihood estimate for Gaussian
+noise of unknown covariance; Ljung (1999), (7.87)-(7.96) and Section 15.2. Its gradient is that of the
+weighted cost at W = N det(S / N)^(1/p) S^-1 / p, and so is its Hessian up to what vanishes at the minimum.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import block_length, stream
 from inputdesign_cli.identification.stability import is_stable, reflected
-from inputdesign_cli.identification.structure import Row
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -43,16 +43,16 @@ class PredictionErrors:
         weights: W (p, p), or None to weigh by the residuals' own covariance.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[OutputOrders, ...]
     places: tuple[NDArray[np.int64], ...]
     u: tuple[Array, ...]
     y: tuple[Array, ...]
     weights: Array | None = None
 
     @classmethod
-    def single(cls, row: Row, u: Sequence[Array], y: Array) -> PredictionErrors:
+    def single(cls, row: OutputOrders, u: Sequence[Array], y: Array) -> PredictionErrors:
         """Of one output alone: the sum of squared prediction errors."""
-        return cls((row,), (np.arange(row.size),), tuple(u), (y,), np.ones((1, 1)))
+        return cls((row,), (np.arange(row.size),), tuple(u), (y,))
 
     def repeated(self, starts: int) -> PredictionErrors:
         """The same record, (samples, 1) signals, for a search from several starts."""
@@ -129,6 +129,8 @@ class PredictionErrors:
         if self.weights is not None:
             weights = np.broadcast_to(self.weights, errors.shape)
             return np.sum(weights * errors, axis=(1, 2)), weights
+        if p == 1:  # the sum of squares, whose derivatives are not weighed
+            return errors[:, 0, 0], np.ones_like(errors)
         samples = self.y[0].shape[0]
         inverse, logarithm = inverses(errors / samples)
         cost = samples * np.exp(logarithm / p)

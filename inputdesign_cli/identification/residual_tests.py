@@ -5,7 +5,7 @@ Of several outputs all channels are tested at once, in units of the residuals' o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.special
@@ -22,8 +22,9 @@ class ResidualTest:
     """A chi-squared test over several lags.
 
     Attributes:
-        lags, correlation: (n,) normalised correlations; of vectors (n, rows, columns), entry (i, j) of lag
-            tau that of residual i and of residual or input j, tau samples earlier.
+        lags: (n,).
+        correlation: (n, p, columns), normalised; entry (i, j) of lag tau is that of residual i and of
+            residual or input j, tau samples earlier.
         limit: a single correlation of white noise stays within +- limit with probability 0.99.
         statistic, freedom: chi-squared with this many degrees of freedom if the model is right.
         probability: of a statistic at least as large if the model is right; small values refute it.
@@ -38,21 +39,14 @@ class ResidualTest:
 
 
 def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
-    """Autocorrelation of the residuals (samples,) at the lags 1 .. `lags` (statistic of Ljung and Box).
-
-    Args:
-        fitted: number of estimated parameters of the noise model, which make residuals look whiter.
-    """
-    return _scalar(joint_whiteness(errors[:, None], lags=lags, fitted=fitted))
-
-
-def joint_whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
     """Correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
 
     The portmanteau statistic of Hosking, J. American Statistical Association 75 (1980) 602-608, with the
     weights of Ljung and Box, to which it reduces for one output.
 
     Args:
+        errors: (samples, p).
+        lags: how many.
         fitted: number of estimated parameters of the noise model, which make residuals look whiter.
     """
     n, p = errors.shape
@@ -66,25 +60,17 @@ def joint_whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> Residu
     return _test(at, products / np.outer(rms, rms), n, statistic, p * p * at.size - fitted)
 
 
-def cross_correlation(
+def cross_correlations(
     errors: Array, u: Array, *, lags: int = 25, fitted: int = 0, feedback: bool = False
 ) -> ResidualTest:
     """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
 
     Args:
-        errors, u: (samples,).
+        errors, u: (samples, p), (samples, r).
+        lags: how far back the inputs are looked at.
         fitted: number of estimated parameters of the plant, which take as many directions away.
         feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
     """
-    return _scalar(
-        cross_correlations(errors[:, None], u[:, None], lags=lags, fitted=fitted, feedback=feedback)
-    )
-
-
-def cross_correlations(
-    errors: Array, u: Array, *, lags: int = 25, fitted: int = 0, feedback: bool = False
-) -> ResidualTest:
-    """The same of all residuals (samples, p) and all inputs (samples, r) at once."""
     n, p = errors.shape
     r = u.shape[1]
     at = np.arange(_most_lags(n, r, lags, fitted)) + int(feedback)
@@ -109,7 +95,3 @@ def _test(at: NDArray, correlation: NDArray, samples: int, statistic: float, fre
     probability = float(scipy.special.chdtrc(freedom, statistic))
     limit = _BAND / np.sqrt(samples)
     return ResidualTest(at.astype(float), correlation, limit, float(statistic), freedom, probability)
-
-
-def _scalar(test: ResidualTest) -> ResidualTest:
-    return replace(test, correlation=test.correlation[:, 0, 0])

@@ -13,15 +13,15 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import scipy.signal
 
+from inputdesign_cli.identification.orders import Block, OutputOrders
 from inputdesign_cli.identification.stability import reflected
-from inputdesign_cli.identification.structure import Block, Row
 from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 15
 _LONGEST = 40
 
 
-def starting_points(row: Row, u: Sequence[Array], y: Array) -> Array:
+def starting_points(row: OutputOrders, u: Sequence[Array], y: Array) -> Array:
     """(points, k): several starts for one output y (samples,) and all inputs u, (samples,) each."""
     inputs = [u[entry.input] for entry in row.entries]
     noise, responses = _long_model(row, inputs, y)
@@ -48,7 +48,7 @@ def _shifted(x: Array, lag: int) -> Array:
     return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])
 
 
-def _long_model(row: Row, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
+def _long_model(row: OutputOrders, inputs: list[Array], y: Array) -> tuple[Array, list[Array]]:
     """Residuals of a long ARX model, and what it says that each input alone causes."""
     highest = max([row.a, row.c, row.d, *(max(entry.b, entry.f) for entry in row.entries)])
     order = max(1, min(max(4 * highest, 10), y.size // (3 * (len(inputs) + 1)), _LONGEST))
@@ -62,7 +62,7 @@ def _long_model(row: Row, inputs: list[Array], y: Array) -> tuple[Array, list[Ar
     return residual, responses
 
 
-def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Array:
+def _equation_error(row: OutputOrders, inputs: list[Array], y: Array, noise: Array) -> Array:
     """A, B, C by regression; output-error denominators F take the place of a missing A."""
     A, C = row.by_letter["a"][0], row.by_letter["c"][0]
     Bs, Fs = row.by_letter["b"], row.by_letter["f"]
@@ -74,7 +74,9 @@ def _equation_error(row: Row, inputs: list[Array], y: Array, noise: Array) -> Ar
     return _theta(row, [*denominators, *zip(Bs, bs, strict=True), (C, c)])
 
 
-def _output_error(row: Row, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool) -> Array:
+def _output_error(
+    row: OutputOrders, inputs: list[Array], y: Array, targets: list[Array], *, coloured: bool
+) -> Array:
     """B and F (or A) by Steiglitz and McBride on `targets`, then C and D from the residual."""
     A, C, D = (row.by_letter[letter][0] for letter in "acd")
     Bs, Fs = row.by_letter["b"], row.by_letter["f"]
@@ -115,7 +117,7 @@ def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> 
     return F, numerators
 
 
-def _theta(row: Row, parts: Iterable[tuple[Block, Array]]) -> Array:
+def _theta(row: OutputOrders, parts: Iterable[tuple[Block, Array]]) -> Array:
     theta = np.zeros(row.size)
     for block, values in parts:
         theta[block.columns] = values

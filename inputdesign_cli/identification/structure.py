@@ -1,162 +1,94 @@
-"""Which coefficients of A y = (B/F) u + (C/D) e are unknown, and theta as polynomials, many runs at once."""
+"""What is to be estimated of a polynomial model: one row an output, and which parameters the rows share."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inputdesign_cli.identification.orders import InputOrders, OutputOrders
+from inputdesign_cli.identification.problem import PredictionErrors
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 
 @dataclass(frozen=True)
-class Entry:
-    """Orders of B/F from one `input` to an output; B has the coefficients of the lags `delay` to `b`."""
-
-    input: int
-    b: int
-    f: int
-    delay: int
-
-
-@dataclass(frozen=True)
-class Block:
-    """The free coefficients of one polynomial: their lags, and where they stand in the theta of the row.
-
-    `entry` is the number of the entry of B or F in its row.
-    """
-
-    letter: str
-    entry: int
-    lags: range
-    columns: slice
-
-    @property
-    def source(self) -> str:
-        """The signal of which the columns of psi are delays."""
-        return f"{self.letter}{self.entry}" if self.letter in "bf" else self.letter
-
-
-@dataclass(frozen=True)
-class Polynomials:
-    """The polynomials of each run, (runs, order + 1), ascending in q^-1; B and F one an entry."""
-
-    A: Array
-    B: tuple[Array, ...]
-    C: Array
-    D: Array
-    F: tuple[Array, ...]
-
-    @property
-    def order(self) -> int:
-        """The highest of all orders."""
-        return max(p.shape[1] for p in (self.A, self.C, self.D, *self.B, *self.F)) - 1
-
-
-@dataclass(frozen=True)
-class Row:
-    """Orders of one output: A y = sum_j (B_j / F_j) u_j + (C / D) e; entries that are zero are left out.
-
-    theta is ordered as a1.., the coefficients of B entry by entry, c1.., d1.., those of F.
-    """
-
-    a: int
-    c: int
-    d: int
-    entries: tuple[Entry, ...]
-
-    @cached_property
-    def blocks(self) -> tuple[Block, ...]:
-        """The polynomials in the order of theta; those without free coefficients, too."""
-        parts = [("a", 0, range(1, self.a + 1))]
-        parts += [("b", e, range(x.delay, x.b + 1)) for e, x in enumerate(self.entries)]
-        parts += [("c", 0, range(1, self.c + 1)), ("d", 0, range(1, self.d + 1))]
-        parts += [("f", e, range(1, x.f + 1)) for e, x in enumerate(self.entries)]
-        ends = np.cumsum([len(lags) for _, _, lags in parts]).tolist()
-        return tuple(
-            Block(letter, e, lags, slice(end - len(lags), end))
-            for (letter, e, lags), end in zip(parts, ends, strict=True)
-        )
-
-    @cached_property
-    def by_letter(self) -> dict[str, tuple[Block, ...]]:
-        """The blocks of each polynomial; of A, C and D one."""
-        return {letter: tuple(b for b in self.blocks if b.letter == letter) for letter in "abcdf"}
-
-    @property
-    def size(self) -> int:
-        """Number of parameters."""
-        return self.blocks[-1].columns.stop
-
-    @property
-    def memory(self) -> int:
-        """How far back the regression looks, recursions aside."""
-        return max([self.a, *(entry.b for entry in self.entries)])
-
-    def polynomials(self, theta: Array) -> Polynomials:
-        """theta (runs, k) as polynomials."""
-
-        def of(letter: str) -> tuple[Array, ...]:
-            parts = []
-            for block in self.by_letter[letter]:
-                p = np.zeros((theta.shape[0], block.lags.stop))
-                p[:, 0] = letter != "b"
-                p[:, block.lags.start : block.lags.stop] = theta[:, block.columns]
-                parts.append(p)
-            return tuple(parts)
-
-        return Polynomials(of("a")[0], of("b"), of("c")[0], of("d")[0], of("f"))
-
-
-@dataclass(frozen=True)
 class Structure:
-    """Orders of the five polynomials (SISO).
+    """Orders of A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i.
 
-    `a`, `c`, `d`, `f` are the orders of monic polynomials; B has the coefficients of the lags `delay` to
-    `b`. theta is ordered as in `PolynomialModel.names`: a1.., b(delay).., c1.., d1.., f1.. .
+    Attributes:
+        names: (k,) parameters, in the order of `PolynomialModel`.
+        in_plant, in_noise: numbers of parameters of B and F, and of A, C and D.
+        rows: one an output; `places` of each row, where its parameters stand in theta.
     """
 
-    a: int = 0
-    b: int = 1
-    c: int = 0
-    d: int = 0
-    f: int = 0
-    delay: int = 1
+    names: tuple[str, ...]
+    in_plant: int
+    in_noise: int
+    rows: tuple[OutputOrders, ...]
+    places: tuple[NDArray[np.int64], ...]
 
     @classmethod
     def of(cls, model: PolynomialModel) -> Structure:
-        """The structure of a model: its orders and its delay."""
-        a, b, c, d, f = (len(p) - 1 for p in (model.A, model.B, model.C, model.D, model.F))
-        return cls(a, b, c, d, f, model.delay)
-
-    @cached_property
-    def row(self) -> Row:
-        """The same as the only output of a model with one input."""
-        return Row(self.a, self.c, self.d, (Entry(0, self.b, self.f, self.delay),))
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Parameter names in the order of theta."""
-        return tuple(f"{block.letter}{lag}" for block in self.row.blocks for lag in block.lags)
+        """The structure of a model: its orders and delays, its zero entries, and what outputs share."""
+        where = {
+            (parameter.letter, parameter.power, place): index
+            for index, parameter in enumerate(model.parameters)
+            for place in parameter.places
+        }
+        rows, places = [], []
+        for i in range(model.outputs):
+            entries = tuple(
+                InputOrders(j, B.size - 1, F.size - 1, int(np.flatnonzero(B)[0]))
+                for j, (B, F) in enumerate(zip(model.B[i], model.F[i], strict=True))
+                if np.any(B)
+            )
+            a, c, d = (rows_[0 if len(rows_) == 1 else i].size - 1 for rows_ in (model.A, model.C, model.D))
+            row = OutputOrders(a, c, d, entries)
+            rows.append(row)
+            place = [
+                where[block.letter, lag, _place(block.letter, i, entries, block.entry)]
+                for block in row.blocks
+                for lag in block.lags
+            ]
+            places.append(np.array(place, dtype=np.int64))
+        letters = [parameter.letter for parameter in model.parameters]
+        in_plant = sum(letter in "bf" for letter in letters)
+        return cls(model.names, in_plant, len(letters) - in_plant, tuple(rows), tuple(places))
 
     @property
     def size(self) -> int:
         """Number of parameters k."""
         return len(self.names)
 
-    def model(self, theta: Array, variance: float) -> PolynomialModel:
-        """theta (k,) as a model."""
-        p = self.row.polynomials(theta[None])
-        return PolynomialModel(A=p.A[0], B=p.B[0][0], C=p.C[0], D=p.D[0], F=p.F[0][0], variance=variance)
+    @property
+    def memory(self) -> int:
+        """How far back the regressions look, recursions aside."""
+        return max(row.memory for row in self.rows)
 
-    def responses(self, theta: Array, w: Array) -> np.ndarray:
-        """G (runs, n) of each theta (runs, k) at frequencies `w` (n,) in rad/sample."""
-        p = self.row.polynomials(theta)
-        q = np.exp(-1j * w)
+    def own(self) -> Array:
+        """(p,): how many parameters each output has, those that n outputs share counted as 1/n."""
+        shared = np.bincount(np.concatenate(self.places), minlength=self.size)
+        return np.array([float(np.sum(1.0 / shared[place])) for place in self.places])
 
-        def at(coefficients: Array) -> np.ndarray:
-            return np.asarray(coefficients @ q[None, :] ** np.arange(coefficients.shape[1])[:, None])
+    def problem(self, u: Array, y: Array, noise: Array | None = None) -> PredictionErrors:
+        """The problem of fitting records u (runs, samples, r) and y (runs, samples, p).
 
-        return at(p.B[0]) / (at(p.A) * at(p.F[0]))
+        Args:
+            noise: the covariance of e (p, p) if it is known.
+        """
+        weights = None if noise is None else np.asarray(np.linalg.inv(noise), dtype=float)
+        return PredictionErrors(self.rows, self.places, _signals(u), _signals(y), weights)
+
+
+def _signals(x: Array) -> tuple[Array, ...]:
+    """(runs, samples, channels) as a signal (samples, runs) of each channel."""
+    return tuple(np.ascontiguousarray(np.moveaxis(x, -1, 0).swapaxes(1, 2)))
+
+
+def _place(letter: str, output: int, entries: tuple[InputOrders, ...], entry: int) -> tuple[int, int]:
+    """Output and input where a parameter acts, as `Parameter.places` have them."""
+    if letter in "bf":
+        return output, entries[entry].input
+    return (output, 0) if letter == "a" else (output, output)

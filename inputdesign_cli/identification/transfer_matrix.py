@@ -1,14 +1,12 @@
-"""Transfer matrices in s from sampled records: estimates, many of them, and simulation."""
+"""Transfer matrices in s from sampled records: one estimate, or many."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from inputdesign_cli.identification.channel_estimate import ChannelEstimate, concluded
-from inputdesign_cli.identification.channels import ChannelBatch
 from inputdesign_cli.identification.checks import (
     check_apart,
     check_length,
@@ -16,13 +14,14 @@ from inputdesign_cli.identification.checks import (
     check_varying,
     fit_percent,
 )
+from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, concluded
+from inputdesign_cli.identification.gauss_newton import best_run, minimise
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.refined_iv import refine
-from inputdesign_cli.identification.search import best_run, minimise
 from inputdesign_cli.identification.transfer_problem import Point, TransferProblem, evaluate, rounding
-from inputdesign_cli.identification.transfer_record import Intersample, TransferRecord
+from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
-from inputdesign_cli.plant import ContinuousChannels
+from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.polynomial import Array
 
 # Of the starts made from the data, as many are followed to the end: the likeliest after the instruments.
@@ -30,15 +29,14 @@ _FOLLOWED = 3
 
 
 def identify_transfer_matrix(
-    model: ContinuousChannels,
+    model: ContinuousModel,
     u: ArrayLike,
     y: ArrayLike,
-    sample_time: float,
+    between: Intersample,
     *,
-    hold: bool,
     start: ArrayLike | None = None,
     feedback: bool = False,
-) -> ChannelEstimate:
+) -> Estimate:
     """Maximum-likelihood estimate of a transfer matrix in s from one record, white noise on the outputs.
 
     The noise of the samples has an unknown full covariance. From each start refined instrumental variables
@@ -48,7 +46,7 @@ def identify_transfer_matrix(
     Args:
         model: the structure, and with it the names and the order of theta; its numbers are not used.
         u, y: (N, r), (N, p).
-        hold: whether u is held between its samples; otherwise it is their band-limited interpolation.
+        between: the time between samples, and whether u is held there.
         start: (k,), tried besides starts made from the data.
         feedback: whether u(t) answers y(t), which a test of the residuals heeds.
 
@@ -59,7 +57,7 @@ def identify_transfer_matrix(
     inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
     check_length(len(outputs), len(model.names), 0, outputs=model.outputs)
     check_varying(model.names, inputs, outputs)
-    record = TransferRecord(model, inputs, outputs, Intersample(sample_time, hold))
+    record = TransferRecord(model, inputs, outputs, between)
     made = [refine(record, evaluate(record, theta)) for theta in starting_points(record)]
     refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
     if start is not None:
@@ -91,17 +89,17 @@ def identify_transfer_matrix(
 
 
 def fit_transfer_matrices(
-    model: ContinuousChannels,
+    model: ContinuousModel,
     u: ArrayLike,
     y: ArrayLike,
-    sample_time: float,
+    between: Intersample,
     *,
-    hold: bool,
     start: ArrayLike,
-) -> ChannelBatch:
+) -> BatchEstimate:
     """The estimates of `identify_transfer_matrix` for many records, each from its one start, without checks.
 
     Args:
+        model, between: see `identify_transfer_matrix`.
         u: (N, r) common to all runs, or (runs, N, r).
         y: (runs, N, p).
         start: (k,) for all runs, or (runs, k).
@@ -109,10 +107,7 @@ def fit_transfer_matrices(
     outputs = np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(model.names)))
-    records = tuple(
-        TransferRecord(model, inputs[run], outputs[run], Intersample(sample_time, hold))
-        for run in range(len(outputs))
-    )
+    records = tuple(TransferRecord(model, inputs[run], outputs[run], between) for run in range(len(outputs)))
     theta, refined = [], []
     for record, row in zip(records, begin, strict=True):
         point, steps = refine(record, evaluate(record, record.stabilised(row)))
@@ -123,25 +118,13 @@ def fit_transfer_matrices(
         _noise_and_information(record, evaluate(record, theta))
         for record, theta in zip(records, found.theta, strict=True)
     ]
-    return ChannelBatch(
+    return BatchEstimate(
         theta=found.theta,
         noise=np.array([noise for noise, _ in described]),
         information=np.array([information for _, information in described]),
         converged=found.converged,
         steps=found.steps + np.array(refined),
     )
-
-
-def simulate_transfer_matrix(
-    model: ContinuousChannels, u: ArrayLike, sample_time: float, *, hold: bool
-) -> NDArray[np.float64]:
-    """(N, p) or (runs, N, p): outputs without noise for samples (N, r) or (runs, N, r), from rest.
-
-    With a hold they are exact. Without, what is applied is the band-limited interpolation of the samples
-    and of at least as many zeros, periodically repeated: the input of `channel_record_information`, which
-    pads by what the plant remembers. Where these lengths differ, only the ends of a record show a trace.
-    """
-    return Intersample(sample_time, hold).outputs(model, np.asarray(u, dtype=float))
 
 
 def _noise_and_information(record: TransferRecord, point: Point) -> tuple[Array, Array]:

@@ -1,10 +1,4 @@
-"""A transfer matrix in s against one sampled record: output errors, gradients, regressors, stability.
-
-Everything is at rest before the record. With a hold, outputs are those of the plant behind it, exactly.
-Without, what is applied is the band-limited interpolation of the samples and of zeros around them, as
-many on each side, and the outputs are read at the same instants. Both by FFT: an entry is one chain of
-states in time, of which its output and all its gradients are linear combinations.
-"""
+"""A transfer matrix in s against one sampled record: output errors, gradients, regressors, stability."""
 
 from __future__ import annotations
 
@@ -12,10 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant import ContinuousChannels
+from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.polynomial import Array
 
@@ -26,56 +19,22 @@ _FASTEST = 1e4
 
 
 @dataclass(frozen=True)
-class Intersample:
-    """Instants `sample_time` apart between which signals are held (`hold`), or band-limited."""
-
-    sample_time: float
-    hold: bool
-
-    def states(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
-        """(.., N, 2 order): the states of an entry that samples (.., N) drive from rest.
-
-        Measured outputs are never held, whatever the input is.
-        """
-        samples = signal.shape[-1]
-        length = 2 * scipy.fft.next_fast_len(samples, real=True)
-        angles = 2.0 * np.pi * np.arange(length // 2 + 1) / length
-        z = np.exp(1j * angles)
-        states = entry.states(z) if hold else entry.interpolated_states(angles / self.sample_time)
-        states = entry.forgetting(states, z, samples)
-        transform = scipy.fft.rfft(signal, length, axis=-1)
-        driven = scipy.fft.irfft(transform[..., None] * states, length, axis=-2)
-        return np.asarray(driven[..., :samples, :])
-
-    def entry(self, model: ContinuousChannels, i: int, j: int) -> HeldEntry:
-        """Entry (i, j) at these instants."""
-        return HeldEntry.of(model.numerator[i][j], model.denominator[i][j], self.sample_time)
-
-    def outputs(self, model: ContinuousChannels, u: Array) -> NDArray[np.float64]:
-        """(.., N, p): what samples (.., N, r) cause."""
-        y = np.zeros((*u.shape[:-1], model.outputs))
-        for i, j in model.active:
-            entry = self.entry(model, i, j)
-            states = self.states(entry, u[..., j], hold=self.hold)
-            y[..., i] += entry.direct * u[..., j] + states @ entry.gain
-        return y
-
-
-@dataclass(frozen=True)
 class TransferRecord:
     """Samples u (N, r), y (N, p), and the `structure` that is to explain them by parameters theta (k,)."""
 
-    structure: ContinuousChannels
+    structure: ContinuousModel
     u: Array
     y: Array
     intersample: Intersample
 
     @property
     def samples(self) -> int:
+        """Number of samples N."""
         return len(self.y)
 
     @property
     def size(self) -> int:
+        """Number of parameters k."""
         return len(self.structure.parameters)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
@@ -83,7 +42,7 @@ class TransferRecord:
         model = self.structure.at(theta)
         errors, psi = self.y.copy(), np.zeros((self.size, *self.y.shape))
         for i, j in self.structure.active:
-            entry, u = self.intersample.entry(model, i, j), self.u[:, j]
+            entry, u = self._entry(model, i, j), self.u[:, j]
             states = self.intersample.states(entry, u, hold=self.intersample.hold)
             errors[:, i] -= entry.direct * u + states @ entry.gain
             for index, parameter in enumerate(self.structure.parameters):
@@ -105,7 +64,7 @@ class TransferRecord:
             if parameter.letter == "b":
                 continue
             for i, j in {place[0]: place for place in parameter.places}.values():
-                entry = self.intersample.entry(model, i, j)
+                entry = self._entry(model, i, j)
                 if (i, j) not in filtered:
                     filtered[i, j] = self.intersample.states(entry, errors[:, i], hold=False)
                 power = np.eye(entry.order)[parameter.power]
@@ -125,6 +84,9 @@ class TransferRecord:
             poles = -np.maximum(np.abs(poles.real), slowest) + 1j * poles.imag
             out[columns] = np.poly(poles).real[:0:-1]
         return out
+
+    def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
+        return self.intersample.entry(model.numerator[i][j], model.denominator[i][j])
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:

@@ -19,6 +19,8 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.polynomial import Array
 
 _RANK_TOLERANCE = 1e-11
+# Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.
+_TAKES_PART = 0.05
 
 
 class Named(Protocol):
@@ -81,16 +83,22 @@ class Coordinates:
             return rows
         return rows @ self._inverse_factor.T
 
-    def unexcited(self, direction: Array) -> str:
-        """The names of the parameters that make up a `direction` (k,) of these coordinates."""
-        raw = direction if self.factor is None else self._inverse_factor.T @ direction
+    def unexcited(self, directions: Array) -> str:
+        """The names of the parameters that take part in some `directions` (k, m) of these coordinates."""
+        raw = directions if self.factor is None else self._inverse_factor.T @ directions
         size = np.abs(self.model.theta)
-        return _involved(self.model.names, raw / np.maximum(size, 1e-3 * size.max()))
+        return taking_part(self.model.names, raw / np.maximum(size, 1e-3 * size.max())[:, None])
 
 
-def _involved(names: Sequence[str], direction: Array) -> str:
-    members = np.abs(direction) > 0.05 * np.abs(direction).max()
-    return ", ".join(name for name, member in zip(names, members, strict=True) if member)
+def taking_part(names: Sequence[str], directions: Array) -> str:
+    """The names of the parameters that take part in a space, whatever vectors span it.
+
+    Args:
+        names: of the k parameters.
+        directions: (k, m), independent columns.
+    """
+    share = np.linalg.norm(np.linalg.qr(directions)[0], axis=1)
+    return ", ".join(name for name, own in zip(names, share, strict=True) if own > _TAKES_PART * share.max())
 
 
 def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: str) -> Array:
@@ -108,8 +116,9 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
     scale[scale == 0.0] = 1.0
     triangle = np.asarray(np.linalg.qr(rows / scale, mode="r"))
     _, singular, vectors = np.linalg.svd(triangle)
-    if singular.size < len(names) or singular[-1] <= _RANK_TOLERANCE * singular[0]:
-        listed = _involved(names, vectors[-1])
+    rank = int(np.sum(singular > _RANK_TOLERANCE * singular[0]))
+    if rank < len(names):
+        listed = taking_part(names, vectors[rank:].T)
         raise bad_spec(
             "not-identifiable",
             f"no {excitation} can tell these parameters apart: {listed}",

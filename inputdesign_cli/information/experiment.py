@@ -1,4 +1,10 @@
-"""What an excitation does to a plant: gradients of the prediction, information per frequency, powers."""
+"""What an excitation does to a plant: gradients of the prediction, information per frequency, powers.
+
+The measure is (1 / 2 pi) dw over the circle (w in rad/sample) or the line (rad per time unit): the
+power of a signal is the integral of its spectrum, its mean square. In continuous time the N samples of
+the outputs are taken fast enough to see the whole band; each carries noise of the model's covariance.
+Criteria do not depend on the measure, as long as powers and information share it.
+"""
 
 from __future__ import annotations
 
@@ -10,131 +16,182 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
-from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature, integrate
-from inputdesign_cli.plant import Fraction, Loop, PolynomialModel, logarithmic_distance
+from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, integrate
+from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 PowerKind = Literal["input", "output", "excitation"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
+_NODES_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
 class Experiment(Coordinates):
-    """N samples of a model in a loop; `prior` (k, k) is information already at hand, in raw parameters.
+    """N samples of a model with r inputs and p outputs, excited within `band`.
 
-    The excitation x is u in open loop and r in closed loop (u = r - C y).
+    The excitation x is u in open loop (`loop` None) and r in closed loop, u = r - C y.
 
-    `factor` sets its `Coordinates`; designs are computed in those of `whitened`.
+    A density D over frequency stands for the functional (1 / 2 pi) integral of tr(D(w) Phi(w)) dw of
+    the spectrum Phi of x. Its values are (n,) for one input, and Hermitian (n, r, r) for several.
+
+    `prior` (k, k) is information already at hand, in raw parameters; `factor` sets the `Coordinates`.
     """
 
-    loop: Loop
+    model: Model
     samples: int
+    band: tuple[float, float] = (0.0, np.pi)
     prior: Array | None = None
     factor: Array | None = None
-
-    band = (0.0, np.pi)
-    inputs = 1
+    loop: Loop | None = None
 
     @property
-    def model(self) -> PolynomialModel:
-        return self.loop.model
-
-    @property
-    def size(self) -> int:
-        """Number of parameters k."""
-        return len(self.model.names)
+    def inputs(self) -> int:
+        return self.model.inputs
 
     @cached_property
     def singularities(self) -> ComplexArray:
-        """Poles of all densities below, as points angle + j damping of the frequency plane."""
-        return logarithmic_distance(self.loop.poles)
+        """Poles of all densities below, as points frequency + j damping of the frequency plane."""
+        return self._source.singularities
+
+    @property
+    def _source(self) -> Model | Loop:
+        return self.model if self.loop is None else self.loop
+
+    @cached_property
+    def _noise_whitener(self) -> Array:
+        """K (p, p) with K^T K the inverse of the noise covariance."""
+        return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
-        """F_x (n, k): what x contributes to the gradient of the prediction.
+        """F_x (n, k, p, r): what x contributes to the gradient of the prediction, noise whitened to I.
 
-        F_u = Lambda_G / H in open loop, F_r = S Lambda_G / H in closed loop (least-costly paper,
-        below (4) and (15)).
+        F_u = H^-1 dG in open loop; in closed loop what x causes at y and u enters the prediction as well
+        ([bombois-least-costly], below (4) and (15), for one channel).
         """
-        t = self.loop.responses(w)
-        return self.whiten_rows(self.model.prediction_gradient(w, t.y_x, t.u_x, np.zeros_like(t.y_x)))
+        gradient = self.model.input_gradient(w) if self.loop is None else self.loop.excitation_gradient(w)
+        if len(self._noise_whitener) == 1:
+            return self._whiten(self._noise_whitener[0, 0] * gradient)
+        return self._whiten(np.einsum("pq,nkqr->nkpr", self._noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """F_e or F_v (n, k): what e contributes, Lambda_H / H - C S Lambda_G (least-costly paper, (15))."""
-        t = self.loop.responses(w)
-        return self.whiten_rows(self.model.prediction_gradient(w, t.y_e, t.u_e, np.ones_like(t.y_e)))
+        """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
+        K = self._noise_whitener
+        gradient = self._source.noise_gradient(w)
+        if len(K) == 1:
+            return self._whiten(gradient)
+        return self._whiten(np.einsum("pq,nkqs,st->nkpt", K, gradient, np.linalg.inv(K), optimize=True))
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """Lambda_G (n, k): the gradient of G, in these coordinates."""
-        return self.whiten_rows(self.model.plant_gradient(w))
+        """dG/dtheta (n, k, p, r), in these coordinates."""
+        return self._whiten(self.model.plant_gradient(w))
 
-    def plant_fraction(self, w: ArrayLike) -> Fraction:
-        """G as numerator over denominator, their gradients (n, k) in these coordinates."""
-        part = self.model.fraction(w)
-        return replace(
-            part,
-            numerator_gradient=self.whiten_rows(part.numerator_gradient),
-            denominator_gradient=self.whiten_rows(part.denominator_gradient),
-        )
+    def _whiten(self, gradient: ComplexArray) -> ComplexArray:
+        if self.factor is None:
+            return gradient
+        return np.tensordot(gradient, self._inverse_factor, axes=(1, 1)).transpose(0, 3, 1, 2)
 
-    def information_density(self, w: ArrayLike) -> NDArray[np.float64]:
-        """(n, k, k): D with M = M0 + (1/2 pi) integral D(w) Phi_x(w) dw, for all N samples."""
-        return (self.samples / self.model.variance) * _real_outer(self.excitation_gradient(w))
+    def information_density(self, w: ArrayLike) -> NDArray:
+        """D (n, k, k) or (n, k, k, r, r) with M = M0 + (1/2 pi) integral tr(D Phi) dw, for all N samples.
 
-    def value_density(self, weight: Array, w: ArrayLike) -> Array:
-        """(n,): the density of tr(Y (M - M0)) for a fixed Y = `weight` (k, k)."""
-        F = self.excitation_gradient(w)
-        scale = self.samples / self.model.variance
-        return scale * np.einsum("ni,ij,nj->n", F.conj(), weight, F, optimize=True).real
-
-    def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> Array:
-        """(n,): the factor on Phi_x that gives the spectrum of u_x, y_x or x itself.
-
-        `channel` is for plants with several channels; here the sum over the channels is the only one.
+        [mohan-spectral], (3), made Hermitian in the channels and symmetric in the parameters.
         """
-        if kind == "excitation":
-            return np.ones_like(np.asarray(w, dtype=float))
+        F = self.excitation_gradient(w)
+        if self.inputs == 1:
+            return self.samples * _real_products(F)
+        half = np.einsum("nmpa,nlpb->nlmab", F.conj(), F, optimize=True)
+        return (0.5 * self.samples) * (half + half.swapaxes(1, 2))
+
+    def value_density(self, weight: Array, w: ArrayLike) -> NDArray:
+        """(n,) or (n, r, r): the density of tr(Y (M - M0)), Y = `weight` (k, k) symmetric."""
+        F = self.excitation_gradient(w)
+        weighted = np.tensordot(F, weight, axes=(1, 1))  # (n, p, r, k)
+        value = self.samples * np.einsum("nkpa,npbk->nab", F.conj(), weighted, optimize=True)
+        return self._squeezed(value)
+
+    def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
+        """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x or x, of all channels or of one."""
+        if kind == "output" or (kind == "input" and self.loop is not None):
+            G = self.response(kind, w)
+            rows = G if channel is None else G[:, channel : channel + 1]
+            return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
+        unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
+        return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
+
+    def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
+        """(n, p or r, r): from x to the outputs, the inputs or x itself."""
+        if kind == "excitation" or (kind == "input" and self.loop is None):
+            return np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
+        if self.loop is None:
+            return self.model.plant_at(w)
         t = self.loop.responses(w)
-        return np.abs(t.u_x if kind == "input" else t.y_x) ** 2
+        return t.y_x if kind == "output" else t.u_x
+
+    def _squeezed(self, density: NDArray) -> NDArray:
+        return density[:, 0, 0].real if self.inputs == 1 else density
 
     @cached_property
     def noise_information(self) -> Array:
         """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
+        if self.model.continuous or np.all(self._silent):
+            return np.zeros((self.size, self.size))
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
-            F = self.noise_gradient(rule.nodes)
-            return np.einsum("n,nij->ij", rule.weights, _real_outer(F), optimize=True)
+            total = np.zeros((self.size, self.size))
+            for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
+                part = slice(start, start + _NODES_AT_ONCE)
+                products = _real_products(self.noise_gradient(rule.nodes[part]))
+                total += np.tensordot(rule.weights[part], products, axes=1)
+            return total
 
         return self.samples * integrate(moments, self.singularities)
 
     @property
     def baseline_information(self) -> Array:
-        """(k, k): what is known without any excitation, by the noise in the loop and by `prior`."""
+        """(k, k): what is known without any excitation, by the noise and by `prior`."""
         return self.noise_information + self.prior_information
 
-    def whitened(self, power: float) -> Experiment:
-        """The same experiment in coordinates where white excitation of this power gives M = I.
+    @cached_property
+    def _silent(self) -> NDArray[np.bool_]:
+        """(k,): the parameters of which noise alone says nothing."""
+        probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
+        return ~np.any(probe > 0, axis=(0, 2, 3))
 
-        L comes from a QR factorisation of the gradients themselves, never from M: that halves the
-        digits lost to an ill-conditioned parametrisation.
+    def whitened(self, power: float | Array) -> Experiment:
+        """The same experiment in coordinates where M = I by this power, flat over the band.
+
+        Args:
+            power: of all channels together, which share it evenly, or (r,) of each.
 
         Raises:
-            SpecError: `not-identifiable` when even white excitation cannot tell parameters apart.
+            SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
         """
-        rule = graded_quadrature(self.singularities)
+        rule = band_quadrature(self.singularities, self.band)
         raw = replace(self, factor=None)
-        excited = (
-            raw.excitation_gradient(rule.nodes)
-            * np.sqrt(rule.weights * (power * self.samples / self.model.variance))[:, None]
-        )
-        noise = raw.noise_gradient(rule.nodes) * np.sqrt(rule.weights * self.samples)[:, None]
-        rows = [excited.real, excited.imag, noise.real, noise.imag]
+        width = (self.band[1] - self.band[0]) / np.pi
+        total = float(np.sum(power))
+        shares = np.sqrt(np.asarray(power) * self.inputs / total) if np.ndim(power) else 1.0
+        level = total * self.samples / (self.inputs * width)
+        rows = [_rows(raw.excitation_gradient(rule.nodes) * shares, rule.weights * level)]
+        if not self.model.continuous and not np.all(self._silent):
+            around = band_quadrature(self.singularities, (0.0, np.pi))
+            rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))
         if self.prior is not None:
             eigenvalues, vectors = np.linalg.eigh(self.prior)
             rows.append(np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T)
-        stacked = np.concatenate(rows)
-        return replace(self, factor=factor_of(stacked, self.model.names, excitation="excitation"))
+        whole = not self.model.continuous and self.band == (0.0, np.pi)
+        excitation = "excitation" if whole else "excitation within the band"
+        return replace(self, factor=factor_of(np.concatenate(rows), self.model.names, excitation=excitation))
 
 
-def _real_outer(F: ComplexArray) -> NDArray[np.float64]:
-    """Re(F F^*) for each frequency: (n, k) -> (n, k, k)."""
-    return F.real[:, :, None] * F.real[:, None, :] + F.imag[:, :, None] * F.imag[:, None, :]
+def _real_products(F: ComplexArray) -> NDArray[np.float64]:
+    """Re sum over channels of F_l F_m^*: (n, k, p, r) -> (n, k, k)."""
+    flat = F.reshape(*F.shape[:2], -1)
+    real = np.concatenate([flat.real, flat.imag], axis=2)
+    return real @ real.swapaxes(1, 2)
+
+
+def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
+    """sqrt(weight) F as real rows: (n, k, p, r) -> (2 n p r, k)."""
+    flat = np.moveaxis(F, 1, -1) * np.sqrt(weights)[:, None, None, None]
+    flat = flat.reshape(-1, F.shape[1])
+    return np.concatenate([flat.real, flat.imag])

@@ -1,39 +1,136 @@
-"""The excitations of a Monte Carlo study: one row a run, each with a realisation of its own."""
+"""The excitations of a Monte Carlo study: a record for each run, and what it tells in theory."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings
-from inputdesign_cli.signal.single import record_information
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, in_phase_record
+from inputdesign_cli.signal.settings import Method
+from inputdesign_cli.spectrum import Basis, LinesBasis, TabulatedSpectrum
+
+
+class Excitation(Protocol):
+    """What the runs apply."""
+
+    @property
+    def name(self) -> str: ...
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records (runs, samples, r), each a realisation of its own."""
+        ...
+
+    def information(self, experiment: Experiment) -> Array:
+        """What it tells in theory, (k, k) in raw parameters, prior information included."""
+        ...
 
 
 @dataclass(frozen=True)
-class Excitation:
-    """A spectrum that every run realises anew by `recipe`, or one `record` (samples,) that all runs apply."""
+class Recorded:
+    """One record (samples, r), `step` apart, that all runs apply."""
 
     name: str
-    basis: FirBasis | LinesBasis = field(default_factory=lambda: FirBasis(0))
-    x: Array = field(default_factory=lambda: np.ones(1))
-    recipe: SignalSettings = field(default_factory=SignalSettings)
-    record: Array | None = None
+    record: Array
+    step: float
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
-        """(runs, samples): records, each scaled to the power of the spectrum exactly."""
-        if self.record is not None:
-            return np.broadcast_to(self.record, (runs, self.record.size))
-        generator = SignalGenerator(DesignedSpectrum.of(self.basis, self.x), self.recipe, samples)
-        rows = np.stack([np.repeat(generator.values(rng)[:, 0], self.recipe.hold) for _ in range(runs)])
-        return rows * np.sqrt(generator.spectrum.power / np.mean(rows**2, axis=1, keepdims=True))
+        """The same record for each run."""
+        return np.broadcast_to(self.record, (runs, *self.record.shape))
 
     def information(self, experiment: Experiment) -> Array:
-        """(k, k) in raw parameters: what this excitation tells in theory, prior information included."""
-        if self.record is not None:
-            return record_information(experiment, self.record)
-        maps = self.basis.integrals(experiment.information_density, experiment.singularities)
-        return experiment.baseline_information + np.tensordot(self.x, maps, axes=1)
+        """Of the samples themselves."""
+        return FiniteRecord(experiment, len(self.record), self.step).information(self.record)
+
+
+@dataclass(frozen=True)
+class Redrawn:
+    """Records of a spectrum, generated anew in each run, each channel scaled to its power exactly.
+
+    `basis` and `x` are the spectrum that the generator realises.
+    """
+
+    name: str
+    generator: SignalGenerator
+    basis: Basis | TabulatedSpectrum
+    x: Array
+
+    @classmethod
+    def flat(
+        cls,
+        name: str,
+        method: Method,
+        powers: Array,
+        band: tuple[float, float],
+        samples: int,
+        step: float,
+    ) -> Redrawn:
+        """Independent inputs of these powers (r,), each flat over a band in the unit of the experiment."""
+        white = TabulatedSpectrum.white(powers, band)
+        spectrum = DesignedSpectrum.of(white, np.ones(1), inputs=powers.size, step=step)
+        settings = SignalSettings(method, phases="orthogonal" if powers.size > 1 else "random")
+        edges = (band[0] * step, band[1] * step)
+        return cls(name, SignalGenerator(spectrum, settings, samples, edges), white, np.ones(1))
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records of the generator's kind of signal."""
+        values = np.stack([self.generator.values(rng) for _ in range(runs)])
+        records = np.repeat(values, self.generator.settings.hold, axis=1)
+        found = np.mean(records**2, axis=1, keepdims=True)
+        return np.asarray(records * np.sqrt(self.powers / np.maximum(found, 1e-300)))
+
+    @cached_property
+    def powers(self) -> Array:
+        """(r,): the power of each channel."""
+        inputs = self.generator.spectrum.inputs
+
+        def of(channel: int) -> float:
+            unit = np.diag(np.arange(inputs) == channel).astype(float)
+            density = partial(_constant, unit)
+            return float(self.x @ self.basis.integrals(density, np.zeros(0, dtype=complex)))
+
+        return np.array([of(channel) for channel in range(inputs)])
+
+    def information(self, experiment: Experiment) -> Array:
+        """Of the spectrum."""
+        return _information(experiment, self.basis, self.x)
+
+
+@dataclass(frozen=True)
+class InPhase:
+    """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels.
+
+    `basis` and `x` are their spectrum.
+    """
+
+    name: str
+    frequencies: Array
+    amplitudes: Array
+    basis: LinesBasis
+    x: Array
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Records of random phases."""
+        return np.stack(
+            [in_phase_record(self.frequencies, self.amplitudes, samples, rng) for _ in range(runs)]
+        )
+
+    def information(self, experiment: Experiment) -> Array:
+        """Of the sinusoids."""
+        return _information(experiment, self.basis, self.x)
+
+
+def _constant(density: Array, w: Array) -> NDArray[np.float64]:
+    """A density (r, r) at frequencies (n,): (n,) for one input, else (n, r, r)."""
+    return np.full(w.shape, density[0, 0]) if density.size == 1 else np.ones(w.shape)[:, None, None] * density
+
+
+def _information(experiment: Experiment, basis: Basis | TabulatedSpectrum, x: Array) -> Array:
+    """(k, k): M of a spectrum."""
+    maps = basis.integrals(experiment.information_density, experiment.singularities)
+    return np.asarray(experiment.baseline_information + np.tensordot(x, maps, axes=1))

@@ -1,6 +1,7 @@
 """One entry of a transfer matrix behind a zero-order hold, with the gradients of its parameters in s.
 
-The same states serve samples that are not held but interpolated within their band.
+Both come from one matrix exponential ([van-loan-1978]). The same states serve samples that are not held but
+interpolated within their band.
 """
 
 from __future__ import annotations

@@ -9,8 +9,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_loop import ChannelLoop
-from inputdesign_cli.plant.channels import PolynomialChannels
+from inputdesign_cli.plant.loop import Loop, close_loop
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -20,17 +19,19 @@ from inputdesign_cli.plant.polynomial import (
     unit_circle,
 )
 from inputdesign_cli.plant.polynomial_matrix import at, stack
+from inputdesign_cli.plant.polynomial_model import PolynomialModel
+from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
-class PolynomialLoop(ChannelLoop):
-    """`ChannelLoop` with R_i = A_i prod_j F_ij and N = R G, so that R H = prod_j F_ij C_i / D_i.
+class PolynomialLoop(Loop):
+    """`Loop` with R_i = A_i prod_j F_ij and N = R G, so that R H = prod_j F_ij C_i / D_i.
 
     The roots of the determinant of the polynomial matrix on the left are all closed-loop poles (every 1/A_i
     is driven by its own noise e_i).
     """
 
-    model: PolynomialChannels
+    model: PolynomialModel
 
     @cached_property
     def _left(self) -> Array:
@@ -92,6 +93,8 @@ class PolynomialLoop(ChannelLoop):
             right[..., i] = scipy.signal.lfilter(np.convolve(self._others(i), c), d, e[..., i])
         for j, q in enumerate(self.controller.denominator):
             right[..., m.outputs + j] = scipy.signal.lfilter(q, [1.0], r[..., j])
+        if right.shape[-1] == 2:
+            return self._single(right[..., :1], right[..., 1:])
         inverse = np.linalg.inv(self._left[..., 0])
         back = [(inverse @ self._left[..., lag]).T for lag in range(1, self._left.shape[-1])]
         found = right @ inverse.T
@@ -99,3 +102,23 @@ class PolynomialLoop(ChannelLoop):
             for lag, block in enumerate(back[:t], start=1):
                 found[..., t, :] -= found[..., t - lag, :] @ block
         return found[..., : m.outputs], found[..., m.outputs :]
+
+    def _single(self, top: Array, bottom: Array) -> tuple[Array, Array]:
+        """y and u of one input and one output by Cramer's rule: filters in place of a pass over time.
+
+        Args:
+            top, bottom: the right-hand side, (.., n, 1) each.
+        """
+        ((R, minus_N), (P, Q)) = self._left
+        determinant = np.convolve(R, Q) - np.convolve(minus_N, P)
+
+        def solved(a: Array, x: Array, b: Array, z: Array) -> Array:
+            above = scipy.signal.lfilter(a, [1.0], x, axis=-2) - scipy.signal.lfilter(b, [1.0], z, axis=-2)
+            return np.asarray(scipy.signal.lfilter([1.0], determinant, above, axis=-2))
+
+        return solved(Q, top, minus_N, bottom), solved(R, bottom, P, top)
+
+
+@close_loop.register
+def _(model: PolynomialModel, controller: TransferMatrix) -> PolynomialLoop:
+    return PolynomialLoop(model, controller)

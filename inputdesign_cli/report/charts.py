@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.figures.plots import draw
-from inputdesign_cli.report.study_words import study_caption
+from inputdesign_cli.report.numbers import spoken
 from inputdesign_cli.runs.results import (
     Array,
     BoundCurves,
     BoundPanel,
+    Curves,
     OptimalityCurves,
+    Result,
     SignalCurves,
     SpectrumCurves,
 )
 from inputdesign_cli.runs.text_formats import read_csv
 
-Result = Mapping[str, Any]
-
+# Curves, what they show in words, and a caption.
+Drawn = tuple[Curves, str, str]
 
 _CAPTIONS = {
     "bound": "The error that the model may have (r_u) against the error that is admitted (r_adm).",
@@ -50,15 +52,15 @@ class Chart:
 
 def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) -> dict[str, Chart]:
     """The charts of a run by file stem. What has no table we know of is taken from its PNG file."""
-    makers = {"bound": _bound, "spectrum": _spectrum, "optimality": _optimality, "signal": _signal}
+    spectrum = partial(_spectrum, symbol="r" if closed_loop else "u")
+    makers: dict[str, Callable[[Mapping[str, Array], Result], Drawn | None]]
+    makers = {"bound": _bound, "spectrum": spectrum, "optimality": _optimality, "signal": _signal}
     charts = {}
     for stem, make in makers.items():
         path = run / f"{stem}.csv"
         found = make(read_csv(path), result) if path.is_file() else None
         if found is not None:
             curves, alt, caption = found
-            if isinstance(curves, SpectrumCurves) and closed_loop:
-                curves = replace(curves, symbol="r")
             charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg")), alt, caption)
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
@@ -76,15 +78,33 @@ def png_chart(path: Path) -> Chart:
     """A figure of the run as it is."""
     data = base64.b64encode(path.read_bytes()).decode()
     name = path.stem.replace("_", " ")
-    caption = _CAPTIONS.get(path.stem) or study_caption(path.stem) or f"The figure {name} of the run."
+    caption = _CAPTIONS.get(path.stem) or _study_caption(path.stem) or f"The figure {name} of the run."
     return Chart(f"data:image/png;base64,{data}", caption, caption)
+
+
+def _study_caption(stem: str) -> str | None:
+    """What a figure of data or of simulated runs shows; None for other figures."""
+    kind, _, name = stem.partition("_")
+    if kind in ("errors", "cloud", "disturbance") and name:
+        what = {
+            "errors": "The errors |G_hat - G_0| of the models of all runs, against r_u and r_adm",
+            "cloud": "The estimates of all runs, with the ellipses of theory",
+            "disturbance": "What the excitation alone does to the loop",
+        }[kind]
+        return f"{what}: {spoken(name)}."
+    return {
+        "fit": "The recorded outputs, predicted one step ahead, and simulated from the input alone.",
+        "residuals": "Correlations of the residuals with themselves and with past inputs; chance leaves them "
+        "within the grey.",
+        "bound": "The error r_u that these data leave, against the admitted error r_adm.",
+    }.get(stem.removeprefix("data_"))
 
 
 def _frequency(table: Mapping[str, Array]) -> Array:
     return next(values for name, values in table.items() if name.startswith("frequency"))
 
 
-def _bound(table: Mapping[str, Array], result: Result) -> tuple[BoundCurves, str, str] | None:
+def _bound(table: Mapping[str, Array], result: Result) -> Drawn | None:
     if not {"r_u", "G_abs"} <= set(table):
         return None
     w = _frequency(table)
@@ -108,20 +128,20 @@ def _bound(table: Mapping[str, Array], result: Result) -> tuple[BoundCurves, str
     return curves, alt, _CAPTIONS["bound"]
 
 
-def _spectrum(table: Mapping[str, Array], result: Result) -> tuple[SpectrumCurves, str, str] | None:
+def _spectrum(table: Mapping[str, Array], result: Result, *, symbol: str) -> Drawn | None:
     if "phi" not in table:
         return None
     w, phi = _frequency(table), table["phi"]
     white = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation", [None])[0]
-    positive = w > 0
-    record = table["phi_record"][positive] if "phi_record" in table else None
-    curves = SpectrumCurves(w[positive], density=phi[positive], white=white, record=record)
+    record = table["phi_record"][:, None] if "phi_record" in table else None
+    density = phi[:, None, None].astype(np.complex128)
+    curves = SpectrumCurves(w, density, white=white, symbol=symbol, record=record)
     peak = w[int(np.argmax(phi))]
     alt = f"Spectral density of the excitation against frequency, with its peak at {peak:.3g}."
     return curves, alt, _CAPTIONS["spectrum"]
 
 
-def _optimality(table: Mapping[str, Array], result: Result) -> tuple[OptimalityCurves, str, str] | None:
+def _optimality(table: Mapping[str, Array], result: Result) -> Drawn | None:
     if "ratio" not in table:
         return None
     w, ratio = _frequency(table), table["ratio"]
@@ -130,7 +150,7 @@ def _optimality(table: Mapping[str, Array], result: Result) -> tuple[OptimalityC
     return curves, alt, _CAPTIONS["optimality"]
 
 
-def _signal(table: Mapping[str, Array], result: Result) -> tuple[SignalCurves, str, str] | None:
+def _signal(table: Mapping[str, Array], result: Result) -> Drawn | None:
     names = list(table)
     channels = {name: table[name] for name in names if not name.startswith("time")}
     if len(channels) == len(names) or not channels:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,10 +12,12 @@ from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import QUANTITIES, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.report.charts import Chart, svg_uri
-from inputdesign_cli.report.render import provenance
-from inputdesign_cli.report.words import ANSWERS, MAXIMISED, citations, question
+from inputdesign_cli.report.numbers import provenance
+from inputdesign_cli.report.question import Question, read_question
+from inputdesign_cli.report.sources import citations
+from inputdesign_cli.runs.objectives import OBJECTIVES
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import read_run
-from inputdesign_cli.specification import Spec, parse_spec
 
 MOST_ROWS = 200
 _SHOWN = (
@@ -31,17 +32,17 @@ _SHOWN = (
 )
 
 
-def sweep_page(root: Path) -> dict[str, Any]:
+def sweep_page(root: Path) -> dict[str, Json]:
     """The content of the template for a sweep. Raises `DataError` as `read_sweep` does."""
     table = read_sweep(root)
     summary = table.summary
     columns = [(name, title) for name, title in _SHOWN if any(table.columns.get(name, []))]
     names = [*table.axes, *(name for name, _ in columns)]
     rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]
-    spec, result = _first_run(table, root)
+    question, result = _first_run(table, root)
     return {
         "title": summary.get("title") or root.resolve().name,
-        "question": question(spec, summary["verb"]) if spec else [],
+        "question": question.sentences if question else (),
         "zipped": summary.get("zip", False),
         "axes": [(axis["key"], _values(axis["values"]), "") for axis in summary["axes"]],
         "answer": _answer(table),
@@ -53,18 +54,18 @@ def sweep_page(root: Path) -> dict[str, Any]:
         "verb": summary["verb"],
         "spec": (root / "sweep.yaml").read_text(encoding="utf-8"),
         "provenance": provenance(summary.get("environment", {})),
-        "citations": citations(spec, result) if spec else [],
+        "citations": citations(question, result) if question else [],
     }
 
 
-def _first_run(table: SweepTable, root: Path) -> tuple[Spec | None, dict[str, Any]]:
-    """The spec and the result of the first point that has one: they speak for the others."""
+def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str, Json]]:
+    """The question and the result of the first point that has one: they speak for the others."""
     run = next((run for run in table.columns["run"] if run), None)
     if run is None:
         return None, {}
     try:
         text = (root / run / "spec.yaml").read_text(encoding="utf-8")
-        return parse_spec(text), read_run(root / run)
+        return read_question(text, verb=table.summary["verb"]), read_run(root / run)
     except (OSError, SpecError, DataError):
         return None, {}
 
@@ -78,9 +79,10 @@ def _answer(table: SweepTable) -> str:
         return said
     kinds = {kind for kind in table.columns.get("objective.kind", []) if kind}
     kind = next(iter(kinds)) if len(kinds) == 1 else ""
-    best = int(np.nanargmax(values)) if kind in MAXIMISED else int(np.nanargmin(values))
+    known = OBJECTIVES.get(kind)
+    best = int(np.nanargmax(values) if known and known.maximised else np.nanargmin(values))
     point = ", ".join(f"{key} = {table.columns[key][best]}" for key in table.axes)
-    what = ANSWERS.get(kind, (quantity, ""))[0]
+    what = known.name if known else quantity
     low, high = np.nanmin(values), np.nanmax(values)
     return f"{said} Over the sweep the {what} ranges from {low:.5g} to {high:.5g}; it is best at {point}."
 

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-import inputdesign_cli
-from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
-from inputdesign_cli.runs.golden_file import Golden, GoldenRun, Quantity, load_golden
-
-__all__ = ["Golden", "GoldenRun", "Quantity", "Row", "compare", "execute", "load_golden"]
-
-Result = Mapping[str, Any]
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.runs.golden_file import Golden, Quantity
+from inputdesign_cli.runs.results import Json, Result
 
 
 @dataclass(frozen=True)
@@ -34,7 +29,7 @@ class Row:
     def passed(self) -> bool:
         return self.deviation is not None and abs(self.deviation) <= self.quantity.tolerance
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Json]:
         """The row in JSON's types."""
         return {
             "golden": self.golden,
@@ -50,22 +45,6 @@ class Row:
             "passed": self.passed,
             "note": self.note,
         }
-
-
-def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:
-    """The result of one run of a golden file, or the error that stands for it if there is no design.
-
-    Raises
-    ------
-    SpecError, DataError
-        The spec that the golden file names is not good: nothing can be compared.
-    """
-    spec = inputdesign_cli.load_spec(golden.spec_of(run), list(run.overrides))
-    try:
-        result: Result = getattr(inputdesign_cli, run.command)(spec).result
-    except (InfeasibleError, InaccurateError) as error:
-        return error
-    return result
 
 
 def compare(golden: Golden, results: Mapping[str, Result | IdesignError]) -> list[Row]:
@@ -84,7 +63,7 @@ def _look_up(result: Result | IdesignError | None, quantity: Quantity) -> tuple[
         return None, "the run has no result"
     if isinstance(result, IdesignError):
         return None, str(result)
-    value: Any = result
+    value: Json = result
     for step in quantity.steps:
         try:
             value = value[step]

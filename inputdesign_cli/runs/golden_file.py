@@ -20,27 +20,26 @@ A golden file holds runs, and each run the quantities to find in its result:
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import PlainValidator, ValidationError, model_validator
+from pydantic import AfterValidator, ValidationError
 
-from inputdesign_cli.errors import Diagnostic, SpecError
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification.models.fields import FileName, Number, Positive, Text
-from inputdesign_cli.specification.models.findings import Finding, Findings, fail
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.section import Section
-from inputdesign_cli.specification.models.translate import translate
-from inputdesign_cli.specification.models.values import text
 from inputdesign_cli.specification.yaml.files import read_text
-from inputdesign_cli.specification.yaml.places import format_key, parse_key
-from inputdesign_cli.specification.yaml.reader import Tree, read
+from inputdesign_cli.specification.yaml.places import parse_key
+from inputdesign_cli.specification.yaml.reader import read
 
 _PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
 
 
-def _result_path(value: Any) -> str:
-    path = text(value)
+def _result_path(path: str) -> str:
     if not _PATH.fullmatch(path):
         hint = "write objective.value or power.input[0]"
         raise fail("golden-path", f"{path!r} is no path into a result", hint)
@@ -50,7 +49,7 @@ def _result_path(value: Any) -> str:
 class Quantity(Section):
     """One number of a result: where it stands, what it should be, how far off it may be and why."""
 
-    path: Annotated[str, PlainValidator(_result_path)]
+    path: Annotated[Text, AfterValidator(_result_path)]
     expected: Number
     absolute: Positive | None = None
     relative: Positive | None = None
@@ -58,13 +57,14 @@ class Quantity(Section):
     source: Text
     label: Text = ""
 
-    @model_validator(mode="after")
-    def _one_tolerance(self) -> Quantity:
+    def check(self) -> Iterator[PathDiagnostic]:
+        """There is one tolerance, and it is above 0."""
         if (self.absolute is None) == (self.relative is None):
-            raise fail("golden-tolerance", "{key} needs one tolerance", "give either absolute or relative")
-        if self.absolute is None and self.expected == 0.0:
-            raise fail("golden-tolerance", "{key} of 0 is no tolerance", "give absolute", "relative")
-        return self
+            message, hint = "{key} needs one tolerance", "give either absolute or relative"
+            yield PathDiagnostic("golden-tolerance", message, hint)
+        elif self.absolute is None and self.expected == 0.0:
+            message = "{key} of 0 is no tolerance"
+            yield PathDiagnostic("golden-tolerance", message, "give absolute", ("relative",))
 
     @property
     def tolerance(self) -> float:
@@ -96,15 +96,13 @@ class _Content(Section):
     title: Text = ""
     runs: tuple[GoldenRun, ...]
 
-    @model_validator(mode="after")
-    def _names_differ(self) -> _Content:
-        findings = Findings()
+    def check(self) -> Iterator[PathDiagnostic]:
+        """The names of the runs differ."""
         names = [run.name for run in self.runs]
         for i, name in enumerate(names):
             if name in names[:i]:
-                findings.add("golden-name", f"two runs have the name {name!r}", "", "runs", i, "name")
-        findings.stop()
-        return self
+                message = f"two runs have the name {name!r}"
+                yield PathDiagnostic("golden-name", message, path=("runs", i, "name"))
 
 
 @dataclass(frozen=True)
@@ -123,26 +121,17 @@ class Golden:
 def load_golden(path: Path) -> Golden:
     """Read a golden file.
 
-    Raises
-    ------
-    SpecError
-        Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
-        `golden-path`, `golden-tolerance`, `golden-name`.
+    Raises:
+        SpecError: Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
+            `golden-path`, `golden-tolerance`, `golden-name`.
     """
     tree = read(read_text(path), str(path))
-    readers: dict[Any, Any] = {}
     try:
-        content = _Content.model_validate(tree.data, context=readers)
+        content = _Content.model_validate(tree.data)
     except ValidationError as error:
-        findings = translate(error.errors(), tree.data, readers)
-        raise SpecError([*tree.diagnostics, *(_complaint(finding, tree) for finding in findings)]) from None
+        found = translate(error, tree.data, _Content)
+        placed = [one.placed(tree.places, "the file") for one in found]
+        raise SpecError([*tree.diagnostics, *placed]) from None
     if tree.diagnostics:
         raise SpecError(tree.diagnostics)
     return Golden(Path(path), content.title or Path(path).stem, content.runs)
-
-
-def _complaint(finding: Finding, tree: Tree) -> Diagnostic:
-    key = format_key(finding.path)
-    location = tree.places.location(tree.places.mark(finding.path, at_key=finding.at_key))
-    message, hint = (part.replace("{key}", key or "the file") for part in (finding.message, finding.hint))
-    return Diagnostic(finding.code, message, hint, key, location)

@@ -6,7 +6,6 @@ from inputdesign_cli.signal.constraints import largest_move as largest_move
 from inputdesign_cli.signal.crest import crest_factor as crest_factor
 from inputdesign_cli.signal.crest import optimise_phases as optimise_phases
 from inputdesign_cli.signal.designed import DesignedSpectrum as DesignedSpectrum
-from inputdesign_cli.signal.designed import RecordBasis as RecordBasis
 from inputdesign_cli.signal.evaluation import Target as Target
 from inputdesign_cli.signal.generator import SignalGenerator as SignalGenerator
 from inputdesign_cli.signal.lines import Lines as Lines
@@ -26,10 +25,6 @@ from inputdesign_cli.signal.selection import best_record as best_record
 from inputdesign_cli.signal.settings import LineVectors as LineVectors
 from inputdesign_cli.signal.settings import Quantiser as Quantiser
 from inputdesign_cli.signal.settings import SignalSettings as SignalSettings
-from inputdesign_cli.signal.single import channel_outputs as channel_outputs
-from inputdesign_cli.signal.single import channel_record_information as channel_record_information
-from inputdesign_cli.signal.single import input_and_output as input_and_output
-from inputdesign_cli.signal.single import record_information as record_information
 from inputdesign_cli.signal.sinusoids import Sinusoids as Sinusoids
 from inputdesign_cli.signal.sinusoids import select as select
 from inputdesign_cli.signal.spectral_factor import SpectralFactor as SpectralFactor

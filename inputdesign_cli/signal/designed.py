@@ -11,19 +11,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.lines import Lines, grid_lines, merged
-from inputdesign_cli.spectrum import (
-    DirectedLines,
-    FirBasis,
-    FlatBasis,
-    LinesBasis,
-    MatrixFirBasis,
-    PolynomialBasis,
-    TabulatedChannels,
-)
-
-RecordBasis = (
-    FirBasis | MatrixFirBasis | LinesBasis | DirectedLines | FlatBasis | PolynomialBasis | TabulatedChannels
-)
+from inputdesign_cli.spectrum import Basis, TabulatedSpectrum
 
 
 @dataclass(frozen=True)
@@ -49,16 +37,14 @@ class DesignedSpectrum:
     autocovariances: Array | None = None
 
     @classmethod
-    def of(cls, basis: RecordBasis, x: Array, *, inputs: int = 1, step: float = 1.0) -> DesignedSpectrum:
+    def of(
+        cls, basis: Basis | TabulatedSpectrum, x: Array, *, inputs: int = 1, step: float = 1.0
+    ) -> DesignedSpectrum:
         """The spectrum with coefficients `x` on `basis`."""
         power = float(x @ basis.integrals(partial(_unit, inputs), np.zeros(0, dtype=complex)))
-        if isinstance(basis, LinesBasis):
-            carrying = x > 0
-            lines = Lines(basis.frequencies[carrying], x[carrying, None, None].astype(complex))
-            return cls(inputs, power, step, sinusoids=lines, free=basis.free)
-        if isinstance(basis, DirectedLines):
+        if not basis.has_density:
             return cls(inputs, power, step, sinusoids=Lines(*basis.lines(x)), free=basis.free)
-        moving_average = x if isinstance(basis, FirBasis) else None
+        moving_average = basis.moving_average(x)
         return cls(inputs, power, step, partial(basis.density, x), autocovariances=moving_average)
 
     def lines(self, period: int, hold: int = 1) -> Lines:
@@ -71,7 +57,8 @@ class DesignedSpectrum:
         if self.density is not None:
             w = np.asarray(2.0 * np.pi * np.arange(period // 2 + 1) / (period * step), dtype=np.float64)
             return grid_lines(self.density(w), period, step)
-        assert self.sinusoids is not None
+        if self.sinusoids is None:
+            raise ValueError("a spectrum has a density or sinusoids")
         lines = Lines(self.sinusoids.frequencies * step, self.sinusoids.powers)
         return merged(lines, period) if self.free else lines
 

@@ -31,13 +31,13 @@ class MatrixFactor:
     floor: float
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
-        """(n, samples): stationary noise through the taps."""
+        """(samples, n): stationary noise through the taps."""
         n = self.taps.shape[1]
         drive = rng.standard_normal((n, samples + self.taps.shape[0] - 1))
-        out = np.zeros((n, samples))
+        out = np.zeros((samples, n))
         for i in range(n):
             for j in range(n):
-                out[i] += scipy.signal.fftconvolve(drive[j], self.taps[:, i, j], mode="valid")
+                out[:, i] += scipy.signal.fftconvolve(drive[j], self.taps[:, i, j], mode="valid")
         return out
 
 

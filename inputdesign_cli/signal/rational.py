@@ -60,7 +60,7 @@ class RationalFilter:
         return RationalFilter(self.A, self.B, factor * self.C, factor * self.D)
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
-        """(n, samples): stationary noise, started from the stationary distribution of the state."""
+        """(samples, n): stationary noise, started from the stationary distribution of the state."""
         covariance = scipy.linalg.solve_discrete_lyapunov(self.A, self.B @ self.B.T)
         values, vectors = np.linalg.eigh(covariance)
         state = vectors @ (np.sqrt(np.maximum(values, 0)) * rng.standard_normal(self.order))
@@ -69,7 +69,7 @@ class RationalFilter:
         for t in range(samples):
             out[t] = self.C @ state + self.D @ drive[t]
             state = self.A @ state + self.B @ drive[t]
-        return out.T
+        return out
 
 
 def rational_filter(taps: Array, order: int) -> RationalFilter:

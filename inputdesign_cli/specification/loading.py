@@ -13,14 +13,13 @@ from pydantic import ValidationError
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.specification.checks.everything import related, run_checks
 from inputdesign_cli.specification.models.experiment import Cost
-from inputdesign_cli.specification.models.findings import Finding
-from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
-from inputdesign_cli.specification.models.translate import shorten, translate
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import compose
-from inputdesign_cli.specification.yaml.places import Path, Places, format_key
+from inputdesign_cli.specification.yaml.places import Path, Places
 from inputdesign_cli.specification.yaml.reader import Tree, read
 from inputdesign_cli.specification.yaml.source import Source
 
@@ -33,14 +32,15 @@ _MOST_ROUNDS = 50
 def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Spec:
     """Read a spec file.
 
-    Parameters
-    ----------
-    path : the YAML file.
-    overrides : `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
+    Args:
+        path: The YAML file.
+        overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
 
-    Raises
-    ------
-    SpecError : with one diagnostic for everything that is wrong, in the order of the file.
+    Returns:
+        The checked spec, with defaults filled in.
+
+    Raises:
+        SpecError: With one diagnostic for everything that is wrong, in the order of the file.
     """
     return _parse(read_text(path), os.fspath(path), overrides, FilePath(path).parent)
 
@@ -48,12 +48,19 @@ def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Sp
 def parse_spec(
     text: str, file: str = "<spec>", overrides: Sequence[str] = (), *, folder: FilePath | None = None
 ) -> Spec:
-    """Read a spec from its text. Raises `SpecError` as `load_spec` does.
+    """Read a spec from its text.
 
-    Parameters
-    ----------
-    file : the name in diagnostics.
-    folder : what the paths in the spec are relative to (default: the current folder).
+    Args:
+        text: YAML.
+        file: The name in diagnostics.
+        overrides: As for `load_spec`.
+        folder: What the paths in the spec are relative to (default: the current folder).
+
+    Returns:
+        The checked spec, with defaults filled in.
+
+    Raises:
+        SpecError: With one diagnostic for everything that is wrong, in the order of the file.
     """
     return _parse(text.removeprefix("\ufeff"), file, overrides, folder or FilePath())
 
@@ -71,8 +78,8 @@ def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> 
             )
         )
     compose(tree, folder, overrides)
-    spec, findings = _validate(tree)
-    diagnostics = [*tree.diagnostics, *(_complaint(f, tree.places) for f in findings)]
+    spec, found = _validate(tree)
+    diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
         raise SpecError(_sorted(diagnostics, tree.places))
     spec = _with_defaults(spec)
@@ -80,14 +87,14 @@ def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> 
     return spec
 
 
-def _validate(tree: Tree) -> tuple[Spec | None, list[Finding]]:
+def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
     """Validate, take out what is wrong, and validate again, until the rest is a spec that can be checked.
 
-    So a wrong number in `plant` does not hide a contradiction in `accuracy`; findings about what was taken
-    out, or about what contains it, are consequences and not reported.
+    So a wrong number in `plant` does not hide a contradiction in `accuracy`. What is wrong with a part
+    that was taken out, or with what contains it, is a consequence and is not reported.
     """
     data = copy.deepcopy(tree.data)
-    findings: list[Finding] = []
+    told: list[PathDiagnostic] = []
     broken = set(tree.broken)
     for path in _empty(data, ()):
         comma = isinstance(path[-1], str) and path[-1].isdecimal()
@@ -96,42 +103,38 @@ def _validate(tree: Tree) -> tuple[Spec | None, list[Finding]]:
             if comma
             else "write a value, or remove the key"
         )
-        findings.append(Finding("empty-value", "{key} has no value", hint, path, at_key=True))
+        told.append(PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True))
         broken.add(path)
         _prune(data, path)
     for attempt in range(_MOST_ROUNDS):
-        readers: dict[int, type[Section]] = {}
         try:
-            spec = Spec.model_validate(data, context=readers)
+            spec = Spec.model_validate(data)
         except ValidationError as error:
-            found = translate(error.errors(include_url=False), data, readers)
+            found = translate(error, data, Spec)
             # Under its right name a misspelt key would be there: it is neither missing nor without effect.
-            broken |= {(*f.path[:-1], f.meant) for f in found if f.meant}
-            known = set(broken)
-            findings += [f for f in found if not _consequence(f, known, attempt)]
-            for finding in found:
-                broken.add(finding.path)
-            for finding in found:
-                _prune(data, finding.path)
+            broken |= {(*one.path[:-1], one.meant) for one in found if one.meant}
+            told += [one for one in found if not _consequence(one, broken, attempt)]
+            for one in found:
+                broken.add(one.path)
+                _prune(data, one.path)
             continue
-        checked = [shorten(f, tree.data) for f in run_checks(spec, broken)]
-        findings += [f for f in checked if not related(f.path, broken)]
-        return spec, findings
-    return None, findings
+        checked = [shorten(one, tree.data) for one in run_checks(spec, broken)]
+        return spec, told + [one for one in checked if not related(one.path, broken)]
+    return None, told
 
 
-def _consequence(finding: Finding, broken: set[Path], attempt: int) -> bool:
-    """Whether a finding follows from what was taken out before it.
+def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool:
+    """Whether this follows from what was taken out before.
 
     What was taken out may have told which kind of plant or spectrum this is, so later attempts say nothing
     about keys: what is missing or too much was said by the first.
     """
-    if attempt > 0 and finding.code in ("unknown-key", "unsuitable-key"):
+    if attempt > 0 and found.code in ("unknown-key", "unsuitable-key"):
         return True
-    if finding.keys:
-        return any(related((*finding.path, key), broken) for key in finding.keys)
-    missing = attempt > 0 and finding.code == "missing-key"
-    return related(finding.path[:-1] if missing else finding.path, broken)
+    if found.keys:
+        return any(related((*found.path, key), broken) for key in found.keys)
+    missing = attempt > 0 and found.code == "missing-key"
+    return related(found.path[:-1] if missing else found.path, broken)
 
 
 def _empty(data: Any, path: Path) -> list[Path]:
@@ -171,14 +174,6 @@ def _with_defaults(spec: Spec) -> Spec:
     if spec.spectrum is None and spec.goal == "least_cost" and spec.plant.sampled and single:
         update["spectrum"] = FirSpectrum(type="fir")
     return spec.model_copy(update=update) if update else spec
-
-
-def _complaint(finding: Finding, places: Places) -> Diagnostic:
-    key = format_key(finding.path)
-    name = key or "the spec"
-    location = places.location(places.mark(finding.path, at_key=finding.at_key))
-    message, hint = (text.replace("{key}", name) for text in (finding.message, finding.hint))
-    return Diagnostic(finding.code, message, hint, key, location)
 
 
 def _sorted(diagnostics: list[Diagnostic], places: Places) -> list[Diagnostic]:

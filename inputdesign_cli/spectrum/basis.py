@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
-Density = Callable[[Array], NDArray[np.float64]]
+# From frequencies (n,) to values (n, ..) of one input, or Hermitian matrices (n, .., r, r) of several.
+Density = Callable[[Array], NDArray]
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,9 @@ class Basis(Protocol):
 
     The cone is never handed to a solver whole. A design starts on `first_face` and enlarges it where
     `price` shows that a spectrum outside of it would pay.
+
+    A family has a density over frequency, or it consists of sinusoids; the other of `density` and `lines` is
+    then empty. Densities of one input are (n,), those of r inputs Hermitian (n, r, r).
     """
 
     @property
@@ -82,8 +85,62 @@ class Basis(Protocol):
         """Number of unknowns."""
         ...
 
+    @property
+    def inputs(self) -> int:
+        """Number of inputs r."""
+        ...
+
+    @property
+    def has_density(self) -> bool:
+        """Whether the family has a density over frequency (else it consists of sinusoids)."""
+        ...
+
+    @property
+    def free(self) -> bool:
+        """Whether it grows to every spectrum whatever."""
+        ...
+
+    @property
+    def degree(self) -> int:
+        """How fast a density may oscillate over the band, as the degree of a polynomial."""
+        ...
+
+    @property
+    def knots(self) -> Array:
+        """Frequencies at which the density may have a kink."""
+        ...
+
+    def density(self, x: Array, w: ArrayLike) -> NDArray:
+        """Phi at frequencies `w` (n,)."""
+        ...
+
+    def lines(self, x: Array) -> tuple[Array, ComplexArray]:
+        """Frequencies (L,), ascending, and power matrices (L, r, r) of the sinusoids that carry power."""
+        ...
+
+    def spread(self, powers: Array) -> Array:
+        """(size,): excitation with these powers (r,) of the channels, uncorrelated, flat over the family."""
+        ...
+
+    @property
+    def even(self) -> Array:
+        """(size,): the same of total power one, even over the channels."""
+        ...
+
+    def in_units(self, units: Array) -> Basis:
+        """The family for channels of these units (r,); only where that changes where a design begins."""
+        ...
+
+    def moving_average(self, x: Array) -> Array | None:
+        """c_0 .. c_m of one input, where a moving average has this spectrum; else None."""
+        ...
+
+    def directed(self, frequency: float, direction: ComplexArray) -> Array:
+        """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
+        ...
+
     def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
-        """(size, ...): (1 / 2 pi) integral of the even function density(w) times each basis function."""
+        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function."""
         ...
 
     def coarser(self) -> Sequence[Basis]:
@@ -102,27 +159,42 @@ class Basis(Protocol):
         """A face that holds the current solution `y` and the `directions` (the basis may grow with it)."""
         ...
 
+    def described(self, x: Array, unit: float) -> Mapping[str, object]:
+        """The type of the family and what it takes to restate the spectrum, as plain data and arrays.
 
-def pointwise_scale(price: Functional, value: Functional, grid: Array) -> tuple[float, Array, Array]:
-    """The largest s for which price(w) >= s value(w) at every frequency.
+        Args:
+            unit: what frequencies are divided by to be those of the user.
+        """
+        ...
 
-    Valid for every spectrum whatever, since every spectrum is a mixture of sinusoids. What a price picks
-    up at single frequencies only adds to it and is left out; a value that does proves nothing (s = 0).
 
-    Returns:
-        s, and the local maxima of value / price over [grid[0], grid[-1]]: frequencies and ratios.
-    """
+class DensityFamily:
+    """What families with a density over frequency have in common."""
 
-    def ratio(w: ArrayLike) -> Array:
-        at = np.asarray(w, dtype=float)
-        cost = price.density(at)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            quotient = value.density(at) / cost
-        # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
-        return np.where(cost > 0, quotient, -np.inf)
+    has_density = True
+    free = False
+    knots: Array = np.zeros(0)
 
-    peaks, heights = local_maxima(ratio, grid, ratio(grid))
-    top = heights.max(initial=0.0)
-    if value.concentrated:
-        return 0.0, peaks, heights
-    return (np.inf if top <= 0 else 1.0 / top), peaks, heights
+    if TYPE_CHECKING:
+
+        @property
+        def inputs(self) -> int: ...
+
+        def spread(self, powers: Array) -> Array: ...
+
+    @property
+    def even(self) -> Array:
+        """(size,): total power one, even over the channels."""
+        return self.spread(np.full(self.inputs, 1.0 / self.inputs))
+
+    def lines(self, x: Array) -> tuple[Array, ComplexArray]:
+        """None: there are no sinusoids."""
+        return np.zeros(0), np.zeros((0, self.inputs, self.inputs), dtype=complex)
+
+    def moving_average(self, x: Array) -> Array | None:
+        """None: no finite one."""
+        return None
+
+    def in_units(self, units: Array) -> Self:
+        """Itself: units do not matter."""
+        return self

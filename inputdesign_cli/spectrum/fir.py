@@ -1,10 +1,11 @@
-"""FIR spectra: Phi(w) = c_0 + 2 sum_{r=1..m} c_r cos(r w), the c_r autocovariances of the excitation.
+"""FIR spectra of one input: Phi(w) = c_0 + 2 sum_{t=1..m} c_t cos(t w), c_t the autocovariances.
 
-Least-costly paper, (14); m = 0 is white noise.
+[bombois-least-costly], (14); m = 0 is white noise. The fast path of `matrix_fir` for one input.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing, pointwise_scale
+from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Functional, Pricing
+from inputdesign_cli.spectrum.directions import directed_scale
 from inputdesign_cli.spectrum.svec import smat, svec_layout
 
 _FIRST_ORDER = 11  # spectra up to this order are designed whole, in one face
@@ -24,10 +26,10 @@ _SINGULAR_PRICE = 1e-10
 
 
 @dataclass(frozen=True)
-class FirBasis:
+class FirBasis(DensityFamily):
     """The unknowns are c_0 .. c_m (m = `order`); the cone is that of nonnegative cosine polynomials.
 
-    Each of those is a sum of |v_i(e^{jw})|^2, v_i polynomials of degree m (Fejer, Riesz). With the
+    Each of those is a sum of |v_i(e^{jw})|^2, v_i polynomials of degree m ([fejer-riesz-1916]). With the
     v_i in the span of the columns of V (m + 1, q) it is v(w)^* Q v(w), Q >= 0 of order q: this is a
     face, and its generators are V. The full Gram matrix has order m + 1, but the optimal one is of
     low rank, so a few generators, found by pricing, reach the optimum.
@@ -35,16 +37,25 @@ class FirBasis:
 
     order: int
 
+    inputs = 1
+
     @property
     def size(self) -> int:
         return self.order + 1
 
     @property
-    def white(self) -> Array:
-        """(m + 1,): the flat spectrum of power one."""
-        unit = np.zeros(self.size)
-        unit[0] = 1.0
-        return unit
+    def degree(self) -> int:
+        return self.order
+
+    def spread(self, powers: Array) -> Array:
+        """(m + 1,): the flat spectrum of this power (1,)."""
+        flat = np.zeros(self.size)
+        flat[0] = powers[0]
+        return flat
+
+    def moving_average(self, x: Array) -> Array | None:
+        """The autocovariances themselves."""
+        return x
 
     def functions(self, w: ArrayLike) -> Array:
         """(n, m + 1): the basis functions 1, 2 cos w, .., 2 cos m w."""
@@ -84,7 +95,7 @@ class FirBasis:
         """The largest s with price - s value >= 0 on every spectrum of this basis.
 
         A linear functional of c_0 .. c_m is nonnegative on all nonnegative cosine polynomials exactly
-        when its Toeplitz matrix is positive semidefinite (Caratheodory, Toeplitz): a generalised
+        when its Toeplitz matrix is positive semidefinite ([caratheodory-1911]): a generalised
         eigenvalue, whose leading eigenvectors are the spectra |v|^2 that pay best. Where the price
         itself nearly vanishes, rounding spoils that eigenvalue, and the pointwise ratio, which is
         valid too, stands in.
@@ -94,7 +105,7 @@ class FirBasis:
         spread = np.linalg.eigvalsh(metric)
         if spread[0] <= _SINGULAR_PRICE * spread[-1]:
             _, vectors = scipy.linalg.eigh(worth - metric, subset_by_index=[first, self.order])
-            return Pricing(pointwise_scale(price, value, grid)[0], vectors)
+            return Pricing(directed_scale(price, value, grid)[0], vectors)
         ratios, vectors = scipy.linalg.eigh(worth, metric, subset_by_index=[first, self.order])
         return Pricing(1.0 / ratios[-1] if ratios[-1] > 0 else np.inf, vectors)
 
@@ -131,6 +142,10 @@ class FirBasis:
             order=generators.shape[1],
             generators=generators,
         )
+
+    def described(self, x: Array, unit: float) -> Mapping[str, object]:
+        """The autocovariances c_0 .. c_m."""
+        return {"type": "fir", "order": self.order, "coefficients": x}
 
 
 def _toeplitz(g: Array) -> Array:

@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.information import ChannelExperiment, Experiment, Quadrature, integrate_band
+from inputdesign_cli.information import Experiment, Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
-from inputdesign_cli.spectrum.channels import weighted_sums
-from inputdesign_cli.spectrum.directed_lines import DirectedLines
-from inputdesign_cli.spectrum.fir import FirBasis
-from inputdesign_cli.spectrum.lines import LinesBasis
+from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Functional, Pricing
+from inputdesign_cli.spectrum.directions import weighted_sums
 
 
 @dataclass(frozen=True)
-class FlatBasis:
+class FlatBasis(DensityFamily):
     """The unknown is the total power; Phi = level I on `band`, zero outside."""
 
     inputs: int
     band: tuple[float, float]
 
     size = 1
-    order = 0
-
-    @property
-    def white(self) -> Array:
-        """(1,): power one."""
-        return np.ones(1)
+    degree = 0
 
     def spread(self, powers: Array) -> Array:
         """(1,): their sum; what a channel has alone is not of this family."""
         return np.array([np.sum(powers)])
+
+    def moving_average(self, x: Array) -> Array | None:
+        """White noise of one input over the whole circle; otherwise there is none."""
+        return x if self.inputs == 1 and self.band == (0.0, np.pi) else None
 
     @property
     def level(self) -> float:
@@ -77,16 +74,12 @@ class FlatBasis:
         """Nothing to add."""
         return self, face
 
+    def described(self, x: Array, unit: float) -> Mapping[str, object]:
+        """The power; of one input also as the autocovariance c_0."""
+        entry = {"type": "white", "power": float(x[0])}
+        return entry | ({"order": 0, "coefficients": x} if self.inputs == 1 else {})
 
-def flat_basis(experiment: Experiment | ChannelExperiment) -> FirBasis | FlatBasis:
+
+def flat_basis(experiment: Experiment) -> FlatBasis:
     """White excitation for an experiment: what its coordinates are whitened with."""
-    if isinstance(experiment, Experiment):
-        return FirBasis(0)
     return FlatBasis(experiment.inputs, experiment.band)
-
-
-def free_lines(experiment: Experiment | ChannelExperiment, grid: Array) -> LinesBasis | DirectedLines:
-    """Sinusoids anywhere on [grid[0], grid[-1]]: every spectrum of the experiment's inputs there."""
-    if experiment.inputs == 1:
-        return LinesBasis.anywhere(grid)
-    return DirectedLines.anywhere(float(grid[0]), float(grid[-1]), experiment.inputs)

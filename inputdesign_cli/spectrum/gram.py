@@ -14,8 +14,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum.basis import Face, Functional, Pricing
-from inputdesign_cli.spectrum.channels import directed_scale, leading_pairs
+from inputdesign_cli.spectrum.basis import DensityFamily, Face, Functional, Pricing
+from inputdesign_cli.spectrum.directions import directed_scale, leading_pairs
 from inputdesign_cli.spectrum.svec import smat
 
 _WHOLE = 28  # Gram matrices up to this order are designed whole, in one face
@@ -27,7 +27,7 @@ _SINGULAR_PRICE = 1e-12
 
 
 @dataclass(frozen=True)
-class GramBasis(ABC):
+class GramBasis(DensityFamily, ABC):
     """A family for `inputs` r, of `order` m; Q has the order n = r (m + 1), degree by degree.
 
     A face has generators V (n, q): Q = V Y V^* with a real Y >= 0 of order q. Where Q may be complex
@@ -45,6 +45,10 @@ class GramBasis(ABC):
         return self.inputs * (self.order + 1)
 
     @property
+    def degree(self) -> int:
+        return self.order
+
+    @property
     def _copies(self) -> int:
         """How many times n generators span the whole cone."""
         return 2 if self.hermitian else 1
@@ -56,11 +60,6 @@ class GramBasis(ABC):
     @abstractmethod
     def spread(self, powers: Array) -> Array:
         """(size,): flat excitation with these powers (r,) of the channels, uncorrelated."""
-
-    @property
-    def white(self) -> Array:
-        """(size,): flat excitation of total power one, even over the channels."""
-        return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     @abstractmethod
     def products(self, generators: NDArray) -> Array:

@@ -1,77 +1,203 @@
 """Line spectra: sinusoids of free power, at given frequencies or wherever they pay.
 
-With free frequencies this is every spectrum whatever: an information matrix that some spectrum
-reaches is reached by finitely many sinusoids (Caratheodory).
+Each has a direction v across the channels; the power matrix of a line, Hermitian (r, r), is the sum over its
+directions of power v v^*. With free frequencies this is every spectrum whatever: an information matrix that
+some spectrum reaches is reached by finitely many sinusoids (Caratheodory).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing, pointwise_scale
+from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
+from inputdesign_cli.spectrum.directions import (
+    best_directions,
+    directed_scale,
+    first_directions,
+    matrices,
+)
 
 _FIRST_LINES = 24
-_MOST_NEW = 12
+_MOST_NEW = 16
+# Two atoms at one frequency are the same when their directions agree this closely.
+_SAME = 1e-12
+# An atom is in use from this share of the cost, and near another within this distance (band and turn).
+_USED = 1e-4
+_NEAR = 0.2
+# What hardly counts among limits that are not all there is to pay keeps a finite unit.
+_FREE = 1e-12
 
 
 @dataclass(frozen=True)
 class LinesBasis:
-    """The unknowns are the powers (mean squares) of sinusoids at `frequencies` (L,) in rad/sample.
+    """The unknowns are the powers of atoms: sinusoids at `frequencies` (L,) along `directions` (L, r).
 
-    With `free` the basis grows by the frequencies at which a sinusoid would pay, so that prices
-    hold for every spectrum on `band`; without, the frequencies are all there is.
+    Directions have length one, so that the power is the total over the channels; they are told apart in
+    `units` (r,) of the channels. The basis grows by
+    the atoms that would pay: anywhere on the grid when `free`, else at `allowed` frequencies with any
+    direction. Prices then hold for every spectrum, or for every spectrum on those lines.
     """
 
     frequencies: Array
+    directions: ComplexArray
+    allowed: Array
+    units: Array
     free: bool = False
-    band: tuple[float, float] = (0.0, np.pi)
+
+    has_density = False
+    degree = 0
+    knots = np.zeros(0)
 
     @classmethod
-    def anywhere(cls, grid: Array) -> LinesBasis:
-        """Free frequencies on [grid[0], grid[-1]], to begin with some spread linearly and logarithmically."""
-        lo, hi = max(grid[0], 1e-3 * grid[-1]), grid[-1]
-        start = np.concatenate([np.linspace(lo, hi, _FIRST_LINES), np.geomspace(lo, hi, _FIRST_LINES)])
-        return cls(np.unique(start), free=True, band=(float(grid[0]), float(grid[-1])))
+    def anywhere(cls, lo: float, hi: float, inputs: int) -> LinesBasis:
+        """Free frequencies on [lo, hi], to begin with some spread linearly and logarithmically."""
+        low = max(lo, 1e-3 * hi)
+        start = np.concatenate([np.linspace(low, hi, _FIRST_LINES), np.geomspace(low, hi, _FIRST_LINES)])
+        return replace(cls.at(np.unique(start), inputs), free=True)
+
+    @classmethod
+    def at(cls, frequencies: Array, inputs: int) -> LinesBasis:
+        """Lines at these frequencies, to begin with along each channel and pair of channels."""
+        even = np.zeros((frequencies.size, inputs), dtype=complex)
+        return cls(frequencies, even, frequencies, np.ones(inputs)).in_units(np.ones(inputs))
+
+    def in_units(self, units: Array) -> LinesBasis:
+        """The first lines once more, with directions that suit channels of these units (r,)."""
+        start = first_directions(units)
+        w = self.allowed
+        return replace(
+            self, frequencies=np.repeat(w, len(start)), directions=np.tile(start, (w.size, 1)), units=units
+        )
 
     @property
     def size(self) -> int:
         return self.frequencies.size
 
     @property
-    def flat(self) -> Array:
-        """(L,): power one spread evenly over the lines."""
-        return np.full(self.size, 1.0 / self.size)
+    def inputs(self) -> int:
+        return self.directions.shape[1]
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
-        """(L, ...): the density at each line, which is what a sinusoid of power one picks up."""
-        return density(self.frequencies)
+    def density(self, x: Array, w: ArrayLike) -> NDArray:
+        """Zero: sinusoids have no density."""
+        shape = () if self.inputs == 1 else (self.inputs, self.inputs)
+        return np.zeros((np.size(w), *shape))
+
+    def directed(self, frequency: float, direction: ComplexArray) -> Array:
+        """Zero, as the density."""
+        return np.zeros(self.size)
+
+    @property
+    def even(self) -> Array:
+        """(L,): power one, spread evenly over the lines and channels."""
+        return self.spread(np.full(self.inputs, 1.0 / self.inputs))
 
     def coarser(self) -> list[LinesBasis]:
         """None: lines are cheap."""
         return []
 
+    def spread(self, powers: Array) -> Array:
+        """(L,): these powers (r,) of the channels, uncorrelated, each spread evenly over the lines."""
+        axes = (np.abs(self.directions) > 1.0 - _SAME).astype(float)
+        return axes @ (powers / np.sum(axes, axis=0))
+
+    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+        """(L, ...): v^* D(w) v, what an atom of power one picks up."""
+        values = density(self.frequencies)
+        if self.inputs == 1:
+            return values
+        return np.einsum("na,n...ab,nb->n...", self.directions.conj(), values, self.directions).real
+
     def first_face(self, price: Functional) -> Face:
-        """All lines, in units of their price."""
-        return Face(np.diag(1.0 / price.vector), "nonnegative", self.size, self.frequencies)
+        """All atoms, in units of their price."""
+        least = _FREE * price.vector.max()
+        return Face(
+            np.diag(1.0 / np.maximum(price.vector, least)), "nonnegative", self.size, self.frequencies
+        )
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """The ratio at the lines, or over all frequencies with its peaks as new lines."""
-        if not self.free:
-            top = float(np.max(value.vector / price.vector))
-            return Pricing(1.0 / top if top > 0 else np.inf, np.zeros(0))
-        inside = np.union1d(grid[(grid >= self.band[0]) & (grid <= self.band[1])], self.band)
-        scale, peaks, heights = pointwise_scale(price, value, inside)
-        return Pricing(scale, peaks[np.argsort(-heights)][:_MOST_NEW])
+        """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction)."""
+        if self.free:
+            scale, where, heights, directions = directed_scale(price, value, grid)
+        else:
+            where = self.allowed
+            heights, directions = best_directions(price.density(where), value.density(where))
+            top = heights.max(initial=0.0)
+            scale = np.inf if top <= 0 else 1.0 / top
+        best = np.argsort(-heights)[:_MOST_NEW]
+        return Pricing(scale, np.column_stack([where[best], directions[best]]))
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
-        """The lines so far and those at `directions`; x of the old basis is the head of x of the new."""
-        new = np.array([w for w in directions if np.min(np.abs(w - self.frequencies)) > 1e-10])
-        if new.size == 0:
+        """The atoms so far and the new ones; x of the old basis is the head of x of the new."""
+        rows = [*directions, *self._around(y, directions)]
+        fresh = [row for row in rows if self._is_new(float(row[0].real), row[1:])]
+        if not fresh:
             return self, face
-        grown = replace(self, frequencies=np.concatenate([self.frequencies, new]))
-        costs = np.concatenate([price.vector, price.density(new)])
-        return grown, grown.first_face(Functional(costs, price.density))
+        added = np.array(fresh)
+        grown = replace(
+            self,
+            frequencies=np.concatenate([self.frequencies, added[:, 0].real]),
+            directions=np.concatenate([self.directions, added[:, 1:]]),
+        )
+        at = matrices(price.density(added[:, 0].real))
+        costs = np.einsum("na,nab,nb->n", added[:, 1:].conj(), at, added[:, 1:]).real
+        return grown, grown.first_face(Functional(np.concatenate([price.vector, costs]), price.density))
+
+    def _around(self, y: Array, atoms: NDArray) -> list[NDArray]:
+        """Halfway from the nearest atom in use to each of the new ones, and as far beyond.
+
+        Each round moves the best frequencies and directions a little less than the round before; what lies
+        on both sides of a new atom saves a quarter of the rounds.
+        """
+        used = np.flatnonzero(y > _USED * y.sum())
+        span, found = max(float(np.ptp(self.allowed)), np.finfo(float).tiny), []
+        for atom in atoms if used.size else []:
+            w, v = float(atom[0].real), atom[1:]
+            apart = np.abs(self.frequencies[used] - w) / span
+            turned = 1.0 - self._alike(self.directions[used], v)
+            distance = np.where(self.free | (apart == 0.0), apart + turned, np.inf)
+            nearest = used[int(np.argmin(distance))]
+            if distance.min() > _NEAR:
+                continue
+            old = self.directions[nearest]
+            phase = np.vdot(old, v)
+            old = old * phase / abs(phase)
+            for share in (0.5, 1.5):
+                at = self.frequencies[nearest] + share * (w - self.frequencies[nearest])
+                turn = old + share * (v - old)
+                if self.allowed[0] <= at <= self.allowed[-1]:
+                    found.append(np.concatenate([[at], turn / np.linalg.norm(turn)]))
+        return found
+
+    def _is_new(self, frequency: float, direction: ComplexArray) -> bool:
+        near = np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300)
+        return not np.any(self._alike(self.directions[near], direction) > 1.0 - _SAME)
+
+    def _alike(self, directions: ComplexArray, direction: ComplexArray) -> Array:
+        """(n,): squared cosines between directions, in the units of the channels."""
+        one, other = directions / self.units, direction / self.units
+        size = np.linalg.norm(one, axis=1) * np.linalg.norm(other)
+        return np.abs(one.conj() @ other / size) ** 2
+
+    def moving_average(self, x: Array) -> Array | None:
+        """None: sinusoids have no density."""
+        return None
+
+    def lines(self, x: Array) -> tuple[Array, ComplexArray]:
+        """Frequencies (number,) with power, ascending, and their power matrices (number, r, r)."""
+        w, inverse = np.unique(self.frequencies, return_inverse=True)
+        power = np.zeros((w.size, self.inputs, self.inputs), dtype=complex)
+        outer = np.einsum("na,nb->nab", self.directions, self.directions.conj())
+        np.add.at(power, inverse.ravel(), np.maximum(x, 0.0)[:, None, None] * outer)
+        kept = np.trace(power, axis1=1, axis2=2).real > 0
+        return w[kept], power[kept]
+
+    def described(self, x: Array, unit: float) -> Mapping[str, object]:
+        """Frequencies and powers: numbers of one input, else Hermitian matrices."""
+        w, powers = self.lines(x)
+        shown = powers[:, 0, 0].real if self.inputs == 1 else powers
+        return {"type": "free" if self.free else "multisine", "frequencies": w / unit, "powers": shown}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information import Quadrature, integrate
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density
-from inputdesign_cli.spectrum.channels import weighted_sums
+from inputdesign_cli.spectrum.directions import weighted_sums
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import svec_layout, svec_length
 
@@ -20,7 +21,7 @@ class MatrixFirBasis(GramBasis):
     """The unknowns are the upper triangle of c_0 by columns, then c_1 .. c_m (r, r) row by row.
 
     `inputs` r, `order` m. A spectrum of this family is nonnegative exactly when it is V Q V^* with
-    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 (matrix Fejer, Riesz); c_t is the sum of the
+    V(w) = [I, e^{-jw} I, .., e^{-jwm} I] and a real Q >= 0 ([dritschel-rovnyak-2010]); c_t is the sum of the
     blocks (s + t, s) of Q.
     """
 
@@ -94,22 +95,29 @@ class MatrixFirBasis(GramBasis):
         return blocks.reshape(r * (m + 1), r * (m + 1))
 
     def products(self, generators: NDArray) -> Array:
-        """c_t of (v_a v_b^* + v_b v_a^*) / 2, by convolution along the lags."""
+        """(size, q (q + 1) / 2): x of (v_a v_b^* + v_b v_a^*) / 2 for each pair of generators (n, q).
+
+        A generator v holds the taps v(0) .. v(m), (r,) each, of a filter, and c_t of a pair is the sum over s
+        of v_a(s + t) v_b(s)^T made symmetric in a and b: a correlation along the lags, done by FFT.
+        """
         r, number = self.inputs, generators.shape[1]
         length = 2 * (self.order + 1)
         taps = np.zeros((self.order + 1, r, number))
         taps.reshape(-1, number)[: len(generators)] = generators
-        transform = np.fft.rfft(taps, length, axis=0)
-        left, right, scale = svec_layout(number)
+        spectra = np.fft.rfft(taps, length, axis=0)
+        a, b, scale = svec_layout(number)
         rows, columns, _ = svec_layout(r)
-        lags = np.arange(self.order + 1)
-        out = np.zeros((self.size, left.size))
-        tail = out[rows.size :].reshape(self.order, r, r, left.size)
+        out = np.zeros((self.size, a.size))
+        later = out[rows.size :].reshape(self.order, r, r, a.size)
         for i in range(r):
             for j in range(r):
-                product = transform[:, i][:, left] * transform[:, j][:, right].conj()
-                product = product + transform[:, i][:, right] * transform[:, j][:, left].conj()
-                c = 0.5 * np.fft.irfft(product, length, axis=0)[lags] * scale
+                pair = spectra[:, i][:, a] * spectra[:, j][:, b].conj()
+                pair = pair + spectra[:, i][:, b] * spectra[:, j][:, a].conj()
+                c = 0.5 * np.fft.irfft(pair, length, axis=0)[: self.order + 1] * scale
                 out[np.flatnonzero((rows == i) & (columns == j))] = c[:1]
-                tail[:, i, j] = c[1:]
+                later[:, i, j] = c[1:]
         return out
+
+    def described(self, x: Array, unit: float) -> Mapping[str, object]:
+        """The autocovariances c_0 .. c_m, (r, r) each."""
+        return {"type": "fir", "order": self.order, "coefficients": self.autocovariances(x)}

@@ -1,6 +1,6 @@
 """Spectra that are polynomials in frequency: Phi(w) = 1/2 W(w) S W(w)^* on a band, zero outside.
 
-Spectral design paper, (8)-(9), with S = H H^T in place of the factor H: only S enters the information
+[mohan-spectral], (8)-(9), with S = H H^T in place of the factor H: only S enters the information
 and the powers, which are linear in it. W = [p_0 I, .., p_m I], and the band is the half band [lo, hi]
 mapped to [-1, 1]: a polynomial on [-w_c, w_c] with real coefficients need not be an even spectrum,
 and what is not even is not the spectrum of any real signal.
@@ -8,7 +8,8 @@ and what is not even is not the spectrum of any real signal.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density
-from inputdesign_cli.spectrum.channels import weighted_sums
+from inputdesign_cli.spectrum.directions import weighted_sums
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import hmat, hvec, hvec_layout, smat, svec, svec_layout, svec_length
 
@@ -38,6 +39,7 @@ class PolynomialBasis(GramBasis):
 
     band: tuple[float, float] = (0.0, np.pi)
     hermitian: bool = False
+    shown_in: BasisName = "legendre"  # the polynomials in which results state the coefficients
 
     @property
     def size(self) -> int:
@@ -51,7 +53,7 @@ class PolynomialBasis(GramBasis):
         return hvec(flat.astype(complex)) if self.hermitian else svec(flat)
 
     def of_order(self, order: int) -> PolynomialBasis:
-        return PolynomialBasis(self.inputs, order, self.band, self.hermitian)
+        return replace(self, order=order)
 
     def functions(self, w: ArrayLike) -> Array:
         """(n, m + 1): p_0 .. p_m, zero outside of the band."""
@@ -137,3 +139,13 @@ class PolynomialBasis(GramBasis):
             change[: degree + 1, degree] = column
         spread = np.kron(change, np.eye(self.inputs))
         return spread @ S @ spread.T
+
+    def described(self, x: Array, unit: float) -> Mapping[str, object]:
+        """S in the polynomials that results are stated in, and the band."""
+        return {
+            "type": "polynomial",
+            "basis": self.shown_in,
+            "order": self.order,
+            "band": [edge / unit for edge in self.band],
+            "coefficients": self.coefficients(x, self.shown_in),
+        }

@@ -1,6 +1,6 @@
 """Symmetric matrices as vectors: the upper triangle by columns, off-diagonal entries times sqrt(2).
 
-The scaling makes svec(A) . svec(B) = tr(A B); the order is the one that Clarabel uses.
+The scaling makes svec(A) . svec(B) = tr(A B); the order is the one that Clarabel uses ([goulart-chen-2024]).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A spectrum that is given as a table: nothing to design, but everything to integrate."""
+"""A spectrum that is given as a table, in any unit of frequency: nothing to design, but all to integrate."""
 
 from __future__ import annotations
 
@@ -7,34 +7,68 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.information import Quadrature, integrate
+from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density
+from inputdesign_cli.spectrum.basis import Density, DensityFamily
+
+_NODES_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
-class TabulatedSpectrum:
-    """Phi(w), linear between the points of a table and zero outside it."""
+class TabulatedSpectrum(DensityFamily):
+    """x Phi(w), with Phi linear between the points of a table and zero outside it.
 
-    frequency: Array  # (n,) ascending, rad/sample
-    phi: Array  # (n,) nonnegative
+    White excitation on a band, of any powers of the channels, is a table of two points.
+    """
+
+    frequency: Array  # (n,) ascending
+    phi: ComplexArray  # (n, r, r), Hermitian and positive semidefinite
+
+    size = 1
+
+    @classmethod
+    def white(cls, powers: Array, band: tuple[float, float]) -> TabulatedSpectrum:
+        """Independent channels of these `powers` (r,), each flat over `band`."""
+        level = np.diag(powers * np.pi / (band[1] - band[0])).astype(complex)
+        return cls(np.array(band), np.array([level, level]))
 
     @property
-    def size(self) -> int:
-        """One: a table is a single spectrum."""
-        return 1
+    def knots(self) -> Array:  # type: ignore[override]
+        return self.frequency
 
-    def density(self, w: ArrayLike) -> Array:
-        """Phi (n,) at frequencies `w` (n,)."""
-        return np.interp(np.asarray(w, dtype=float), self.frequency, self.phi, left=0.0, right=0.0)
+    @property
+    def inputs(self) -> int:
+        return self.phi.shape[1]
+
+    def density(self, x: Array, w: ArrayLike) -> NDArray:
+        """Phi at `w`: (n,) for one input, else (n, r, r)."""
+        phi = x[0] * self._at(np.asarray(w, dtype=float))
+        return phi[:, 0, 0].real if self.inputs == 1 else phi
+
+    def _at(self, w: Array) -> ComplexArray:
+        right = np.clip(np.searchsorted(self.frequency, w), 1, self.frequency.size - 1)
+        left = right - 1
+        part = (w - self.frequency[left]) / (self.frequency[right] - self.frequency[left])
+        lo, hi = self.frequency[0], self.frequency[-1]
+        slack = 1e-12 * hi
+        inside = (w >= lo - slack) & (w <= hi + slack)
+        part = np.clip(part, 0.0, 1.0)
+        mixed = (1 - part)[:, None, None] * self.phi[left] + part[:, None, None] * self.phi[right]
+        return mixed * inside[:, None, None]
 
     def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
-        """(1, ...): (1 / 2 pi) integral of the even function density(w) times Phi."""
+        """(1, ...): (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w."""
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
-            return np.tensordot(self.density(rule.nodes) * rule.weights, density(rule.nodes), axes=(0, 0))[
-                None
-            ]
+            total: NDArray | float = 0.0
+            for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
+                part = slice(start, start + _NODES_AT_ONCE)
+                values = density(rule.nodes[part])
+                if self.inputs == 1:
+                    values = values[..., None, None]
+                weighted = self._at(rule.nodes[part]) * rule.weights[part, None, None]
+                total = total + np.einsum("n...ab,nba->...", values, weighted, optimize=True).real
+            return np.asarray(total)[None]
 
-        lo, hi = float(self.frequency[0]), float(self.frequency[-1])
-        return integrate(moments, singularities, lo=lo, hi=hi, knots=self.frequency)
+        band = (float(self.frequency[0]), float(self.frequency[-1]))
+        return integrate_band(moments, singularities, band, knots=self.frequency)

@@ -8,16 +8,15 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import get_args
 
-import inputdesign_cli
 from inputdesign_cli import __version__
 from inputdesign_cli.errors import SpecError, bad_spec
-from inputdesign_cli.specification import Draft, read_draft
+from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
-from inputdesign_cli.sweep.point import PointTask
+from inputdesign_cli.sweep.point import PointJob
+from inputdesign_cli.sweep.verbs import Verb
 
-Verb = Literal["solve", "analyse", "simulate"]
 _KEY_LENGTH = 24
 _TRIED = 50
 
@@ -26,7 +25,7 @@ _TRIED = 50
 class Plan:
     """The points of a sweep, in order."""
 
-    draft: Draft
+    draft: SpecTemplate
     grid: Grid
     verb: Verb
     _keys: list[str] = field(default_factory=list, repr=False)
@@ -43,7 +42,7 @@ class Plan:
             self._keys.append(hashlib.sha256(name.encode()).hexdigest()[:_KEY_LENGTH])
         return self._keys[index]
 
-    def task(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointTask:
+    def job(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointJob:
         """A point for a worker; `with_files` if the worker may not see the files that the spec names."""
         overrides = tuple(self.grid.overrides(self.grid[index]))
         files = None
@@ -51,14 +50,13 @@ class Plan:
             with suppress(SpecError):
                 names = self.draft.files(self.draft.variant(overrides))
                 files = {name: (self.draft.folder / name).read_bytes() for name in names}
-        return PointTask(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
+        return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
 
     def check(self) -> None:
         """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
 
-        Raises
-        ------
-        SpecError : what is wrong with the first point, if no point that is tried can be read.
+        Raises:
+            SpecError: what is wrong with the first point, if no point that is tried can be read.
         """
         first: SpecError | None = None
         for index in dict.fromkeys(i * (len(self.grid) - 1) // _TRIED for i in range(_TRIED + 1)):
@@ -80,15 +78,14 @@ class Plan:
 def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb) -> Plan:
     """Read the spec and the settings.
 
-    Raises
-    ------
-    SpecError : the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
+    Raises:
+        SpecError: the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
     """
-    if not hasattr(inputdesign_cli, verb):
+    if verb not in get_args(Verb):
         hint = "sweep with --verb solve"
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
-    draft = read_draft(spec, fixed)
+    draft = read_template(spec, fixed)
     plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
     plan.check()
     return plan

@@ -1,23 +1,21 @@
-"""Spec -> problem -> outcome: the only room that knows the words of the YAML and the mathematics."""
+"""The verbs: spec in, results out. A spec becomes a task once; nothing after that knows the spec."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.specification import RegressionPlant, Spec
-from inputdesign_cli.tasks.analysis import analyse_given
-from inputdesign_cli.tasks.assessment import assess as assess
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.build.channels import has_channels
-from inputdesign_cli.tasks.build.loop_error_problem import build_problem
-from inputdesign_cli.tasks.build.regression_task import build_regression
-from inputdesign_cli.tasks.build.task import build_analysis, build_task
-from inputdesign_cli.tasks.channel_analysis import analyse_channels, build_channel_analysis
-from inputdesign_cli.tasks.channel_design import solve_channels
-from inputdesign_cli.tasks.design import solve_convex
-from inputdesign_cli.tasks.identification import identify as identify
-from inputdesign_cli.tasks.loop_error import solve_closed_loop_error
-from inputdesign_cli.tasks.regression import solve_regression
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.assessment import Assessment
+from inputdesign_cli.tasks.assessment import assess as assess_record
+from inputdesign_cli.tasks.build.given import build_given
+from inputdesign_cli.tasks.build.identification import build_identification
+from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.identification import identify as identify_record
 
 
 def solve(spec: Spec) -> Results:
@@ -28,16 +26,8 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
-    if not spec.designs:
-        return analyse(spec)
-    try:
-        if isinstance(spec.plant, RegressionPlant):
-            return solve_regression(spec)
-        if spec.accuracy.closed_loop_error is not None:
-            return solve_closed_loop_error(spec)
-        return solve_channels(spec) if has_channels(spec) else solve_convex(spec)
-    except IdesignError as error:
-        raise spec.place(error) from error
+    with _placed(spec):
+        return build_task(spec).solve()
 
 
 def analyse(spec: Spec) -> Results:
@@ -46,25 +36,57 @@ def analyse(spec: Spec) -> Results:
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    try:
-        several = has_channels(spec) and not spec.designs
-        return analyse_channels(spec) if several else analyse_given(spec)
-    except IdesignError as error:
-        raise spec.place(error) from error
+    with _placed(spec):
+        return build_given(spec).solve()
 
 
 def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing."""
+    with _placed(spec):
+        build_task(spec).check()
+
+
+def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
+    """Design the experiment, or take the given one, and try it many times on a simulated true system.
+
+    Args:
+        executor: where batches of runs are computed (default: in this process); the result does not depend
+            on it.
+
+    Raises:
+        SpecError: what this version does not simulate, and all that `solve` raises.
+    """
+    with _placed(spec):
+        return build_task(spec).simulate(executor)
+
+
+def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
+
+    Raises:
+        SpecError: the plant is not supported.
+        DataError: the file cannot be used, or the data do not determine the parameters.
+    """
+    with _placed(spec):
+        return identify_record(build_identification(spec), Path(data), remove_means=remove_means)
+
+
+def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
+    """Identify the model from a real experiment, compare what the data buy with what is asked, and top up.
+
+    Raises:
+        SpecError: nothing is asked that data could meet; see `identify` and `solve`.
+        DataError: the file cannot be used.
+        InfeasibleError, InaccurateError: of the top-up.
+    """
+    with _placed(spec):
+        return assess_record(build_identification(spec), Path(data), remove_means=remove_means)
+
+
+@contextmanager
+def _placed(spec: Spec) -> Iterator[None]:
+    """Errors with the lines of the spec that they concern."""
     try:
-        if not spec.designs:
-            build_channel_analysis(spec) if has_channels(spec) else build_analysis(spec)
-        elif isinstance(spec.plant, RegressionPlant):
-            build_regression(spec)
-        elif spec.accuracy.closed_loop_error is not None:
-            build_problem(spec)
-        elif has_channels(spec):
-            build_channel_task(spec)
-        else:
-            build_task(spec)
+        yield
     except IdesignError as error:
         raise spec.place(error) from error

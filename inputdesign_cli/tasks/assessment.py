@@ -1,25 +1,28 @@
-"""Spec and data -> does the real experiment meet the target, and if not, what is still to be done."""
+"""Data -> does the real experiment meet the target, and if not, what is still to be done."""
 
 from __future__ import annotations
 
-import json
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
-from inputdesign_cli.accuracy import EntryOfPlant, worst_violation
-from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Results
-from inputdesign_cli.specification import Spec, parse_spec
-from inputdesign_cli.tasks.build.channels import has_channels
-from inputdesign_cli.tasks.channel_design import solve_channels
-from inputdesign_cli.tasks.channel_identification import ChannelIdentified
-from inputdesign_cli.tasks.design import solve_convex
-from inputdesign_cli.tasks.identification import Identified, identified
+from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.identification import (
+    Identification,
+    ModelQuestion,
+    identification_results,
+    identified,
+)
+from inputdesign_cli.tasks.result.design import requirement_entry
+from inputdesign_cli.tasks.result.estimates import identification_entry
 
 _ROUNDING = 1e-9
+Part = TypeVar("Part", Table, Curves)
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class Assessment:
     outcome: Results
 
 
-def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
+def assess(task: Identification, path: Path, *, remove_means: bool = False) -> Assessment:
     """Identify the model from a real experiment and compare what the data buy with what is asked.
 
     Both sides are evaluated at the new estimate: r_u by the information of the data themselves (and of
@@ -42,79 +45,52 @@ def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Asses
         DataError: the file cannot be used.
         InfeasibleError, InaccurateError: of the top-up.
     """
-    try:
-        return _assess(spec, Path(data), remove_means)
-    except IdesignError as error:
-        raise spec.place(error) from error
-
-
-def _assess(spec: Spec, path: Path, remove_means: bool) -> Assessment:
-    if not spec.accuracy.requirements:
-        raise spec.complain(
+    if not task.assessable:
+        raise bad_spec(
             "nothing-to-assess",
             "the spec states no accuracy that data could meet or miss",
             hint="state one, such as accuracy: {model_error: {relative: 0.05}}",
             key="accuracy",
         )
     started = time.perf_counter()
-    found = identified(spec, path, remove_means=remove_means)
-    information = found.estimate.information + found.experiment.prior_information
-    met, listed = _requirements(found, information)
-    identification = found.outcome(spec, started)
-    if met or not spec.designs:
-        verdict = {"met": met, "requirements": listed}
-        result = {**identification.result, "status": "met" if met else "missed", "assessment": verdict}
-        return Assessment(met, replace(identification, result=result))
-    topped = _top_up(found, information)
+    found = identified(task, path, remove_means=remove_means)
+    question = found.question
+    information = found.estimate.information + question.experiment.prior_information
+    met, listed = _evaluated(task.header.units, question, information)
+    assessment: dict[str, Json] = {"met": met, "requirements": listed}
+    identification = identification_results(task, found, started)
+    if met or question.top_up is None:
+        status = {"status": "met" if met else "missed", "assessment": assessment}
+        return Assessment(met, replace(identification, result={**identification.result, **status}))
+    topped = question.top_up(information)
+    notes = [*topped.result.get("notes", []), *identification.result.get("notes", [])]
     result = {
         **topped.result,
-        "title": spec.title,
+        "title": task.header.title,
         "status": "missed",
-        "identification": found.entry,
-        "assessment": {"met": False, "requirements": listed, "top_up_status": topped.result["status"]},
-        "notes": [*topped.result.get("notes", []), *found.notes],
+        "identification": identification_entry(found.estimate),
+        "assessment": {**assessment, "top_up_status": topped.result["status"]},
+        "notes": notes,
     }
-    tables = {**topped.tables, **{f"data_{k}": t for k, t in identification.tables.items()}}
-    curves = {**topped.curves, **{f"data_{k}": c for k, c in identification.curves.items()}}
     return Assessment(
         False,
         replace(
             topped,
             result=result,
-            tables=tables,
-            curves=curves,
+            tables={**topped.tables, **_of_data(identification.tables)},
+            curves={**topped.curves, **_of_data(identification.curves)},
             files={**topped.files, **identification.files},
         ),
     )
 
 
-def _requirements(
-    found: Identified | ChannelIdentified, information: Array
-) -> tuple[bool, list[dict[str, Any]]]:
+def _of_data(parts: Mapping[str, Part]) -> dict[str, Part]:
+    return {f"data_{name}": part for name, part in parts.items()}
+
+
+def _evaluated(
+    units: Units, question: ModelQuestion, information: Array
+) -> tuple[bool, list[dict[str, Json]]]:
     """Whether the information of the data meets what is asked, and each requirement with its worst ratio."""
-    listed: list[dict[str, Any]] = []
-    for make in found.requirements():
-        requirement = make(found.experiment)
-        violation = worst_violation(requirement, information)
-        entry: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
-        if violation.frequency is not None:
-            entry["frequency"] = violation.frequency / found.frequency_unit
-        if isinstance(requirement, EntryOfPlant):
-            entry["entry"] = requirement.label
-        listed.append(entry)
+    listed = [requirement_entry(units, r, information) for r in question.requirements]
     return all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed), listed
-
-
-def _top_up(found: Identified | ChannelIdentified, information: Array) -> Results:
-    """The design on the new estimate with the data as prior information."""
-    prior = {
-        "parameters": list(found.estimate.names),
-        "information": (0.5 * (information + information.T)).tolist(),
-    }
-    spec = parse_spec(
-        found.spec.to_yaml(),
-        file="top-up",
-        overrides=[f"experiment.prior={json.dumps(prior)}"],
-        folder=found.spec.resolve_path("."),
-    )
-    return solve_channels(spec) if has_channels(spec) else solve_convex(spec)

@@ -7,15 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion
+from inputdesign_cli.accuracy import Level
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import PolynomialBasis, hvec, svec
 
 _STARTS = 3
+
+
+@dataclass(frozen=True)
+class FewColumns:
+    """How many columns a factor may have, and the seed of the random starts."""
+
+    columns: int
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -27,23 +34,20 @@ class Climbed:
     entry: dict[str, Any]
 
 
-def restrict_columns(spec: Spec, design: Design) -> Climbed | None:
-    """Climb from the optimum cut to `factor_columns` and from random factors; None when not asked for.
+def restrict_columns(asked: FewColumns, design: Design) -> Climbed:
+    """Climb from the optimum cut to so few columns and from random factors.
 
     The bound of the design over all factors stays: it is the paper's upper bound.
     """
-    columns = getattr(spec.spectrum, "factor_columns", None)
-    if columns is None:
-        return None
     problem, x = design.problem, design.result.x
-    basis, criterion = problem.basis, problem.requirements[0]
-    assert isinstance(basis, PolynomialBasis)
-    assert isinstance(criterion, Criterion)
-    columns = min(columns, basis.gram_order)
+    basis, criterion = problem.basis, problem.requirements[0].criterion
+    if not isinstance(basis, PolynomialBasis) or criterion is None:
+        raise ValueError("a factor of few columns is for a criterion and a polynomial spectrum")
+    columns = min(asked.columns, basis.gram_order)
     quadratic = _quadratic(problem, basis, criterion)
     values, vectors = np.linalg.eigh(basis.matrix(x))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    rng = np.random.default_rng(spec.signal.seed or 0)
+    rng = np.random.default_rng(asked.seed)
     found = hill_climb(quadratic, columns, starts=_STARTS, rng=rng, guesses=[root])
     S = found.factor @ found.factor.conj().T
     climbed = hvec(S) if basis.hermitian else svec(S.real)
@@ -58,7 +62,7 @@ def restrict_columns(spec: Spec, design: Design) -> Climbed | None:
     )
 
 
-def _quadratic(problem: Problem, basis: PolynomialBasis, criterion: Criterion) -> QuadraticDesign:
+def _quadratic(problem: Problem, basis: PolynomialBasis, criterion: Level) -> QuadraticDesign:
     k = problem.experiment.size
     maps = np.array([[basis.gram(problem.information_map[:, i, j]) for j in range(k)] for i in range(k)])
     limits = tuple(

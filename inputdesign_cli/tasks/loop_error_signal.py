@@ -4,102 +4,104 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from inputdesign_cli.design.loop_error import LoopErrorDesign
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.signal.lines import Lines, grid_lines
 from inputdesign_cli.signal.matrix_factor import matrix_factor
+from inputdesign_cli.signal.periodic import even_multisine, harmonics, periodogram
 from inputdesign_cli.signal.rational import rational_filter
-from inputdesign_cli.signal.tabulated_multisine import lines_of, matrix_multisine, periodogram_masses
-from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.loop_error_design import ClosedLoopDesign
-
-_CANDIDATES = 20
 
 
 @dataclass(frozen=True)
-class ClosedLoopSignal:
-    """The samples (n, N), what made them, and what is worth reporting of how well they serve."""
+class LoopErrorSignalSettings:
+    """How the record is made.
+
+    Attributes:
+        filtered: by a filter from white noise; otherwise it is a multisine of equal `periods`.
+        order: of a rational filter, states for each input; None: as many taps as it takes.
+        candidates: records of which the best is taken.
+    """
+
+    samples: int
+    filtered: bool
+    periods: int
+    order: int | None
+    candidates: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class LoopErrorSignal:
+    """The samples (N, n), what made them, and what is worth reporting of how well they serve."""
 
     samples: Array
     method: str
-    details: dict[str, Any]
+    details: dict[str, object]
 
 
-def realise_closed_loop(spec: Spec, design: ClosedLoopDesign) -> ClosedLoopSignal:
-    """The best of several records by the error that their own samples give, scaled into the limits.
-
-    Raises:
-        SpecError: for a filter of a design that consists of lines.
-    """
-    samples = spec.signal_samples
-    details: dict[str, Any] = {}
-    n = design.problem.plant.inputs
-    if spec.signal.type == "filtered_noise":
-        make, details = _by_filter(spec, design, samples)
-        method = "filtered_noise"
-    else:
-        method = "multisine"
-        periods = _periods(spec, samples, n)
-        masses = design.masses(samples // periods)
-        details["periods"] = periods
-
-        def make(rng: np.random.Generator) -> Array:
-            return matrix_multisine(masses, samples, rng, periods=periods)
-
+def realise(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> LoopErrorSignal:
+    """The best of several records by the error that their own samples give, scaled into the limits."""
+    make, details = (_by_filter if settings.filtered else _by_multisine)(design, settings)
+    w = harmonics(settings.samples)
+    metrics = design.problem.metrics(w)
     best, value = None, np.inf
-    for stream in np.random.SeedSequence(spec.signal.seed or 0).spawn(spec.signal.candidates or _CANDIDATES):
-        u = _within_limits(design, make(np.random.default_rng(stream)))
+    for stream in np.random.SeedSequence(settings.seed).spawn(settings.candidates):
+        u = make(np.random.default_rng(stream))
+        powers = periodogram(u).powers
+        # What brings the record to its limits, by its own spectrum.
+        excess = np.max(np.einsum("pkab,kba->p", metrics, powers).real / design.problem.most)
         try:
-            M = design.criterion.information(
-                lines_of(samples), periodogram_masses(u), np.ones(samples // 2 + 1)
-            )
+            M = design.criterion.information(w, powers / excess, np.ones(w.size))
             attained = design.criterion.value(M)
         except np.linalg.LinAlgError:  # too short to excite every parameter
             attained = np.inf
         if best is None or attained < value:
-            best, value = u, attained
+            best, value = u / np.sqrt(excess), attained
     assert best is not None
     if np.isfinite(value):
         details["parametric_value"] = value
-    return ClosedLoopSignal(best, method, details)
+    return LoopErrorSignal(best, "filtered_noise" if settings.filtered else "multisine", details)
 
 
-def _periods(spec: Spec, samples: int, n: int) -> int:
-    """Blocks of the multisine: as many as inputs where the record can be split so, or as asked."""
-    if spec.signal.periods is not None:
-        if samples % spec.signal.periods:
-            raise spec.complain(
-                "conflicting-keys",
-                f"{samples} samples do not make {spec.signal.periods} equal periods",
-                hint="choose a divisor of the number of samples",
-                key="signal.periods",
-            )
-        return spec.signal.periods
-    return n if samples % n == 0 else 1
+def design_lines(design: LoopErrorDesign, samples: int) -> Lines:
+    """The design on the harmonics of so many samples."""
+    if design.of_lines:
+        lines = Lines(design.frequencies, design.spectrum)
+        return Lines.of_period(lines.dense(samples), samples)
+    return grid_lines(design.density(harmonics(samples)), samples, 1.0)
 
 
-def _by_filter(
-    spec: Spec, design: ClosedLoopDesign, samples: int
-) -> tuple[Callable[[np.random.Generator], Array], dict[str, Any]]:
-    if design.lines is not None:
-        raise spec.complain(
-            "not-supported",
-            "this version makes multisines of a parametric design, which consists of lines",
-            hint="write type: multisine, or covariance: asymptotic",
-            key="signal.type",
-        )
+def white_lines(design: LoopErrorDesign, samples: int) -> Lines:
+    """White noise of the same total power, in the band of the design."""
+    return grid_lines(design.white_density(harmonics(samples)), samples, 1.0)
+
+
+Make = Callable[[np.random.Generator], Array]
+
+
+def _by_multisine(
+    design: LoopErrorDesign, settings: LoopErrorSignalSettings
+) -> tuple[Make, dict[str, object]]:
+    samples, periods = settings.samples, settings.periods
+    lines = design_lines(design, samples // periods)
+    return lambda rng: even_multisine(lines, samples, rng, periods=periods), {"periods": periods}
+
+
+def _by_filter(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> tuple[Make, dict[str, object]]:
+    samples = settings.samples
     factor = matrix_factor(design.density)
-    details: dict[str, Any] = {"spectral_factor_residual": factor.residual, "floor": factor.floor}
-    if spec.signal.order is None:
+    details: dict[str, object] = {"spectral_factor_residual": factor.residual, "floor": factor.floor}
+    if settings.order is None:
         details["taps"] = int(factor.taps.shape[0])
         return lambda rng: factor.filtered(samples, rng), details
-    filter_ = rational_filter(factor.taps, spec.signal.order)
-    wanted = float(np.trace(design.covariance("input")))
+    filter_ = rational_filter(factor.taps, settings.order)
+    wanted = float(np.trace(design.input_covariance))
     filter_ = filter_.scaled(float(np.sqrt(wanted / filter_.power().sum())))
-    nodes, weights = design.rule.nodes, design.rule.weights
-    M = design.criterion.information(nodes, filter_.spectrum(nodes), weights)
+    w, weights = design.frequencies, design.weights
+    M = design.criterion.information(w, filter_.spectrum(w), weights)
     details |= {
         "order": filter_.order,
         "pole_radius": filter_.radius,
@@ -107,12 +109,3 @@ def _by_filter(
         "filter": {"A": filter_.A, "B": filter_.B, "C": filter_.C, "D": filter_.D},
     }
     return lambda rng: filter_.filtered(samples, rng), details
-
-
-def _within_limits(design: ClosedLoopDesign, u: Array) -> Array:
-    """The record times the factor that brings it to its limits, by its own spectrum."""
-    samples = u.shape[1]
-    masses = periodogram_masses(u)
-    metrics = design.problem.metrics(lines_of(samples))
-    powers = np.einsum("pkab,kba->p", metrics, masses).real
-    return np.asarray(u / np.sqrt(np.max(powers / design.problem.most)))

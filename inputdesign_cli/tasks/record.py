@@ -8,16 +8,15 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, Requirement
+from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     Bounds,
     DesignedSpectrum,
     Record,
-    RecordBasis,
     SignalGenerator,
     SignalSettings,
     Target,
@@ -77,7 +76,7 @@ class RecordRequest:
         return -(-(self.samples or experiment) // block) * block
 
 
-def make_record(request: RecordRequest, design: Design, experiment: ChannelExperiment) -> Record | None:
+def make_record(request: RecordRequest, design: Design, experiment: Experiment) -> Record | None:
     """The best of several records of the designed spectrum.
 
     Best is the least power that meets the requirements by the record itself, or the best criterion. None when
@@ -127,7 +126,7 @@ def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGen
 
 def given_record(
     request: RecordRequest,
-    experiment: ChannelExperiment,
+    experiment: Experiment,
     spectrum: DesignedSpectrum,
     ratio: Callable[[Array], float],
 ) -> Record | None:
@@ -147,9 +146,7 @@ def given_record(
 
 def designed_spectrum(request: RecordRequest, design: Design, inputs: int) -> DesignedSpectrum:
     """The spectrum of a design, for values as far apart as asked."""
-    basis = design.result.basis
-    assert isinstance(basis, RecordBasis)
-    return DesignedSpectrum.of(basis, design.result.x, inputs=inputs, step=request.step)
+    return DesignedSpectrum.of(design.result.basis, design.result.x, inputs=inputs, step=request.step)
 
 
 def least_period(inputs: int) -> int:
@@ -186,13 +183,12 @@ def record_notes(request: RecordRequest, experiment: int, record: Record) -> lis
 
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
     """What ranks records: a criterion by itself, to be large, other requirements by their worst ratio."""
-    first = requirements[0] if requirements else None
-    if isinstance(first, Criterion):
-        criterion = first
-        return lambda information: -criterion.level(information)
-    return worst_ratio(requirements)
+    criterion = requirements[0].criterion if requirements else None
+    if criterion is None:
+        return worst_ratio(requirements)
+    return lambda information: -criterion.level(information)
 
 
 def _cost(problem: Problem, basis: Basis, x: Array, weights: Mapping[PowerKind, Weight]) -> float:
-    at = problem if basis is problem.basis else replace(problem, basis=basis, finer=None)
+    at = problem.on(basis)
     return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))

@@ -12,6 +12,7 @@ import pytest
 import typer
 
 import inputdesign_cli
+from inputdesign_cli import specification, tasks
 from inputdesign_cli.cli import app, main
 from inputdesign_cli.cli.init import Kind
 from inputdesign_cli.cli.terminal import aligned, colourful, status
@@ -79,13 +80,14 @@ def verbs(monkeypatch):
         calls.append((path, overrides))
         return path
 
-    def outcome(spec):
+    def results(spec):
         return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
-    monkeypatch.setitem(vars(inputdesign_cli), "load_spec", load_spec)
+    monkeypatch.setattr(specification, "load_spec", load_spec)
+    monkeypatch.setattr("inputdesign_cli.sweep.golden_runs.load_spec", load_spec)
     for verb in ("solve", "analyse"):
-        monkeypatch.setitem(vars(inputdesign_cli), verb, outcome)
-    monkeypatch.setitem(vars(inputdesign_cli), "validate", lambda spec: None)
+        monkeypatch.setattr(tasks, verb, results)
+    monkeypatch.setattr(tasks, "validate", lambda spec: None)
     return calls
 
 
@@ -95,7 +97,7 @@ def failing(monkeypatch, verbs):
         def fail(spec):
             raise error
 
-        monkeypatch.setitem(vars(inputdesign_cli), verb, fail)
+        monkeypatch.setattr(tasks, verb, fail)
 
     return install
 
@@ -139,7 +141,7 @@ def test_quiet_prints_nothing(run, verbs):
 
 def test_the_summary_of_a_result_with_nothing_in_it(run, verbs, monkeypatch):
     bare = Results({"format": 1, "objective": {"kind": "D", "value": 59.2, "upper_bound": 59.3}}, "")
-    monkeypatch.setitem(vars(inputdesign_cli), "solve", lambda spec: bare)
+    monkeypatch.setattr(tasks, "solve", lambda spec: bare)
     code, out, err = run("solve", "a.yaml")
     assert (code, err) == (0, "")
     assert "log det M" in out
@@ -265,11 +267,13 @@ def test_progress_goes_to_terminals_only(monkeypatch, capsys):
     with status("working", quiet=False):
         pass
     assert capsys.readouterr() == ("", "")
+    monkeypatch.setenv("TERM", "xterm")
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with status("working", quiet=False):
-        assert terminal.text == "working"
-    assert terminal.text.endswith("\r\x1b[K")
+    with status("[working] on it", quiet=False):
+        pass
+    assert "[working] on it" in terminal.text
+    assert terminal.text.endswith("\x1b[2K"), "the line is cleared"
     terminal.text = ""
     with status("working", quiet=True):
         pass
@@ -278,6 +282,17 @@ def test_progress_goes_to_terminals_only(monkeypatch, capsys):
 
 def test_columns_are_aligned():
     assert aligned([("a", "1"), ("bcd", "22")], right=[1]) == ["a     1", "bcd  22"]
+    assert aligned([("漢", "[x]"), ("bcd", "y")]) == ["漢   [x]", "bcd  y"]
+
+
+def test_lines_break_on_a_terminal_and_nowhere_else(monkeypatch):
+    rows = [("note", "one two three " * 10)]
+    assert len(aligned(rows, wrap=True)) == 1
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = aligned(rows, wrap=True)
+    assert max(map(len, lines)) <= 40
+    assert all(line.startswith("      ") for line in lines[1:])
 
 
 # The commands -------------------------------------------------------------------------------------
@@ -288,7 +303,7 @@ def test_validate_reports_all_files_at_once(run, verbs, monkeypatch):
         if spec.stem != "good":
             raise SpecError(diagnostic(spec.stem))
 
-    monkeypatch.setitem(vars(inputdesign_cli), "validate", validate)
+    monkeypatch.setattr(tasks, "validate", validate)
     code, out, err = run("validate", "bad.yaml", "good.yaml", "worse.yaml")
     assert code == 2
     assert out == "good.yaml: valid\n"

@@ -1,37 +1,36 @@
 import numpy as np
 import pytest
 import scipy.signal
-from identification_systems import SYSTEMS, data
+from identification_systems import SYSTEMS, data, row_of
 
-from inputdesign_cli.identification import prediction_errors
 from inputdesign_cli.identification.filters import Stream
-from inputdesign_cli.identification.predictor import errors_and_gradient
+from inputdesign_cli.identification.predictor import errors_and_gradient, prediction_errors
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
 @pytest.mark.parametrize("runs", [3, 30])
 def test_the_gradient_is_the_finite_difference(name, runs):
-    structure, theta = SYSTEMS[name]
+    row, theta = row_of(SYSTEMS[name]), SYSTEMS[name].theta
     rng = np.random.default_rng(1)
-    u, y = (x.T for x in data(name, 60, rng, runs=runs))
-    theta = np.array(theta) * (1 + 0.05 * rng.standard_normal((runs, structure.size)))
-    _, psi = errors_and_gradient(structure.row, theta, [u], y)
-    for i in range(structure.size):
-        step = np.zeros(structure.size)
+    u, y = (x[..., 0].T for x in data(name, 60, rng, runs=runs))
+    theta = theta * (1 + 0.05 * rng.standard_normal((runs, theta.size)))
+    _, psi = errors_and_gradient(row, theta, [u], y)
+    for i in range(row.size):
+        step = np.zeros(row.size)
         step[i] = 1e-6
-        ahead, behind = (prediction_errors(structure.row, theta + s * step, [u], y) for s in (1, -1))
+        ahead, behind = (prediction_errors(row, theta + s * step, [u], y) for s in (1, -1))
         np.testing.assert_allclose(psi[i], -(ahead - behind) / 2e-6, atol=1e-6 * np.abs(psi[i]).max())
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_prediction_errors_at_the_truth_are_the_noise(name):
-    structure, theta = SYSTEMS[name]
-    model = structure.model(np.array(theta), 1.0)
+    model = SYSTEMS[name]
+    A, C, D = model.A[0], model.C[0], model.D[0]
     rng = np.random.default_rng(2)
     u, e = rng.standard_normal((2, 80))
-    y = scipy.signal.lfilter(model.B, np.convolve(model.A, model.F), u)
-    y += scipy.signal.lfilter(model.C, np.convolve(model.A, model.D), e)
-    errors = prediction_errors(structure.row, np.array([theta]), [u[:, None]], y[:, None])
+    y = scipy.signal.lfilter(model.B[0][0], np.convolve(A, model.F[0][0]), u)
+    y += scipy.signal.lfilter(C, np.convolve(A, D), e)
+    errors = prediction_errors(row_of(model), model.theta[None], [u[:, None]], y[:, None])
     np.testing.assert_allclose(errors[:, 0], e, atol=1e-10)
 
 

@@ -14,21 +14,19 @@ from inputdesign_cli.identification.refined_iv import refine
 from inputdesign_cli.identification.transfer_matrix import (
     fit_transfer_matrices,
     identify_transfer_matrix,
-    simulate_transfer_matrix,
 )
 from inputdesign_cli.identification.transfer_problem import evaluate
-from inputdesign_cli.identification.transfer_record import Intersample, TransferRecord
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.identification.transfer_record import TransferRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.plant import ContinuousChannels, SampledChannels
-from inputdesign_cli.signal import channel_outputs, channel_record_information
+from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 
 STEP = 0.4
 SPECS = Path(__file__).parents[2] / "specs"
 
 
 def plant(numerator, denominator, *, common=False):
-    return ContinuousChannels.monic(
+    return ContinuousModel.monic(
         descending(numerator), descending(denominator), np.eye(len(numerator)), common=common
     )
 
@@ -44,7 +42,7 @@ PLANTS = {
 HOLDS = pytest.mark.parametrize("hold", [False, True], ids=["band-limited", "held"])
 
 
-def actual() -> ContinuousChannels:
+def actual() -> ContinuousModel:
     """The true plant of the spectral design paper, near its nominal one."""
     return plant(
         [[[3.2], [3.1]], [[5.2], [1.5]]], [[[1, 1.6, 1.5], [1, 1.9, 1]], [[1, 0.5, 0.95], [1, 0.9, 0.3]]]
@@ -60,7 +58,7 @@ def excitation(samples, inputs, rng, *, share=0.6):
 
 def noisy(model, u, rng, *, hold, level, covariance=None, runs=None):
     """Outputs with noise of `level` times their rms, and the model with the covariance of that noise."""
-    y = simulate_transfer_matrix(model, u, STEP, hold=hold)
+    y = model.driven(u, Intersample(STEP, hold))
     root = level * np.linalg.cholesky(np.eye(y.shape[1]) if covariance is None else covariance)
     root = y.std(axis=0)[:, None] * root
     shape = y.shape if runs is None else (runs, *y.shape)
@@ -68,7 +66,7 @@ def noisy(model, u, rng, *, hold, level, covariance=None, runs=None):
 
 
 def as_sampled(model, hold):
-    return SampledChannels(model, STEP) if hold else model
+    return SampledModel(model, STEP) if hold else model
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -82,14 +80,14 @@ def test_a_held_input_gives_what_a_sampled_state_space_gives(name):
             scipy.signal.cont2discrete((top, bottom), STEP, "zoh") if bottom.size > 1 else (top, [1.0], 0)
         )
         expected[:, i] += scipy.signal.lfilter(np.ravel(b), a, u[:, j])
-    np.testing.assert_allclose(simulate_transfer_matrix(model, u, STEP, hold=True), expected, atol=1e-11)
+    np.testing.assert_allclose(model.driven(u, Intersample(STEP, True)), expected, atol=1e-11)
 
 
 def test_a_held_input_is_exact_when_the_plant_remembers_more_than_the_record():
     slow = plant([[[1.0]]], [[[1.0, 1e-6]]])
     u = np.ones((300, 1))
     expected = (1.0 - np.exp(-1e-6 * STEP * np.arange(300))) / 1e-6
-    ours = simulate_transfer_matrix(slow, u, STEP, hold=True)[:, 0]
+    ours = slow.driven(u, Intersample(STEP, True))[:, 0]
     np.testing.assert_allclose(ours, expected, atol=1e-10 * expected.max())
 
 
@@ -103,7 +101,7 @@ def test_a_band_limited_input_is_its_fine_interpolation():
     for i, j in model.active:
         system = (model.numerator[i][j][::-1], model.denominator[i][j][::-1])
         expected[:, i] += scipy.signal.lsim(system, fine[:, j], time)[1]
-    ours = simulate_transfer_matrix(model, u, STEP, hold=False)
+    ours = model.driven(u, Intersample(STEP, False))
     np.testing.assert_allclose(ours, expected[256 * factor : 512 * factor : factor], atol=2e-4 * np.std(ours))
 
 
@@ -112,8 +110,8 @@ def test_a_band_limited_input_is_its_fine_interpolation():
 def test_outputs_are_those_by_which_the_record_was_judged(name, hold):
     model = PLANTS[name]
     u = excitation(500, model.inputs, np.random.default_rng(2), share=0.3)
-    expected = channel_outputs(ChannelExperiment(as_sampled(model, hold), 500), u, STEP)
-    ours = simulate_transfer_matrix(model, np.stack([u, 2 * u]), STEP, hold=hold)
+    expected = FiniteRecord(Experiment(as_sampled(model, hold), 500), 500, STEP).signals("output", u)
+    ours = model.driven(np.stack([u, 2 * u]), Intersample(STEP, hold))
     tolerance = 1e-10 if hold else 1e-5
     np.testing.assert_allclose(ours[0], expected, atol=tolerance * np.std(expected))
     np.testing.assert_allclose(ours[1], 2 * ours[0], atol=1e-12 * np.abs(ours).max())
@@ -153,8 +151,8 @@ def test_the_slope_of_the_likelihood_is_a_difference_quotient():
 def test_data_without_noise_return_the_parameters(name, hold):
     model = PLANTS[name]
     u = excitation(300, model.inputs, np.random.default_rng(5))
-    y = simulate_transfer_matrix(model, u, STEP, hold=hold)
-    found = fit_transfer_matrices(model, u, y[None], STEP, hold=hold, start=1.15 * model.theta)
+    y = model.driven(u, Intersample(STEP, hold))
+    found = fit_transfer_matrices(model, u, y[None], Intersample(STEP, hold), start=1.15 * model.theta)
     assert np.all(found.converged)
     np.testing.assert_allclose(found.theta[0], model.theta, atol=1e-8)
 
@@ -168,7 +166,7 @@ def test_parameters_are_found_without_a_start(name, hold):
     y, truth = noisy(model, u, rng, hold=hold, level=0.2)
     # The numbers of the structure are not used.
     anything = model.at(np.ones(model.theta.size))
-    found = identify_transfer_matrix(anything, u, y, STEP, hold=hold)
+    found = identify_transfer_matrix(anything, u, y, Intersample(STEP, hold))
     assert found.converged
     assert found.names == model.names
     off = found.theta - model.theta
@@ -193,7 +191,7 @@ def test_one_channel_has_the_estimate_of_a_plain_optimiser():
     plain = scipy.optimize.least_squares(
         errors, model.theta, xtol=1e-14, ftol=1e-14, gtol=1e-14, jac="3-point"
     )
-    found = identify_transfer_matrix(model, u, y, STEP, hold=True)
+    found = identify_transfer_matrix(model, u, y, Intersample(STEP, hold=True))
     np.testing.assert_allclose(found.theta, plain.x, atol=1e-6)
     variance = 2 * plain.cost / (400 - 4)
     assert found.noise[0, 0] == pytest.approx(variance, rel=1e-6)
@@ -205,9 +203,9 @@ def test_the_covariance_is_that_of_the_records_information(hold):
     rng = np.random.default_rng(8)
     u = excitation(500, 2, rng, share=0.4)
     y, _ = noisy(actual(), u, rng, hold=hold, level=0.2, covariance=[[1, 0.7], [0.7, 1]])
-    found = identify_transfer_matrix(two_by_two(), u, y, STEP, hold=hold)
+    found = identify_transfer_matrix(two_by_two(), u, y, Intersample(STEP, hold))
     model = as_sampled(two_by_two().at(found.theta, found.noise), hold)
-    expected = channel_record_information(ChannelExperiment(model, 500), u, STEP)
+    expected = FiniteRecord(Experiment(model, 500), 500, STEP).information(u)
     scale = np.sqrt(np.diag(expected))
     difference = (found.information - expected) / np.outer(scale, scale)
     assert np.abs(difference).max() < (1e-9 if hold else 1e-5)
@@ -220,7 +218,7 @@ def test_instruments_alone_come_within_a_fraction_of_a_standard_deviation():
     y, _ = noisy(actual(), u, rng, hold=False, level=0.2)
     record = TransferRecord(two_by_two(), u, y, Intersample(STEP, hold=False))
 
-    likeliest = identify_transfer_matrix(two_by_two(), u, y, STEP, hold=False)
+    likeliest = identify_transfer_matrix(two_by_two(), u, y, Intersample(STEP, hold=False))
     far = evaluate(record, np.exp(0.3 * rng.normal(size=12)) * two_by_two().theta)
     off = refine(record, far)[0].theta - likeliest.theta
     assert off @ likeliest.information @ off < 0.1
@@ -234,8 +232,10 @@ def test_a_change_of_the_unit_of_time_changes_the_units_of_the_estimate():
     u = excitation(400, 2, rng)
     y, _ = noisy(model, u, rng, hold=True, level=0.2)
     powers = np.array([1000.0 ** (p.power - 2) for p in model.parameters])
-    seconds = identify_transfer_matrix(model, u, y, STEP, hold=True, start=model.theta)
-    milliseconds = identify_transfer_matrix(model, u, y, 1000 * STEP, hold=True, start=powers * model.theta)
+    seconds = identify_transfer_matrix(model, u, y, Intersample(STEP, hold=True), start=model.theta)
+    milliseconds = identify_transfer_matrix(
+        model, u, y, Intersample(1000 * STEP, hold=True), start=powers * model.theta
+    )
     np.testing.assert_allclose(milliseconds.theta / powers, seconds.theta, rtol=1e-4)
 
 
@@ -248,7 +248,7 @@ def test_unstable_starts_are_mirrored():
     rng = np.random.default_rng(11)
     u = excitation(600, 1, rng)
     y, _ = noisy(model, u, rng, hold=True, level=0.1)
-    found = fit_transfer_matrices(model, u, y[None], STEP, hold=True, start=unstable)
+    found = fit_transfer_matrices(model, u, y[None], Intersample(STEP, hold=True), start=unstable)
     assert np.all(found.converged)
     np.testing.assert_allclose(found.theta[0], model.theta, atol=0.1)
 
@@ -259,7 +259,7 @@ def test_a_search_that_ends_at_the_edge_of_stability_has_not_converged():
     rng = np.random.default_rng(12)
     u = np.where(np.arange(400) < 40, 0.0, 1.0)[:, None]
     y = np.cumsum(u, axis=0) ** 1.2 + rng.normal(size=(400, 1))
-    found = fit_transfer_matrices(model, u, y[None], STEP, hold=True, start=model.theta)
+    found = fit_transfer_matrices(model, u, y[None], Intersample(STEP, hold=True), start=model.theta)
     assert not found.converged[0]
 
 
@@ -267,9 +267,9 @@ def test_a_batch_is_one_estimate_after_the_other():
     rng = np.random.default_rng(13)
     u = excitation(300, 2, rng)
     y, _ = noisy(actual(), u, rng, hold=False, level=0.2, runs=3)
-    found = fit_transfer_matrices(two_by_two(), u, y, STEP, hold=False, start=two_by_two().theta)
+    found = fit_transfer_matrices(two_by_two(), u, y, Intersample(STEP, hold=False), start=two_by_two().theta)
     for run in range(3):
-        single = identify_transfer_matrix(two_by_two(), u, y[run], STEP, hold=False)
+        single = identify_transfer_matrix(two_by_two(), u, y[run], Intersample(STEP, hold=False))
         np.testing.assert_allclose(found.theta[run], single.theta, atol=1e-5)
         np.testing.assert_allclose(np.linalg.inv(found.information[run]), single.covariance, rtol=1e-4)
         np.testing.assert_allclose(found.noise[run], single.noise, rtol=1e-4)
@@ -290,7 +290,7 @@ def test_bad_data_is_refused(change, code, word):
     u = excitation(300, 2, rng)
     y, _ = noisy(model, u, rng, hold=True, level=0.2)
     with pytest.raises(SpecError) as caught:
-        identify_transfer_matrix(model, *change(u, y), STEP, hold=True)
+        identify_transfer_matrix(model, *change(u, y), Intersample(STEP, hold=True))
     assert caught.value.diagnostics[0].code == code
     assert word in caught.value.diagnostics[0].message
 
@@ -298,9 +298,9 @@ def test_bad_data_is_refused(change, code, word):
 def test_data_without_noise_have_no_covariance():
     model = PLANTS["two by two"]
     u = excitation(300, 2, np.random.default_rng(15))
-    y = simulate_transfer_matrix(model, u, STEP, hold=True)
+    y = model.driven(u, Intersample(STEP, True))
     with pytest.raises(SpecError) as caught:
-        identify_transfer_matrix(model, u, y, STEP, hold=True)
+        identify_transfer_matrix(model, u, y, Intersample(STEP, hold=True))
     assert caught.value.diagnostics[0].code == "noise-free-data"
 
 
@@ -308,10 +308,10 @@ def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
     """rms / Cramer-Rao bound by parameter, over all directions, and the spread of the eigenvalues."""
     rng = np.random.default_rng(seed)
     y, truth = noisy(actual(), u, rng, hold=hold, level=level, covariance=covariance, runs=runs)
-    found = fit_transfer_matrices(two_by_two(), u, y, STEP, hold=hold, start=two_by_two().theta)
+    found = fit_transfer_matrices(two_by_two(), u, y, Intersample(STEP, hold), start=two_by_two().theta)
     assert np.all(found.converged)
-    experiment = ChannelExperiment(as_sampled(truth, hold), len(u))
-    information = channel_record_information(experiment, u, STEP)
+    experiment = Experiment(as_sampled(truth, hold), len(u))
+    information = FiniteRecord(experiment, len(u), STEP).information(u)
     off = found.theta - truth.theta
     bound = np.sqrt(np.diag(np.linalg.inv(information)))
     by_parameter = np.sqrt(np.mean(off**2, axis=0)) / bound

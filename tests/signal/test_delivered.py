@@ -1,13 +1,13 @@
 """The delivered records of random designs: they meet the accuracy by themselves, at little extra power."""
 
 import pytest
+from inputdesign_cli.signal.single import as_channels
 from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
-from inputdesign_cli.signal.single import as_channels
 from inputdesign_cli.spectrum import FirBasis
 from inputdesign_cli.tasks.record import worst_ratio
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from inputdesign_cli.signal.single import as_channels
 
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal import (
@@ -13,7 +14,6 @@ from inputdesign_cli.signal import (
     best_record,
 )
 from inputdesign_cli.signal.multisine import gaussian_record
-from inputdesign_cli.signal.single import as_channels
 from inputdesign_cli.spectrum import DirectedLines, FirBasis, LinesBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))

@@ -1,11 +1,11 @@
 """Limits on single samples hold exactly, whatever else is asked of the record."""
 
-
 import numpy as np
 import pytest
 from channel_plants import arx
+from inputdesign_cli.signal.single import as_channels
 
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import (
     Bounds,
     DesignedSpectrum,
@@ -18,7 +18,6 @@ from inputdesign_cli.signal import (
 )
 from inputdesign_cli.signal.constraints import compressed, slow_moves
 from inputdesign_cli.signal.level_search import first_level, last_level, least_level, level_of_power
-from inputdesign_cli.signal.single import as_channels
 from inputdesign_cli.spectrum import FirBasis
 
 COLOURED = np.array([1.0, 0.7, 0.3])
@@ -176,7 +175,7 @@ def experiment(request, first_order):
     """The first-order system, or an ARX system of two inputs and outputs, in white coordinates."""
     if request.param == 1:
         return as_channels(first_order).whitened(1.0)
-    return ChannelExperiment(arx(), 240).whitened(1.0)
+    return Experiment(arx(), 240).whitened(1.0)
 
 
 @pytest.mark.parametrize("limited", LIMITS)

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.build.channels import channel_experiment
+from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.build.system import build_experiment
 from inputdesign_cli.tasks.build.task import build_task
-from inputdesign_cli.tasks.design import by_exchange
 
 SPEC = """
 plant:
@@ -49,7 +49,7 @@ def test_single_samples_of_u_are_limited():
     spec = changed(limits, "signal.candidates=2")
     outcome = solve(spec)
     r = np.stack([outcome.tables["signal"].columns[name] for name in ("r1", "r2")], axis=1)
-    _, u = channel_experiment(spec).loop.signals(r, 0.0 * r)
+    _, u = build_experiment(spec).loop.signals(r, 0.0 * r)
     assert np.all(np.abs(u).max(axis=0) <= amplitude * (1 + 1e-10))
     assert np.all(np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0) <= rate * (1 + 1e-10))
     assert outcome.result["signal"]["worst_ratio"] <= 1 + 1e-9
@@ -66,7 +66,7 @@ def test_decoupled_loops_cost_as_much_as_each_alone():
         "plant: {A: [1, -0.6], B: [0, 0.7]}\nnoise: {variance: 0.5}\n"
         "experiment: {samples: 500, controller: {numerator: [0.3], denominator: [1, -0.5]}}\n",
     ]
-    design = by_exchange(both, build_channel_task(both))[0].result
+    design = by_exchange(both, build_convex(both))[0].result
     costs = []
     for text in alone:
         spec = parse_spec(text + common)
@@ -111,7 +111,7 @@ def test_limits_bind_what_r_causes():
 )
 def test_bad_loops_are_explained(override, code):
     with pytest.raises(SpecError) as caught:
-        build_channel_task(changed(override))
+        build_convex(changed(override))
     assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]
 
 
@@ -130,4 +130,4 @@ def test_the_units_of_the_loop_do_not_make_it_algebraic():
         "plant.B=[[[0, 1.0e+6, 0.4e+6], [0, -0.3e-6]], [[0, 0.4e+6], [0, 1.2e-6, -0.5e-6]]]",
         "experiment.controller.numerator=[[[0.3e-6, -0.25e-6], [0]], [[0], [0.3e+6, -0.2e+6]]]",
     )
-    build_channel_task(scaled)
+    build_convex(scaled)

@@ -5,12 +5,12 @@ import warnings
 import cvxpy as cp
 import numpy as np
 import pytest
+from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.spectrum import FirBasis, MatrixFirBasis, PolynomialBasis
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.design import by_exchange
+from inputdesign_cli.tasks.build.convex import build_convex
 
 ARX = """
 plant:
@@ -25,7 +25,7 @@ GRID = np.linspace(0.0, np.pi, 801)
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=list(overrides))
-    return by_exchange(spec, build_channel_task(spec))[0]
+    return by_exchange(spec, build_convex(spec))[0]
 
 
 def plain_program(design, order, upper, lower, power):
@@ -114,5 +114,5 @@ def test_a_directed_functional_is_the_density_along_that_direction(basis):
 def test_sinusoids_have_no_density():
     spec = parse_spec(FIR, overrides=["spectrum={type: free}"])
     with pytest.raises(SpecError) as caught:
-        build_channel_task(spec)
+        build_convex(spec)
     assert caught.value.diagnostics[0].code == "bad-limit"

@@ -7,13 +7,13 @@ import cvxpy as cp
 import numpy as np
 import pytest
 from channel_plants import arx
+from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import load_spec, solve, validate
 from inputdesign_cli.errors import EXIT_BAD_INPUT, SpecError
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.design import by_exchange
+from inputdesign_cli.tasks.build.convex import build_convex
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -59,7 +59,7 @@ def test_spectrum_file_has_the_information_of_the_result(design):
     ).transpose(2, 0, 1)
     assert np.linalg.eigvalsh(phi).min() >= -1e-9 * phi.real.max()
     spec = load_spec(SPECS / "two_by_two.yaml")
-    model = build_channel_task(spec).experiment.model
+    model = build_convex(spec).experiment.model
     F = model.plant_gradient(w)
     integrand = np.einsum("nlpa,nab,nmpb->nlm", F, phi, F.conj(), optimize=True).real / np.pi
     step = w[1] - w[0]
@@ -138,7 +138,7 @@ def test_arx_with_every_entry_bounded_is_the_textbook_optimum():
     result = solve(spec).result
     assert result["objective"]["relative_gap"] <= 1e-5
     assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
-    task = build_channel_task(spec)
+    task = build_convex(spec)
     experiment = task.experiment.whitened(result["baseline"]["white"]["cost"])
     basis, k = task.question.basis, experiment.size
     maps = basis.integrals(experiment.information_density, experiment.singularities)
@@ -206,7 +206,7 @@ def test_weighted_variance_in_continuous_time_holds_for_every_entry():
     assert result["objective"]["relative_gap"] <= 1e-6
     P = np.array(result["information"]["covariance"])
     w = np.linspace(0.0, 2.0, 500)
-    gradient = build_channel_task(spec).experiment.model.plant_gradient(w)
+    gradient = build_convex(spec).experiment.model.plant_gradient(w)
     variance = np.einsum("nkij,kl,nlij->nij", gradient.conj(), P, gradient).real / (1 + w**2)[:, None, None]
     assert variance.max() == pytest.approx(0.01, rel=1e-4)
 
@@ -282,8 +282,8 @@ def test_bad_input_is_refused_with_place_and_hint(name):
 
 
 def test_the_spec_of_the_example_is_that_of_the_tests():
-    task = build_channel_task(load_spec(SPECS / "two_by_two_arx.yaml"))
-    assert task.experiment.model.names == ChannelExperiment(arx(), 1).model.names
+    task = build_convex(load_spec(SPECS / "two_by_two_arx.yaml"))
+    assert task.experiment.model.names == Experiment(arx(), 1).model.names
 
 
 GAINS = """
@@ -315,7 +315,7 @@ def test_the_units_of_the_inputs_do_not_matter(spectrum, asked, same):
     found = []
     for overrides in (asked, [*same, MILLI]):
         spec = changed(GAINS, f"spectrum={spectrum}", *overrides)
-        found.append(by_exchange(spec, build_channel_task(spec))[0])
+        found.append(by_exchange(spec, build_convex(spec))[0])
     assert found[1].result.objective == pytest.approx(found[0].result.objective, rel=1e-6)
     bounds = [design.any_spectrum.certificate.bound for design in found]
     assert bounds[1] == pytest.approx(bounds[0], rel=2e-5)
@@ -329,7 +329,7 @@ def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
         "accuracy: {criterion: E}\nspectrum: {type: fir, order: 6}\n"
         "limits: {input_power: [1000000.0, 2.5]}\n"
     )
-    result = by_exchange(spec, build_channel_task(spec))[0].result
+    result = by_exchange(spec, build_convex(spec))[0].result
     assert result.gap < 1e-6
 
 
@@ -351,4 +351,4 @@ def test_free_spectra_of_unequal_limits_are_proved():
         "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
         "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
     )
-    assert by_exchange(spec, build_channel_task(spec))[0].result.gap < 1e-6
+    assert by_exchange(spec, build_convex(spec))[0].result.gap < 1e-6

@@ -5,20 +5,19 @@ import warnings
 import cvxpy as cp
 import numpy as np
 import pytest
+from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Absolute, LoopSensitivity, NormError, Sensitivity
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant import (
-    MatrixController,
-    PolynomialChannels,
     PolynomialLoop,
     PolynomialModel,
     Rational,
+    TransferMatrix,
 )
 from inputdesign_cli.specification import parse_spec
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.design import by_exchange
+from inputdesign_cli.tasks.build.convex import build_convex
 
 SPEC = """
 plant:
@@ -43,7 +42,7 @@ GRID = np.linspace(1e-3, np.pi, 400)
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=list(overrides))
-    return by_exchange(spec, build_channel_task(spec))[0]
+    return by_exchange(spec, build_convex(spec))[0]
 
 
 @pytest.fixture(scope="module")
@@ -109,10 +108,10 @@ def test_models_of_the_ellipsoid_keep_the_sensitivity(design):
 def test_one_channel_is_the_siso_bound():
     A, B = [1, -0.9], [0, 0.5, 0.2]
     numerator, denominator, W = [0.4, -0.3], [1, -1], Rational.build([0.5, 0.1], [1, -0.3])
-    siso = PolynomialModel(np.array(B), np.array(A, dtype=float))
+    siso = PolynomialModel.single(np.array(B), np.array(A, dtype=float))
     one = ((np.ones(1),),)
-    plant = PolynomialChannels(((np.array(B),),), (np.array(A),), one, one[0], one[0], np.eye(1))
-    loop = PolynomialLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
+    plant = PolynomialModel(((np.array(B),),), (np.array(A),), one, one[0], one[0], np.eye(1))
+    loop = PolynomialLoop(plant, TransferMatrix.build([[numerator]], [[denominator]]))
     expected = Sensitivity(siso, Rational.build(numerator, denominator), W).at(GRID)
     np.testing.assert_allclose(LoopSensitivity(loop, W).at(GRID), expected, rtol=1e-9)
 
@@ -184,5 +183,5 @@ def test_the_norm_costs_more_than_the_entries_and_is_reported():
 )
 def test_what_cannot_be_asked_is_explained(override, code):
     with pytest.raises(SpecError) as caught:
-        build_channel_task(parse_spec(SPEC, overrides=[override]))
+        build_convex(parse_spec(SPEC, overrides=[override]))
     assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import scipy.signal
 import scipy.stats
+from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.runs.run_directory import write_run
-from inputdesign_cli.tasks.build.channel_task import build_channel_task
-from inputdesign_cli.tasks.build.channels import channel_experiment
-from inputdesign_cli.tasks.design import by_exchange
+from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.build.system import build_experiment
 
 MOTOR = "specs/motor_loop.yaml"
 GAIN = np.array([[2.0, -0.5], [0.0, 1.2]])
@@ -55,7 +55,7 @@ plant:
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=list(overrides))
-    return by_exchange(spec, build_channel_task(spec))[0].result
+    return by_exchange(spec, build_convex(spec))[0].result
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def motor(theta, w):
 def test_the_motor_against_a_plain_program():
     """The least cost of r of order 3: relative parameters, sums over a circle, LMIs at 180 frequencies."""
     spec = load_spec(MOTOR, ["spectrum.order=3"])
-    found = by_exchange(spec, build_channel_task(spec))[0].result
+    found = by_exchange(spec, build_convex(spec))[0].result
     theta, samples, variance, order = np.array([2.0, 20.02, 12.0]), 600, 2.5e-5, 3
 
     def gradient(w):
@@ -140,7 +140,7 @@ def test_a_limit_on_the_output_holds_for_the_record():
     spec = load_spec(MOTOR, ["limits.amplitude.output=0.02", "spectrum.order=5", "signal.candidates=2"])
     outcome = solve(spec)
     r = np.asarray(outcome.tables["signal"].columns["r1"])[:, None]
-    y, u = channel_experiment(spec).loop.signals(r, np.zeros_like(r))
+    y, u = build_experiment(spec).loop.signals(r, np.zeros_like(r))
     assert np.abs(y).max() <= 0.02 * (1 + 1e-9)
     entry = outcome.result["signal"]
     assert entry["output_peak"][0] == pytest.approx(np.abs(y).max(), rel=1e-9)
@@ -150,7 +150,7 @@ def test_a_limit_on_the_output_holds_for_the_record():
 
 def recorded(spec, samples, rng, path):
     """u and y of the loop of a spec, under white r; what it is made of is tested with the loop."""
-    experiment = channel_experiment(spec)
+    experiment = build_experiment(spec)
     model = experiment.model
     e = rng.standard_normal((samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
     y, u = experiment.loop.signals(rng.standard_normal((samples, model.inputs)), e)
@@ -164,7 +164,7 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
     spec = load_spec(MOTOR) if text is None else parse_spec(text)
     data = recorded(spec, 1500, np.random.default_rng(1), tmp_path / "d.csv")
     outcome = identify(spec, data)
-    model, found = channel_experiment(spec).model, outcome.result["identification"]
+    model, found = build_experiment(spec).model, outcome.result["identification"]
     for name, true in zip(model.names, model.theta, strict=True):
         assert abs(found["theta"][name] - true) < 4.5 * found["standard_deviation"][name]
     assert "notes" not in outcome.result  # u(t) answers e(t), which is no fault of the model
@@ -200,13 +200,13 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
 )
 def test_what_cannot_be_asked_is_explained(override, code):
     with pytest.raises(SpecError) as caught:
-        build_channel_task(load_spec(MOTOR, [override]))
+        build_convex(load_spec(MOTOR, [override]))
     assert code in [diagnostic.code for diagnostic in caught.value.diagnostics]
 
 
 def test_a_loop_to_be_kept_is_of_a_sampled_plant():
     kept = "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [9], denominator: [1]}}"
-    build_channel_task(load_spec(MOTOR, ["experiment.controller=null", kept]))
+    build_convex(load_spec(MOTOR, ["experiment.controller=null", kept]))
     with pytest.raises(SpecError) as caught:
         load_spec(MOTOR, ["plant.sample=null", "experiment.controller=null", kept])
     (diagnostic,) = [c for c in caught.value.diagnostics if c.key.startswith("accuracy")]
@@ -217,4 +217,4 @@ def test_a_loop_to_be_kept_is_of_a_sampled_plant():
 def test_frequencies_of_complaints_are_in_the_unit_of_the_spec():
     """The nominal loop peaks at 4.35 dB, at 9.54 rad/s."""
     with pytest.raises(SpecError, match=r"9\.54\d* rad/s"):
-        build_channel_task(load_spec(MOTOR, ["accuracy.model_error.sensitivity.max_db=4"]))
+        build_convex(load_spec(MOTOR, ["accuracy.model_error.sensitivity.max_db=4"]))

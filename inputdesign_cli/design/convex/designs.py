@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,15 +21,7 @@ from inputdesign_cli.design.convex.white import least_white_power
 from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import (
-    Basis,
-    DirectedLines,
-    FirBasis,
-    FlatBasis,
-    LinesBasis,
-    flat_basis,
-    free_lines,
-)
+from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 
 _ANY_SPECTRUM_TOLERANCE = 1e-6
 _KEEPS = 1e-9
@@ -44,8 +35,7 @@ class Question:
     """What is asked, in raw parameters: requirements are made for the coordinates of a design.
 
     `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
-    `side` must hold besides. The other goals meet all of them. `band` (rad/sample) confines spectra of
-    lines.
+    `side` must hold besides. The other goals meet all of them.
     """
 
     experiment: Experiment
@@ -56,7 +46,6 @@ class Question:
     cost: Mapping[PowerKind, Weight] = field(default_factory=dict)
     limits: Sequence[PowerLimit] = ()
     densities: Sequence[DensityLimit] = ()
-    band: tuple[float, float] = (0.0, np.pi)
 
 
 @dataclass(frozen=True)
@@ -87,7 +76,7 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     """
     power = white_power(question)
     powers = balanced_powers(question, power or 1.0)
-    question = replace(question, basis=_in_units(question.basis, powers))
+    question = replace(question, basis=question.basis.in_units(np.sqrt(powers)))
     problem = whitened_problem(question, powers)
     flat = _on_flat(problem)
     white = _white(question, flat, power)
@@ -96,11 +85,11 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     if power == 0.0 and not problem.has_floors:
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
     within = excess(flat, white) <= _KEEPS
-    result = _solve(problem, _flat(problem.basis, powers), tolerance)
-    if isinstance(question.basis, LinesBasis | DirectedLines) and question.basis.free:
+    result = _solve(problem, problem.basis.spread(powers), tolerance)
+    if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
     loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
-    anything = _solve(anywhere, _flat(anywhere.basis, powers), loose)
+    anything = _solve(anywhere, anywhere.basis.spread(powers), loose)
     return Design(problem, white, white_level, within, result, anything)
 
 
@@ -108,31 +97,34 @@ def white_power(question: Question) -> float:
     """The power of white excitation that answers the question, 0 where none is needed."""
     if question.goal == "cost":
         return least_white_power(question.experiment, question.requirements)
-    unit = whitened_problem(replace(question, basis=flat_basis(question.experiment)), 1.0)
+    unit = whitened_problem(
+        replace(question, basis=flat_basis(question.experiment)),
+        np.full(question.experiment.inputs, 1.0 / question.experiment.inputs),
+    )
     return 1.0 / least_scale(unit, np.ones(1))
 
 
-def balanced_powers(question: Question, power: float) -> float | Array:
-    """Of several inputs the powers (r,) that take equal shares of the price of white excitation.
+def balanced_powers(question: Question, power: float) -> Array:
+    """The powers (r,) of the inputs that take equal shares of the price of white excitation.
 
     Where the units of the inputs differ, so do their prices or limits: an excitation even over the
     inputs would then be a poor start, and its information matrix a poor measure. One input has `power`.
     """
-    r, family = question.experiment.inputs, question.basis
+    r = question.experiment.inputs
+    even = np.full(r, power / r)
     if r == 1:
-        return power
-    if isinstance(family, FlatBasis):
-        family = free_lines(question.experiment, np.array(question.band))
-    price = _stated(replace(question, basis=family), question.experiment).price
-    prices = np.array([price.at(family.spread(channel)) for channel in np.eye(r)])  # type: ignore[attr-defined]
+        return even
+    lines = LinesBasis.anywhere(*question.experiment.band, r)
+    price = _stated(replace(question, basis=lines), question.experiment).price
+    prices = np.array([price.at(lines.spread(channel)) for channel in np.eye(r)])
     if np.ptp(prices) <= _KEEPS * prices.max():
-        return power
+        return even
     return power * prices.mean() / (r * prices)
 
 
-def whitened_problem(question: Question, powers: float | Array) -> Problem:
+def whitened_problem(question: Question, powers: Array) -> Problem:
     """The problem in coordinates where flat excitation of these powers gives M = I."""
-    coordinates = question.experiment.whitened(powers)  # type: ignore[arg-type]
+    coordinates = question.experiment.whitened(powers)
     return replace(
         _stated(question, coordinates),
         requirements=tuple(make(coordinates) for make in question.requirements),
@@ -155,17 +147,10 @@ def _stated(question: Question, experiment: Experiment) -> Problem:
     )
 
 
-def _anywhere(question: Question, problem: Problem, powers: float | Array) -> Problem:
-    lo, hi = question.band
-    grid = problem.grid[(problem.grid >= lo) & (problem.grid <= hi)]
-    lines = _in_units(free_lines(question.experiment, np.union1d(grid, [lo, hi])), powers)
+def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
+    experiment = question.experiment
+    lines = LinesBasis.anywhere(*experiment.band, experiment.inputs).in_units(np.sqrt(powers))
     return replace(problem, basis=lines, densities=(), finer=None)
-
-
-def _in_units(basis: Basis, powers: float | Array) -> Basis:
-    """Lines with directions that suit the channels; other families have none."""
-    several = isinstance(basis, DirectedLines) and np.ndim(powers) == 1
-    return basis.in_units(np.sqrt(powers)) if several else basis  # type: ignore[attr-defined]
 
 
 def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
@@ -197,16 +182,7 @@ def _white(question: Question, flat: Problem, power: float) -> Candidate:
 
 
 def _on_flat(problem: Problem) -> Problem:
-    basis = flat_basis(problem.experiment)
-    head = isinstance(basis, FirBasis) and isinstance(problem.basis, FirBasis)
-    return replace(problem, basis=basis, finer=problem if head else None)
-
-
-def _flat(basis: Basis, powers: float | Array) -> Array:
-    family: Any = basis  # each has one of these
-    if np.ndim(powers) == 1:
-        return np.asarray(family.spread(powers))
-    return powers * (family.flat if isinstance(basis, LinesBasis | DirectedLines) else family.white)
+    return replace(problem, basis=flat_basis(problem.experiment), finer=None)
 
 
 def _check_excites(problem: Problem, start: Array) -> None:
@@ -214,10 +190,11 @@ def _check_excites(problem: Problem, start: Array) -> None:
     if not problem.needs_definite:
         return
     eigenvalues, vectors = np.linalg.eigh(problem.information(start))
-    if eigenvalues[0] > _UNEXCITED * eigenvalues[-1]:
+    faint = eigenvalues <= _UNEXCITED * eigenvalues[-1]
+    if not faint.any():
         _check_reachable(problem, start)
         return
-    names = problem.experiment.unexcited(vectors[:, 0])
+    names = problem.experiment.unexcited(vectors[:, faint])
     raise bad_spec(
         "too-few-lines",
         f"these lines cannot tell the parameters apart: nothing is learnt about {names}",
@@ -232,7 +209,7 @@ def _check_reachable(problem: Problem, start: Array) -> None:
 
     What the noise alone tells keeps the information matrix regular then, but does not grow with power.
     """
-    if problem.goal != "cost" or isinstance(problem.basis, FirBasis):
+    if problem.goal != "cost" or problem.basis.has_density:
         return
     excited = np.linalg.eigvalsh(problem.excited_information(start))
     if excited[0] > _UNEXCITED * excited[-1]:

@@ -1,9 +1,10 @@
 """The exchange method: a finite conic program, enlarged by whatever it violates, until a proof closes.
 
-Both the cone of spectra and most requirements hold infinitely many conditions. Each round solves
-with a finite selection, whose optimum is a relaxation, asks every piece for its worst violations,
-and adds those. Upper bound: the iterate, repaired until everything holds (`candidate`). Lower bound:
-its multipliers, made exactly dual feasible (`certificate`). Their distance is the proof.
+Both the cone of spectra and most requirements hold infinitely many conditions: a semi-infinite program
+([hettich-kortanek-1993]). Each round solves with a finite selection, whose optimum is a relaxation, asks
+every piece for its worst violations, and adds those. Upper bound: the iterate, repaired until everything
+holds (`candidate`). Lower bound: its multipliers, made exactly dual feasible (`certificate`). Their
+distance is the proof.
 """
 
 from __future__ import annotations

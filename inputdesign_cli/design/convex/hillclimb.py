@@ -1,4 +1,4 @@
-"""Spectra with a factor of few columns by the bilinear hill-climb of the spectral design paper (Figure 3).
+"""Spectra with a factor of few columns by the bilinear hill-climb of [mohan-spectral], Figure 3.
 
 Phi = 1/2 W H H^T W^T with H (n, c): M is quadratic in H. The paper fixes one argument of the bilinear
 form M(X, Y) and climbs in the other, which need not climb (for E it can lose). Since M(X - Y, X - Y) >= 0,

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Criterion, Requirement, Violation, worst
+from inputdesign_cli.accuracy import Level, Requirement, Violation, worst
 from inputdesign_cli.design.convex.limits import (
     DensityBreach,
     DensityLimit,
@@ -48,8 +48,8 @@ def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | 
 class Problem:
     """A design problem, for one of three goals.
 
-    "cost": the least cost; `cost` weighs the powers of input, output and excitation (least-costly
-    paper, (18)).
+    "cost": the least cost; `cost` weighs the powers of input, output and excitation
+    ([bombois-least-costly], (18)).
 
     "factor": the least s such that s M(x) meets the requirements, x within the limits: the best
     accuracy (s is the square of the ratio r_u / r_adm, or the inverse of a criterion). In
@@ -76,9 +76,18 @@ class Problem:
     floors_fixed: bool = False
     finer: Problem | None = field(default=None, repr=False)
 
+    @property
+    def stated_criterion(self) -> Level | None:
+        """The criterion that is to be maximised, if that is the goal."""
+        return self.requirements[0].criterion if self.requirements else None
+
     def coarsened(self, basis: Basis) -> Problem:
         """The same problem for a smaller basis of the same family (see `Basis.coarser`)."""
         return replace(self, basis=basis, finer=self)
+
+    def on(self, basis: Basis) -> Problem:
+        """The same problem on a basis that may have grown out of this one."""
+        return self if basis is self.basis else replace(self, basis=basis, finer=None)
 
     @property
     def scaled(self) -> bool:
@@ -94,8 +103,7 @@ class Problem:
     @property
     def needs_definite(self) -> bool:
         """Whether a singular information matrix is out of the question."""
-        asked = (*self.requirements, *self.side)
-        return any(not (isinstance(r, Criterion) and r.letter == "T") for r in asked)
+        return any(requirement.definite for requirement in (*self.requirements, *self.side))
 
     @cached_property
     def information_map(self) -> NDArray[np.float64]:
@@ -181,30 +189,29 @@ class Problem:
     def density_at(self, place: DensityPlace) -> Functional:
         """v^* Phi v at one frequency as a functional; it has no density over frequency."""
         r = self.experiment.inputs
-        vector = self.basis.directed(place.frequency, place.direction)  # type: ignore[attr-defined]
+        vector = self.basis.directed(place.frequency, place.direction)
         shape = () if r == 1 else (r, r)
         return Functional(vector, lambda w: np.zeros((np.size(w), *shape)), concentrated=True)
 
     def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
         """Local maxima of Phi over its limits times s (or once, for fixed ones), if above `above`."""
         found = []
-        basis: Any = self.basis  # one of those with a density
         for index, limit in enumerate(self.densities):
             factor = self.bound_factor(limit.upper, s)
 
             def ratio(w: Array, limit: DensityLimit = limit, factor: float = factor) -> Array:
-                return breach_ratio(limit, basis.density(x, w) / factor, w)
+                return breach_ratio(limit, self.basis.density(x, w) / factor, w)
 
             grid = np.union1d(limit.grid, self._fine_grid)
             w, _ = local_maxima(ratio, grid, ratio(grid), above=above)
-            found += breaches_at(limit, index, basis.density(x, w) / factor, w, above=above)
+            found += breaches_at(limit, index, self.basis.density(x, w) / factor, w, above=above)
         return found
 
     @cached_property
     def _fine_grid(self) -> Array:
         """Even, and denser at the ends of the band as polynomials oscillate: sixteen points a degree."""
         lo, hi = self.experiment.band
-        even = np.linspace(0.0, 1.0, 16 * (self.basis.order + 1))  # type: ignore[attr-defined]
+        even = np.linspace(0.0, 1.0, 16 * (self.basis.degree + 1))
         return lo + (hi - lo) * np.union1d(even, 0.5 - 0.5 * np.cos(np.pi * even))
 
     def bound_factor(self, upper: bool, s: float) -> float:
@@ -242,7 +249,7 @@ class Problem:
         found = [
             violation
             for requirement in (*self.requirements, *self.side)
-            if not isinstance(requirement, Criterion)
+            if requirement.criterion is None
             for violation in requirement.violations(information)
         ]
         return worst(found)

@@ -35,7 +35,7 @@ def density_row(problem: Problem, place: DensityPlace) -> Row:
 
 def first_density_rows(problem: Problem) -> list[Row]:
     """Rows to begin with: spread over the band, along each channel and pair of channels."""
-    w = np.linspace(*problem.experiment.band, 2 * (problem.basis.order + 1) + _MORE)  # type: ignore[attr-defined]
+    w = np.linspace(*problem.experiment.band, 2 * (problem.basis.degree + 1) + _MORE)
     directions = first_directions(np.ones(problem.experiment.inputs))
     return [
         density_row(problem, DensityPlace(index, float(frequency), v))

@@ -1,25 +1,27 @@
 """The papers' own program: one LMI per grid frequency, positivity by a Gram matrix or the KYP lemma, cvxpy.
 
-Least-costly paper, (13) and (19) with footnote 2. It guarantees nothing between the grid frequencies;
-its multipliers still prove a lower bound for the problem at every frequency, of which the grid is a
-relaxation. Whitened coordinates are kept: in raw parameters no solver survives a resonant plant.
+[bombois-least-costly], (13) and (19) with footnote 2; the lemma: [rantzer-1996]. It guarantees nothing
+between the grid frequencies; its multipliers still prove a lower bound for the problem at every frequency,
+of which the grid is a relaxation. Whitened coordinates are kept: in raw parameters no solver survives a
+resonant plant.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.accuracy.cuts import MatrixCut
+from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.master import Proof
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import Diagnostic, InaccurateError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import FirBasis, svec
+from inputdesign_cli.spectrum import svec
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,17 @@ class GridResult:
 
 
 def solve_on_grid(
-    problem: Problem, frequencies: Array, start: Array, *, positivity: Literal["gram", "kyp"] = "gram"
+    problem: Problem,
+    requirements: Sequence[ModelError],
+    frequencies: Array,
+    start: Array,
+    *,
+    positivity: Literal["gram", "kyp"] = "gram",
 ) -> GridResult:
-    """Minimise the cost of a FIR spectrum subject to the requirements at `frequencies` alone.
+    """Minimise the cost of a FIR spectrum of one input subject to the requirements at `frequencies` alone.
 
     Args:
+        requirements: those of the problem, to first order.
         start: a spectrum of the right size (the white baseline), which scales the program.
 
     Raises:
@@ -45,20 +53,14 @@ def solve_on_grid(
     import cvxpy as cp
 
     basis = problem.basis
-    if not isinstance(basis, FirBasis):
-        raise ValueError("the grid program is for FIR spectra")
     unit_cost, power = problem.price.at(start), start[0]
     inverse = np.linalg.inv(np.linalg.cholesky(problem.information(start)))
     c = cp.Variable(basis.size)
-    constraints = _positive(c, basis.order, positivity)
+    constraints = _positive(c, basis.degree, positivity)
     maps = inverse @ problem.information_map @ inverse.T
     offset = inverse @ problem.baseline_information @ inverse.T
     information = offset + sum(power * c[i] * _symmetric(maps[i]) for i in range(basis.size))
-    cuts = [
-        MatrixCut(r.cut(float(w)).matrix).moved(inverse)  # type: ignore[attr-defined]
-        for r in problem.requirements
-        for w in frequencies
-    ]
+    cuts = [r.cut(float(w)).moved(inverse) for r in requirements for w in frequencies]
     lmis = [information - _symmetric(cut.matrix) >> 0 for cut in cuts]
     program = cp.Problem(cp.Minimize((power / unit_cost) * problem.price.vector @ c), constraints + lmis)
     try:

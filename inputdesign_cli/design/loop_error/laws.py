@@ -1,40 +1,63 @@
 """Control laws whose response at a frequency depends on the plant at that frequency only.
 
-All have the form C = G^-1 X with X free of G, so that Delta C = -G^-1 Delta G C (Rojas, Hjalmarsson and
-Hildebrand, Section VII). Arrays are (K, n, n) over K frequencies; vec stacks columns.
+All have the form C = G^-1 X with X free of G, so that Delta C = -G^-1 Delta G C, [rojas-asymptotic] Section
+VII. Arrays are (K, n, n) over K frequencies; vec stacks columns.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.design.loop_error.checks import (
+    check_circle,
+    check_minimum_variance,
+    check_model_reference,
+)
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
-from inputdesign_cli.design.loop_error.transfer import MatrixTransfer
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z, unit_circle
-from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate
+from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate
+from inputdesign_cli.plant.transfer import Rational, TransferMatrix, product_of
 
 
 class ControlLaw(Protocol):
     """What the design needs to know of a control law."""
 
+    @property
+    def target(self) -> TransferMatrix | None:
+        """T where the law gives it whatever the plant; None where it follows from the plant."""
+        ...
+
     def complementary(self, w: ArrayLike) -> ComplexArray:
         """T = G C (I + G C)^-1, the loop that the true plant would give."""
+        ...
 
     def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
         """C(G)."""
+        ...
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """d vec C / d vec G: (K, n^2, n^2)."""
+    def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
+        """d vec C / d vec H: (K, n^2, n^2); None where C ignores the noise model."""
+        ...
+
+    def check(self, plant: MatrixPlant, *, key: str) -> None:
+        """The controller can run on this plant: it is causal, stable, and finite on the circle.
+
+        Raises:
+            SpecError: see `checks`.
+        """
+        ...
 
     @property
     def singularities(self) -> ComplexArray:
         """Poles, and zeros of S, as points of the frequency plane."""
+        ...
 
 
 def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:
@@ -47,86 +70,97 @@ def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:
     return -kronecker(_transposed(np.linalg.inv(G) @ T), S)
 
 
+def complement(numerator: Array, denominator: Array) -> Array:
+    """The matrix of polynomials d I - N (n, n, l) of I - N / d."""
+    n, size = numerator.shape[0], max(numerator.shape[-1], denominator.size)
+    found = np.zeros((n, n, size))
+    found[..., : numerator.shape[-1]] -= numerator
+    found[np.arange(n), np.arange(n), : denominator.size] += denominator
+    return found
+
+
 def sensitivity(T: ComplexArray) -> ComplexArray:
     """S = I - T for each frequency."""
     return np.asarray(np.eye(T.shape[1]) - T, dtype=complex)
 
 
-def kronecker(left: NDArray[Any], right: NDArray[Any]) -> ComplexArray:
+def kronecker(left: NDArray, right: NDArray) -> ComplexArray:
     """left (x) right for each frequency."""
     product = np.einsum("kab,kcd->kacbd", left, right)
     rows, columns = left.shape[1] * right.shape[1], left.shape[2] * right.shape[2]
     return product.reshape(-1, rows, columns)
 
 
-def _transposed(matrix: NDArray[Any]) -> NDArray[Any]:
+def _transposed(matrix: NDArray) -> NDArray:
     return np.swapaxes(matrix, 1, 2)
 
 
 @dataclass(frozen=True)
-class ModelReference:
-    """C = G^-1 T (I - T)^-1: the loop from reference to output is T (equation (18))."""
+class _FixedLoop:
+    """Laws that give a loop T whatever the plant, and ignore the noise model."""
 
-    target: MatrixTransfer
+    target: TransferMatrix
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
+        """See `ControlLaw`."""
         return self.target.at(w)
 
-    def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        T = self.target.at(w)
-        return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
+    def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> None:
+        """See `ControlLaw`."""
+        return
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        return -kronecker(_transposed(self.controller(G, w)), np.linalg.inv(G))
-
-    @property
+    @cached_property
     def singularities(self) -> ComplexArray:
-        return _loop_singularities(self.target)
+        """See `ControlLaw`."""
+        numerator, d = self.target.common_fraction()
+        zeros = [determinant_and_adjugate(N)[0] for N in (complement(numerator, d), numerator)]
+        return logarithmic_distance(join_roots([self.target.poles, *map(roots_in_z, zeros)]))
 
 
 @dataclass(frozen=True)
-class InternalModel:
+class ModelReference(_FixedLoop):
+    """C = G^-1 T (I - T)^-1: the loop from reference to output is T, [rojas-asymptotic] (18)."""
+
+    def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
+        """See `ControlLaw`."""
+        T = self.target.at(w)
+        return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
+
+    def check(self, plant: MatrixPlant, *, key: str) -> None:
+        """See `ControlLaw`."""
+        check_model_reference(plant, self.target, key=key)
+
+
+@dataclass(frozen=True)
+class InternalModel(_FixedLoop):
     """C = (I - Q G)^-1 Q with Q = G^-1 T, T = b f I.
 
     f is the filter, b the all-pass of the delay and of the zeros that G^-1 may not invert; b is held
     at its nominal value, since it does not depend on G at a single frequency.
     """
 
-    target: MatrixTransfer
-
     @classmethod
-    def build(cls, plant: MatrixPlant, filter_: MatrixTransfer) -> InternalModel:
+    def build(cls, plant: MatrixPlant, filter_: Rational) -> InternalModel:
         """With the delay and the zeros outside the unit circle of the plant in b."""
-        above, below = np.ones(1), np.ones(1)
-        missing = max(plant.inverse_delay - filter_.delay, 0)
-        above = np.concatenate([np.zeros(missing), above])
+        missing = max(plant.inverse_delay - delay_of(filter_.numerator), 0)
+        above: Array = np.eye(missing + 1)[-1]
+        below: Array = np.ones(1)
         outside = plant.zeros[np.abs(plant.zeros) > 1]
         if outside.size:
-            # (q^-1 - 1/z0*)... of modulus one on the circle, poles at the mirrored zeros, gain one at DC.
-            mirrored = np.poly(1 / np.conj(outside)).real
+            # (q^-1 - 1/z0)*... of modulus one on the circle, poles at the mirrored zeros, gain one at DC.
+            below = np.asarray(np.poly(1 / np.conj(outside)).real, dtype=float)
             blaschke = np.poly(outside).real
-            gain = np.sum(mirrored) / np.sum(blaschke)
-            above, below = np.convolve(above, gain * blaschke), np.convolve(below, mirrored)
-        return cls(filter_.scaled(above, below))
-
-    def complementary(self, w: ArrayLike) -> ComplexArray:
-        return self.target.at(w)
+            above = product_of([above, np.sum(below) / np.sum(blaschke) * blaschke])
+        return cls(TransferMatrix.diagonal(filter_, plant.outputs).scaled(Rational(above, (below,))))
 
     def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
+        """See `ControlLaw`."""
         Q = np.linalg.inv(G) @ self.target.at(w)
         return np.asarray(np.linalg.inv(sensitivity(Q @ G)) @ Q)
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        # dC = (I - Q G)^-1 [dQ (I + G C) + Q dG C] with dQ = -G^-1 dG Q.
-        inverse = np.linalg.inv(G)
-        Q, C = inverse @ self.target.at(w), self.controller(G, w)
-        outer = np.linalg.inv(sensitivity(Q @ G))
-        from_filter = -kronecker(_transposed(Q @ sensitivity(-G @ C)), outer @ inverse)
-        return from_filter + kronecker(_transposed(C), outer @ Q)
-
-    @property
-    def singularities(self) -> ComplexArray:
-        return _loop_singularities(self.target)
+    def check(self, plant: MatrixPlant, *, key: str) -> None:
+        """See `ControlLaw`."""
+        check_circle(plant, self.target, key=key)
 
 
 @dataclass(frozen=True)
@@ -134,6 +168,11 @@ class MinimumVariance:
     """C = G^-1 (H E^-1 - I): the output is E e, E the first `delay` terms of H."""
 
     plant: MatrixPlant
+
+    @property
+    def target(self) -> None:
+        """See `ControlLaw`."""
+        return None
 
     @property
     def delay(self) -> int:
@@ -149,18 +188,21 @@ class MinimumVariance:
         return E
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
+        """See `ControlLaw`."""
         return sensitivity(self.unavoidable(w) @ np.linalg.inv(self.plant.noise_at(w)))
 
     def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
+        """See `ControlLaw`."""
         X = -sensitivity(self.plant.noise_at(w) @ np.linalg.inv(self.unavoidable(w)))
         return np.asarray(np.linalg.inv(G) @ X)
-
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        return -kronecker(_transposed(self.controller(G, w)), np.linalg.inv(G))
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
         """d vec C / d vec H with E held: its few terms are known far better than H pointwise."""
         return kronecker(_transposed(np.linalg.inv(self.unavoidable(w))), np.linalg.inv(G))
+
+    def check(self, plant: MatrixPlant, *, key: str) -> None:
+        """See `ControlLaw`."""
+        check_minimum_variance(plant, self.complementary(np.linspace(0.1, 3.0, 30)), key=key)
 
     def _terms(self) -> list[Array]:
         plant = self.plant
@@ -173,16 +215,6 @@ class MinimumVariance:
 
     @property
     def singularities(self) -> ComplexArray:
+        """See `ControlLaw`."""
         roots = [roots_in_z(terms) for terms in self._terms()]
         return np.concatenate([self.plant.singularities, logarithmic_distance(join_roots(roots))])
-
-
-def _loop_singularities(target: MatrixTransfer) -> ComplexArray:
-    n = target.numerator.shape[0]
-    size = max(target.numerator.shape[-1], target.denominator.size)
-    sensitivity = np.zeros((n, n, size))
-    sensitivity[..., : target.numerator.shape[-1]] -= target.numerator
-    sensitivity[np.arange(n), np.arange(n), : target.denominator.size] += target.denominator
-    zeros = roots_in_z(determinant_and_adjugate(sensitivity)[0])
-    numerator, _ = determinant_and_adjugate(target.numerator)
-    return logarithmic_distance(join_roots([target.poles, zeros, roots_in_z(numerator)]))

@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.plant.polynomial import Array
 
 _REACH = 90.0
 _STEP = 0.02
+
+
+@dataclass(frozen=True)
+class LossTheory:
+    """N E||y - y0||^2 = `value`, and mean and standard deviation of its root over experiments."""
+
+    value: float
+    mean: float
+    sd: float
+
+
+def loss_theory(criterion: ParametricCriterion, information: Array) -> LossTheory:
+    """For the model structure; `information` (k, k) is that of one sample."""
+    covariance = np.asarray(np.linalg.inv(information))
+    return LossTheory(criterion.value(information), *root_moments(error_eigenvalues(criterion.W, covariance)))
 
 
 def error_eigenvalues(W: Array, covariance: Array) -> Array:

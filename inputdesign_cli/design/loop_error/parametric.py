@@ -1,5 +1,8 @@
 """The exact finite-order covariance in place of the asymptotic one: least tr(W P) over every spectrum.
 
+[rojas-asymptotic] takes the covariance that holds as the model order grows; here it is that of the model
+structure, [ljung-1999] Section 9.4.
+
 To first order in the error of the parameters, y - y0 = sum_l dtheta_l X_l (r - v) with
 X_l = S G dC_l S. Hence E||y - y0||^2 = tr(W P), W_lm = mean tr(X_l (Phi_r + Phi_v) X_m^*), where the
 covariance P is the inverse of an information matrix that is affine in the input spectrum.
@@ -44,8 +47,8 @@ class ParametricCriterion:
     def information(self, w: Array, Phi: ComplexArray, weights: Array) -> Array:
         """M (k, k) of the spectrum Phi (K, n, n) at `w`, for a mean with `weights` (K,)."""
         X = self.sources(w)
-        moved = X @ Phi[:, None]
-        return self.noise_information + np.einsum("klab,kmab,k->lm", moved, np.conj(X), weights).real
+        excited = X @ Phi[:, None]
+        return self.noise_information + np.einsum("klab,kmab,k->lm", excited, np.conj(X), weights).real
 
     def value(self, information: Array) -> float:
         """tr(W M^-1)."""
@@ -60,7 +63,7 @@ class ParametricCriterion:
 
 @dataclass(frozen=True)
 class LineDesign:
-    """Sinusoids: `spectrum` (J, n, n) are the masses, whose sum's real part is the covariance of u."""
+    """Sinusoids: `spectrum` (J, n, n) are power matrices, whose sum's real part is the covariance of u."""
 
     frequencies: Array
     spectrum: ComplexArray
@@ -125,14 +128,14 @@ def least_error(
         least_gap = min(gap, least_gap)
         if gap <= tolerance * best.value or stalled == _PATIENCE:
             break
-        mass = np.trace(Phi, axis1=1, axis2=2).real
-        kept = lines[mass > _FADED * mass.sum()]
+        power = np.trace(Phi, axis1=1, axis2=2).real
+        kept = lines[power > _FADED * power.sum()]
         highest = np.argsort(heights)[: -_MOST_NEW - 1 : -1]
         lines = _apart(kept, np.sort(peaks[highest]), span=grid[-1])
     assert best is not None
-    mass = np.trace(best.spectrum, axis1=1, axis2=2).real
-    kept = mass > 1e-9 * mass.sum()
-    Phi = best.spectrum[kept] * mass.sum() / mass[kept].sum()
+    power = np.trace(best.spectrum, axis1=1, axis2=2).real
+    kept = power > 1e-9 * power.sum()
+    Phi = best.spectrum[kept] * power.sum() / power[kept].sum()
     return LineDesign(
         best.frequencies[kept], Phi, best.value, bound, best.information, best.powers, best.rounds
     )
@@ -145,7 +148,7 @@ def _restricted(
     limits: Array,
     near: Array | None,
 ) -> tuple[ComplexArray, Array]:
-    """The best masses at given lines and the multipliers of the limits, by a semidefinite program.
+    """The best power matrices at given lines and the multipliers of the limits, by a semidefinite program.
 
     `near` (k, k) is an information matrix near the answer: in its coordinates the program is well scaled.
     """

@@ -2,54 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channels import PolynomialChannels, Rows
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, roots_in_z
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, stack
+from inputdesign_cli.plant.polynomial_model import PolynomialModel
 
 
-class MatrixPlant(PolynomialChannels):
-    """`PolynomialChannels` as G = R^-1 N, R diagonal, with what inverting a square G takes."""
+class MatrixPlant(PolynomialModel):
+    """`PolynomialModel` as G = R^-1 N, R diagonal, with what inverting a square G takes."""
 
     @classmethod
-    def of(cls, channels: PolynomialChannels) -> MatrixPlant:
+    def of(cls, channels: PolynomialModel) -> MatrixPlant:
         """The same plant."""
         return cls(channels.B, channels.A, channels.F, channels.C, channels.D, channels.covariance)
-
-    @classmethod
-    def build(
-        cls,
-        *,
-        B: Sequence[Sequence[Sequence[float]]],
-        covariance: ArrayLike,
-        A: Sequence[Sequence[float]] = ((1.0,),),
-        F: Sequence[Sequence[Sequence[float]]] | None = None,
-        C: Sequence[Sequence[float]] = ((1.0,),),
-        D: Sequence[Sequence[float]] = ((1.0,),),
-    ) -> MatrixPlant:
-        """From plain numbers; A, C and D hold one polynomial for all outputs or one an output."""
-
-        def each(given: Sequence[Sequence[float]]) -> tuple[Array, ...]:
-            return tuple(np.asarray(p, dtype=float) for p in given)
-
-        def matrix(given: Sequence[Sequence[Sequence[float]]]) -> Rows:
-            return tuple(each(row) for row in given)
-
-        ones = [[[1.0] for _ in row] for row in B]
-        return cls(
-            B=matrix(B),
-            A=each(A),
-            F=matrix(F or ones),
-            C=each(C),
-            D=each(D),
-            covariance=np.asarray(covariance, dtype=float),
-        )
 
     def disturbance_at(self, w: ArrayLike) -> ComplexArray:
         """Phi_v (K, n, n), the spectrum of the noise at the outputs."""

@@ -11,25 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.design.loop_error.closed_form import best_spectrum, power_of
-from inputdesign_cli.design.loop_error.laws import (
-    ControlLaw,
-    MinimumVariance,
-    kronecker,
-    propagation,
-    sensitivity,
-)
+from inputdesign_cli.design.loop_error.laws import ControlLaw, kronecker, propagation, sensitivity
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
 from inputdesign_cli.design.loop_error.parametric import LineDesign, ParametricCriterion, least_error
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
-from inputdesign_cli.design.loop_error.transfer import MatrixTransfer
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.design.loop_error.weight import weight as weight_from
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import graded_grid, logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.transfer import Rational
 
 _SETTLED = 1e-11
 _HALVINGS = 4
+_WHITE = Rational(np.ones(1))
 
 
 @dataclass(frozen=True)
@@ -39,6 +34,16 @@ class PowerLimit:
     kind: Literal["input", "output"]
     most: float
     channel: int | None = None
+
+    @classmethod
+    def of_input(cls, most: float, channel: int | None = None) -> PowerLimit:
+        """Of the inputs."""
+        return cls("input", most, channel)
+
+    @classmethod
+    def of_output(cls, most: float, channel: int | None = None) -> PowerLimit:
+        """Of what the inputs cause at the outputs."""
+        return cls("output", most, channel)
 
     def metric(self, G: ComplexArray) -> ComplexArray:
         """M (K, n, n)."""
@@ -50,12 +55,12 @@ class PowerLimit:
 
 
 @dataclass(frozen=True)
-class ClosedLoopProblem:
+class LoopErrorProblem:
     """E||y - y0||^2 of the loop with the controller designed on the model, and what the input may cost.
 
     Attributes:
         reference_variance: (n,) of the white noise behind the reference, one for each output.
-        reference_filter: scalar filter that colours it, as a 1 x 1 matrix.
+        reference_filter: that colours it.
         band: normalised frequencies inside which the input may have power. The asymptotic
             covariance is infinite outside, so there the error is counted inside only.
     """
@@ -64,17 +69,17 @@ class ClosedLoopProblem:
     law: ControlLaw
     limits: tuple[PowerLimit, ...]
     reference_variance: Array
-    reference_filter: MatrixTransfer | None = None
+    reference_filter: Rational = _WHITE
     band: tuple[float, float] = (0.0, np.pi)
 
     def entering(self, w: ArrayLike) -> ComplexArray:
         """Phi_r + Phi_v (K, n, n)."""
         noise = self.plant.disturbance_at(w)
-        shape = 1.0 if self.reference_filter is None else np.abs(self.reference_filter.at(w)) ** 2
-        return np.asarray(noise + np.diag(self.reference_variance) * shape)
+        reference = np.abs(self.reference_filter.at(w))[:, None, None] ** 2 * np.diag(self.reference_variance)
+        return np.asarray(noise + reference)
 
     def weight(self, w: ArrayLike) -> ComplexArray:
-        """The weight of (17), (K, n, n)."""
+        """Z (K, n, n), [rojas-asymptotic] (17)."""
         sent = propagation(self.law, self.plant.plant_at(w), w)
         return weight_from(sent, self.entering(w), self.plant.disturbance_at(w))
 
@@ -95,10 +100,8 @@ class ClosedLoopProblem:
     @cached_property
     def singularities(self) -> ComplexArray:
         """Where integrands over frequency are not analytic, as points of the frequency plane."""
-        parts = [self.plant.singularities, self.law.singularities]
-        if self.reference_filter is not None:
-            parts.append(logarithmic_distance(self.reference_filter.poles))
-        return np.concatenate(parts)
+        reference = logarithmic_distance(self.reference_filter.poles)
+        return np.concatenate([self.plant.singularities, self.law.singularities, reference])
 
     def rule(self, refine: int, *, band: bool = True) -> Quadrature:
         """Nodes and weights of means over frequency, inside the band or over all of the circle."""
@@ -144,59 +147,51 @@ class ClosedLoopProblem:
 
     def model_of_noise_part(self) -> float:
         """J_o: what the error of the noise model adds, whatever the input (zero if C ignores H)."""
-        if not isinstance(self.law, MinimumVariance):
-            return 0.0
-        law = self.law
-
-        def mean(rule: Quadrature) -> float:
-            w = rule.nodes
-            G, noise = self.plant.plant_at(w), self.plant.disturbance_at(w)
-            S = sensitivity(law.complementary(w))
-            J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ law.noise_jacobian(G, w)
-            n = self.plant.outputs
-            entering = kronecker(np.conj(self.entering(w)), np.broadcast_to(np.eye(n), S.shape))
-            inverse = np.linalg.inv(self.plant.covariance).T
-            variance = kronecker(np.broadcast_to(inverse, S.shape).astype(complex), noise)
-            return float(np.einsum("kab,kba,k->", adjoint(J) @ entering @ J, variance, rule.weights).real)
-
         rule = self.rule(1, band=False)
-        return mean(rule)
+        w, n = rule.nodes, self.plant.outputs
+        J = self._noise_propagation(w)
+        if J is None:
+            return 0.0
+        identity = np.broadcast_to(np.eye(n, dtype=complex), (w.size, n, n))
+        entering = kronecker(np.conj(self.entering(w)), identity)
+        inverse = np.linalg.inv(self.plant.covariance).T @ identity
+        variance = kronecker(inverse, self.plant.disturbance_at(w))
+        return float(np.einsum("kab,kba,k->", adjoint(J) @ entering @ J, variance, rule.weights).real)
 
     def parametric(self) -> ParametricCriterion:
         """tr(W P) of the model structure of the plant."""
-        law, plant = self.law, self.plant
-
-        def sent(w: Array) -> tuple[ComplexArray, ComplexArray]:
-            """X_l (K, k, n, n) of the loop, and H^-1 dH_l."""
-            dG, relative = plant.plant_gradient(w), plant.noise_gradient(w)
-            G, T = plant.plant_at(w), law.complementary(w)
-            S = sensitivity(T)
-            X = -S[:, None] @ dG @ (np.linalg.inv(G) @ T)[:, None]
-            if isinstance(law, MinimumVariance):
-                n = plant.outputs
-                J = kronecker(np.swapaxes(S, 1, 2), S @ G) @ law.noise_jacobian(G, w)
-                dH = plant.noise_at(w)[:, None] @ relative
-                columns = np.swapaxes(dH, 2, 3).reshape(*dH.shape[:2], n * n)
-                moved = np.einsum("kab,klb->kla", J, columns).reshape(*dH.shape[:2], n, n)
-                X = X + np.swapaxes(moved, 2, 3)
-            return X, relative
-
-        def integrals(rule: Quadrature) -> tuple[Array, Array]:
-            X, relative = sent(rule.nodes)
-            W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(rule.nodes), np.conj(X), rule.weights).real
-            inverse = np.linalg.inv(plant.covariance)
-            M0 = np.einsum(
-                "klab,bc,kmdc,da,k->lm", relative, plant.covariance, np.conj(relative), inverse, rule.weights
-            ).real
-            return W, M0
-
+        plant, rule = self.plant, self.rule(1, band=False)
+        X, relative = self._parameter_errors(rule.nodes)
+        inverse = np.linalg.inv(plant.covariance)
+        W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(rule.nodes), np.conj(X), rule.weights).real
+        M0 = np.einsum(
+            "klab,bc,kmdc,da,k->lm", relative, plant.covariance, np.conj(relative), inverse, rule.weights
+        ).real
         whitener = np.linalg.inv(np.linalg.cholesky(plant.covariance))
+        return ParametricCriterion(W, M0, lambda w: np.asarray(whitener @ plant.input_gradient(w)))
 
-        def sources(w: Array) -> ComplexArray:
-            return np.asarray(whitener @ plant.input_gradient(w))
+    def _noise_propagation(self, w: ArrayLike) -> ComplexArray | None:
+        """d vec(S G Delta C S) / d vec H (K, n^2, n^2); None where C ignores H."""
+        G = self.plant.plant_at(w)
+        J = self.law.noise_jacobian(G, w)
+        if J is None:
+            return None
+        S = sensitivity(self.law.complementary(w))
+        return kronecker(np.swapaxes(S, 1, 2), S @ G) @ J
 
-        W, M0 = integrals(self.rule(1, band=False))
-        return ParametricCriterion(W, M0, sources)
+    def _parameter_errors(self, w: Array) -> tuple[ComplexArray, ComplexArray]:
+        """X_l (K, k, n, n) of the loop, see `parametric`, and H^-1 dH_l."""
+        plant = self.plant
+        dG, relative = plant.plant_gradient(w), plant.noise_gradient(w)
+        G, T = plant.plant_at(w), self.law.complementary(w)
+        X = -sensitivity(T)[:, None] @ dG @ (np.linalg.inv(G) @ T)[:, None]
+        J = self._noise_propagation(w)
+        if J is not None:
+            dH = plant.noise_at(w)[:, None] @ relative
+            columns = np.swapaxes(dH, 2, 3).reshape(*dH.shape[:2], -1)
+            sent = np.einsum("kab,klb->kla", J, columns).reshape(dH.shape)
+            X = X + np.swapaxes(sent, 2, 3)
+        return X, relative
 
     def best_lines(self, criterion: ParametricCriterion, *, tolerance: float) -> LineDesign:
         """The best input of the model structure among all spectra within the limits."""

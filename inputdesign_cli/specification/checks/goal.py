@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from inputdesign_cli.specification.models.findings import Finding
-from inputdesign_cli.specification.models.plant import RegressionPlant
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.near_words import choices
+from inputdesign_cli.specification.wording import choices
 
 
-def something_asked(spec: Spec) -> Iterator[Finding]:
+def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:
     """A design needs a requirement or a criterion; an analysis of a given excitation does not."""
     accuracy = spec.accuracy
     if spec.designs and not accuracy.requirements and not accuracy.goals:
-        yield Finding(
+        yield PathDiagnostic(
             "nothing-asked",
             "nothing is asked of the model: accuracy holds neither a requirement nor a criterion",
             "write accuracy: {model_error: {relative: 0.01}}, or give the excitation under spectrum.given",
             ("accuracy",),
         )
     if "scale" in accuracy.model_fields_set and accuracy.criterion is None:
-        yield Finding(
+        yield PathDiagnostic(
             "unsuitable-key",
             "{key} is the scale of a criterion, and there is none",
             "add criterion: D (or A, E, T), or remove scale",
@@ -29,11 +28,11 @@ def something_asked(spec: Spec) -> Iterator[Finding]:
         )
 
 
-def goals_agree(spec: Spec) -> Iterator[Finding]:
+def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
     """At most one goal, and an objective that has what it needs."""
     accuracy, objective = spec.accuracy, spec.objective
     for extra in accuracy.goals[1:]:
-        yield Finding(
+        yield PathDiagnostic(
             "conflicting-keys",
             f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment",
             "keep one of the two",
@@ -44,21 +43,21 @@ def goals_agree(spec: Spec) -> Iterator[Finding]:
         return
     path = ("objective",)
     if objective in ("least_cost", "shortest_experiment") and not accuracy.requirements:
-        yield Finding(
+        yield PathDiagnostic(
             "contradictory-objective",
             f"{objective} needs a requirement to meet, but accuracy only holds {choices(accuracy.goals)}",
             "add accuracy.model_error, or write objective: best_accuracy",
             path,
         )
     elif objective in ("least_cost", "shortest_experiment") and accuracy.goals:
-        yield Finding(
+        yield PathDiagnostic(
             "contradictory-objective",
             f"{objective} leaves nothing to optimise for accuracy.{accuracy.goals[0]}",
             f"remove accuracy.{accuracy.goals[0]}, or write objective: best_accuracy",
             path,
         )
     elif objective == "best_accuracy" and not accuracy.goals and accuracy.mean_squared_error is not None:
-        yield Finding(
+        yield PathDiagnostic(
             "contradictory-objective",
             "best_accuracy asks for the least mean-squared error, but a target for it is given",
             "remove the target of mean_squared_error, or write objective: least_cost",
@@ -66,22 +65,22 @@ def goals_agree(spec: Spec) -> Iterator[Finding]:
         )
 
 
-def limits_present(spec: Spec) -> Iterator[Finding]:
+def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
     """Without a limit on power the best experiment has no end, and the shortest is one sample."""
     if not spec.designs or spec.limits.bounds_power:
         return
     if spec.goal == "best_accuracy" and (spec.accuracy.goals or spec.accuracy.requirements):
         asked = (*spec.accuracy.goals, *spec.accuracy.requirements)[0]
-        regression = isinstance(spec.plant, RegressionPlant)
+        regression = spec.plant.kind == "regression"
         key = "limits.energy" if regression else "limits.input_power"
-        yield Finding(
+        yield PathDiagnostic(
             "needs-limits",
             f"accuracy.{asked} is to be the best that limits allow, but nothing limits its power",
             f"add {key}" + ("" if regression else ", limits.output_power or limits.excitation_power"),
             ("limits",) if "limits" in spec.model_fields_set else ("accuracy", asked),
         )
     if spec.goal == "shortest_experiment":
-        yield Finding(
+        yield PathDiagnostic(
             "needs-limits",
             "the shortest experiment needs a limit on power: otherwise one strong sample would do",
             "add limits.input_power, limits.output_power or limits.excitation_power",
@@ -89,25 +88,11 @@ def limits_present(spec: Spec) -> Iterator[Finding]:
         )
 
 
-def sensitivity_has_loop(spec: Spec) -> Iterator[Finding]:
-    """A sensitivity is that of a loop."""
-    error = spec.accuracy.model_error
-    if error is None or error.sensitivity is None or error.sensitivity.controller is not None:
-        return
-    if not spec.closed_loop:
-        yield Finding(
-            "needs-controller",
-            "{key} is that of a control loop, but there is no controller",
-            "add experiment.controller, or a controller beside it for the loop to be kept",
-            ("accuracy", "model_error", "sensitivity"),
-        )
-
-
-def lengths_agree(spec: Spec) -> Iterator[Finding]:
+def lengths_agree(spec: Spec) -> Iterator[PathDiagnostic]:
     """The experiment is no longer than it may be."""
     most = spec.limits.samples
     if most is not None and spec.goal != "shortest_experiment" and spec.experiment.samples > most:
-        yield Finding(
+        yield PathDiagnostic(
             "conflicting-keys",
             f"{{key}} is {spec.experiment.samples}, more than limits.samples ({most})",
             "shorten the experiment or raise the limit",

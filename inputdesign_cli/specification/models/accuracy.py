@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal
 
-from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.specification.models.experiment import SemidefiniteMatrix, check_names, exactly_one
+from inputdesign_cli.specification.models.experiment import check_names, exactly_one
 from inputdesign_cli.specification.models.fields import (
     Band,
     Denominator,
@@ -18,15 +18,16 @@ from inputdesign_cli.specification.models.fields import (
     Flag,
     Fraction,
     Names,
+    NonNegative,
     Numbers,
     Numerator,
     Positive,
+    SemidefiniteMatrix,
     SymmetricMatrix,
 )
-from inputdesign_cli.specification.models.findings import Findings, describe, fail
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
-from inputdesign_cli.specification.models.values import collect, number
 
 DEFAULT_CONFIDENCE = 0.95
 
@@ -43,16 +44,12 @@ class Sensitivity(Section):
         default=None, description="C of the loop to be kept (default: the controller of the experiment)."
     )
 
-    @model_validator(mode="after")
-    def _one(self) -> Sensitivity:
-        findings = Findings()
-        exactly_one(findings, self, "numerator", "max_db")
+    def check(self) -> Iterator[PathDiagnostic]:
+        """W is given once, and whole."""
+        yield from exactly_one(self, "numerator", "max_db")
         if self.denominator is not None and self.numerator is None:
-            findings.add(
-                "missing-key", "{key} stands without a numerator", 'add "numerator: [..]"', "denominator"
-            )
-        findings.stop()
-        return self
+            message = "{key} stands without a numerator"
+            yield PathDiagnostic("missing-key", message, 'add "numerator: [..]"', ("denominator",))
 
     @property
     def weight(self) -> DiscreteTransfer | None:
@@ -87,27 +84,24 @@ class ModelError(Section):
         default="first_order", description="first_order: linearised; ellipsoid: every model of the ellipsoid."
     )
 
-    @model_validator(mode="after")
-    def _one(self) -> ModelError:
-        findings = Findings()
-        exactly_one(findings, self, "relative", "absolute", "table", "sensitivity")
+    def check(self) -> Iterator[PathDiagnostic]:
+        """r_adm and the size of the confidence region are given once."""
+        yield from exactly_one(self, "relative", "absolute", "table", "sensitivity")
         if self.confidence is not None and self.alpha is not None:
-            findings.add(
+            yield PathDiagnostic(
                 "conflicting-keys",
                 "{key} stands beside confidence, which fixes it already",
                 "keep one of the two",
-                "alpha",
+                ("alpha",),
                 at_key=True,
             )
         if self.sensitivity is not None and self.norm == "entry":
-            findings.add(
+            yield PathDiagnostic(
                 "conflicting-keys",
                 "{key} is entry, but a sensitivity depends on all entries of the error together",
                 "remove norm, or write frobenius",
-                "norm",
+                ("norm",),
             )
-        findings.stop()
-        return self
 
     @property
     def probability(self) -> float | None:
@@ -123,12 +117,9 @@ class InformationTarget(Section):
         default=None, description="Names that order its rows (default: of the model)."
     )
 
-    @model_validator(mode="after")
-    def _sizes(self) -> InformationTarget:
-        findings = Findings()
-        check_names(findings, self.parameters, len(self.matrix), "matrix")
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Every row has a name."""
+        yield from check_names(self.parameters, len(self.matrix), "matrix")
 
 
 class Application(Section):
@@ -139,12 +130,9 @@ class Application(Section):
     gamma: Positive = Field(description="Accuracy: V may reach 1/gamma.")
     confidence: Fraction = Field(default=DEFAULT_CONFIDENCE, description="Probability (default 0.95).")
 
-    @model_validator(mode="after")
-    def _sizes(self) -> Application:
-        findings = Findings()
-        check_names(findings, self.parameters, len(self.hessian), "hessian")
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Every row has a name."""
+        yield from check_names(self.parameters, len(self.hessian), "hessian")
 
 
 class WeightedVariance(Section):
@@ -158,61 +146,26 @@ class WeightedVariance(Section):
     )
 
 
-Norm = Annotated[
-    float,
-    PlainValidator(partial(number, least=0.0, hint="a norm is not negative; 0 stands for no bias at all")),
-    WithJsonSchema({"type": "number", "minimum": 0}),
-]
-ErrorTarget = Annotated[
-    float,
-    PlainValidator(
-        partial(
-            number,
-            above=0.0,
-            hint="every estimate has some error; remove the key for the least that limits.energy allows",
-        )
-    ),
-    WithJsonSchema({"type": "number", "exclusiveMinimum": 0}),
-]
-
-
 class MeanSquaredError(Section):
     """Mean-squared error of an estimated quantity when some regressors are neglected."""
 
     estimated: Numbers = Field(description="Weights of the estimated parameters in the quantity of interest.")
     neglected: Numbers | None = Field(default=None, description="Weights of the neglected ones (default 0).")
-    neglected_norm: Norm = Field(description="Bound on the norm of the neglected parameters.")
-    target: ErrorTarget | None = Field(
+    neglected_norm: Annotated[
+        NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
+    ] = Field(description="Bound on the norm of the neglected parameters.")
+    target: (
+        Annotated[
+            Positive,
+            Wording(
+                "a number",
+                "every estimate has some error; remove the key for the least that limits.energy allows",
+            ),
+        ]
+        | None
+    ) = Field(
         default=None, description="Largest admissible error; absent: the least that limits.energy allows."
     )
-
-
-def _deviations(value: Any) -> dict[str, float]:
-    if not isinstance(value, dict) or not value:
-        what = (
-            "is an empty mapping" if isinstance(value, dict) else f"must be a mapping, not {describe(value)}"
-        )
-        raise fail("wrong-shape", "{key} " + what, "write parameter names and numbers: {b1: 0.01}")
-    findings = Findings()
-    result = {
-        name: collect(findings, lambda v: number(v, above=0.0), deviation, name)
-        for name, deviation in value.items()
-    }
-    findings.stop()
-    return result
-
-
-Deviations = Annotated[
-    Mapping[str, float],
-    PlainValidator(_deviations),
-    WithJsonSchema(
-        {
-            "type": "object",
-            "additionalProperties": {"type": "number", "exclusiveMinimum": 0},
-            "minProperties": 1,
-        }
-    ),
-]
 
 
 class Accuracy(Section):
@@ -228,9 +181,14 @@ class Accuracy(Section):
     weighted_variance: WeightedVariance | None = Field(
         default=None, description="Bound on a weighted variance."
     )
-    standard_deviation: Deviations | None = Field(
-        default=None, description="Largest standard deviation of each named parameter."
-    )
+    standard_deviation: (
+        Annotated[
+            Mapping[str, Positive],
+            Field(min_length=1),
+            Wording("a mapping", "write parameter names and numbers: {b1: 0.01}"),
+        ]
+        | None
+    ) = Field(default=None, description="Largest standard deviation of each named parameter.")
     criterion: Literal["D", "A", "E", "T"] | None = Field(
         default=None,
         description="The best det, trace of inverse, smallest eigenvalue or trace of M within limits.",
@@ -250,15 +208,13 @@ class Accuracy(Section):
     def requirements(self) -> tuple[str, ...]:
         """The keys of the requirements that are given, in the order of the contract."""
         names = ("model_error", "information", "application", "weighted_variance", "standard_deviation")
-        given = [n for n in names if getattr(self, n) is not None]
-        if self.mean_squared_error is not None and self.mean_squared_error.target is not None:
-            given.append("mean_squared_error")
-        return tuple(given)
+        error = self.mean_squared_error
+        bounded = error is not None and error.target is not None
+        return self.stated(*names) + (("mean_squared_error",) if bounded else ())
 
     @property
     def goals(self) -> tuple[str, ...]:
         """The keys that ask for the best that limits allow."""
-        given = [n for n in ("criterion", "closed_loop_error") if getattr(self, n) is not None]
-        if self.mean_squared_error is not None and self.mean_squared_error.target is None:
-            given.append("mean_squared_error")
-        return tuple(given)
+        error = self.mean_squared_error
+        unbounded = error is not None and error.target is None
+        return self.stated("criterion", "closed_loop_error") + (("mean_squared_error",) if unbounded else ())

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.controller import MatrixRatio
 from inputdesign_cli.specification.models.experiment import exactly_one
-from inputdesign_cli.specification.models.fields import PositivePerChannel, RowsMatrix
-from inputdesign_cli.specification.models.findings import Findings, describe, fail
-from inputdesign_cli.specification.models.plant import ContinuousMatrix, with_paths
-from inputdesign_cli.specification.models.polynomials import check_delay_stable, check_left_half_plane
-from inputdesign_cli.specification.models.section import Section, needs_mapping, picker, tag
+from inputdesign_cli.specification.models.fields import PerChannel, Positive, RowsMatrix
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.plant import ContinuousMatrix
+from inputdesign_cli.specification.models.polynomials import check_delay_stable
+from inputdesign_cli.specification.models.section import Section, pick, tag
+from inputdesign_cli.specification.models.shapes import check_each
 from inputdesign_cli.specification.models.transfer import (
     ContinuousTransfer,
     DiscreteTransfer,
-    Ratio,
     Transfer,
 )
 
@@ -24,14 +26,11 @@ from inputdesign_cli.specification.models.transfer import (
 class DiscreteMatrix(MatrixRatio, family="transfer", phrase="a transfer matrix in q^-1"):
     """A stable transfer matrix in the delay operator, rows are outputs."""
 
-    @model_validator(mode="after")
-    def _stable(self) -> DiscreteMatrix:
-        findings = Findings()
-        for path, factor in with_paths(self.denominator):
-            if finding := check_delay_stable(factor):
-                findings.add(finding.code, finding.message, finding.hint, "denominator", *path)
-        findings.stop()
-        return self
+    kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
+
+    def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
+        """Its poles lie inside the unit circle; `path` leads to the matrix."""
+        yield from check_each(self.denominator, check_delay_stable, *path, "denominator")
 
 
 class ContinuousTarget(ContinuousMatrix):
@@ -43,8 +42,14 @@ class ContinuousTarget(ContinuousMatrix):
 class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):
     """A transfer matrix in s, sampled with a zero-order hold."""
 
+    kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
+
     continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = Field(default=None, description="How it is sampled: zoh.")
+
+    def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
+        """Nothing is left to check: a matrix in s is stable, or it is not read."""
+        return iter(())
 
 
 def _target_kind(value: dict[str, Any]) -> str:
@@ -61,36 +66,13 @@ Target = Annotated[
     | Annotated[ContinuousTransfer, tag(ContinuousTransfer.phrase)]
     | Annotated[DiscreteMatrix, tag(DiscreteMatrix.phrase)]
     | Annotated[ContinuousMatrixTransfer, tag(ContinuousMatrixTransfer.phrase)],
-    Discriminator(picker(_target_kind)),
-    needs_mapping(
-        "{continuous: {numerator: [1], denominator: [10, 1]}}, or the same in q^-1 or with matrices"
+    pick(_target_kind),
+    Wording(
+        "a mapping of keys",
+        "write {continuous: {numerator: [1], denominator: [10, 1]}}, or the same in q^-1 or with matrices",
     ),
 ]
 """t(q) I from one transfer function, or a square matrix."""
-
-
-def _yes(value: Any) -> bool:
-    if value is True:
-        return True
-    raise fail(
-        "out-of-range",
-        f"{{key}} can only be true, not {describe(value)}",
-        "remove the key to choose another law",
-    )
-
-
-Yes = Annotated[bool, PlainValidator(_yes), WithJsonSchema({"const": True})]
-
-
-def _check_stable(findings: Findings, transfer: ContinuousTransfer | DiscreteTransfer, key: str) -> None:
-    continuous = isinstance(transfer, ContinuousTransfer)
-    ratio: Ratio = transfer.continuous if isinstance(transfer, ContinuousTransfer) else transfer
-    path = (key, "continuous", "denominator") if continuous else (key, "denominator")
-    check = check_left_half_plane if continuous else check_delay_stable
-    for i, factor in enumerate(ratio.denominator_factors):
-        if finding := check(factor):
-            where = (*path, i) if len(ratio.denominator_factors) > 1 else path
-            findings.add(finding.code, finding.message, finding.hint, *where)
 
 
 class Control(Section):
@@ -103,33 +85,29 @@ class Control(Section):
     internal_model: Transfer | None = Field(
         default=None, description="Filter of an internal-model controller."
     )
-    minimum_variance: Yes | None = Field(default=None, description="true: minimum-variance control.")
+    minimum_variance: (
+        Annotated[Literal[True], Wording("true", "remove the key to choose another law")] | None
+    ) = Field(default=None, description="true: minimum-variance control.")
 
-    @model_validator(mode="after")
-    def _one(self) -> Control:
-        findings = Findings()
-        exactly_one(findings, self, "model_reference", "internal_model", "minimum_variance")
-        for key in ("model_reference", "internal_model"):
-            transfer = getattr(self, key)
-            if isinstance(transfer, ContinuousTransfer | DiscreteTransfer):
-                _check_stable(findings, transfer, key)
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """There is one law, and what it is given is stable."""
+        yield from exactly_one(self, "model_reference", "internal_model", "minimum_variance")
+        if self.model_reference is not None:
+            yield from self.model_reference.check_stable("model_reference")
+        if self.internal_model is not None:
+            yield from self.internal_model.check_stable("internal_model")
 
 
 class Reference(Section):
     """The reference that the closed loop will follow: white noise, filtered."""
 
-    variance: PositivePerChannel = Field(default=1.0, description="Variance; a number or one per output.")
+    variance: PerChannel[Positive] = Field(default=1.0, description="Variance; a number or one per output.")
     filter: Transfer | None = Field(default=None, description="Filter that colours it (default 1).")
 
-    @model_validator(mode="after")
-    def _stable(self) -> Reference:
-        findings = Findings()
+    def check(self) -> Iterator[PathDiagnostic]:
+        """The filter is stable."""
         if self.filter is not None:
-            _check_stable(findings, self.filter, "filter")
-        findings.stop()
-        return self
+            yield from self.filter.check_stable("filter")
 
 
 class ClosedLoopError(Section):

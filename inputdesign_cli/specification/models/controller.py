@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, model_validator
+from pydantic import Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import ContinuousDenominator, RowsMatrix
-from inputdesign_cli.specification.models.findings import Findings
-from inputdesign_cli.specification.models.plant import check_shapes, denominators_of
-from inputdesign_cli.specification.models.section import Section, needs_mapping, picker, tag
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.section import Section, pick, tag
+from inputdesign_cli.specification.models.shapes import check_shapes, denominators_of
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 
@@ -22,12 +24,9 @@ class MatrixRatio(Section):
         default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
     )
 
-    @model_validator(mode="after")
-    def _shapes(self) -> MatrixRatio:
-        findings = Findings()
-        check_shapes(findings, self.numerator, self.denominator)
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Numerator and denominator have one shape."""
+        yield from check_shapes(self.numerator, self.denominator)
 
     @property
     def numerator_matrix(self) -> PolynomialMatrix:
@@ -43,6 +42,8 @@ class MatrixRatio(Section):
 class ControllerMatrix(MatrixRatio, family="transfer", phrase="a controller of several channels"):
     """C of u = r - C y: rows are inputs of the plant, columns its outputs."""
 
+    kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
+
 
 def _kind(value: dict[str, Any]) -> str:
     return ControllerMatrix.phrase if depth(value.get("numerator")) > 1 else DiscreteTransfer.phrase
@@ -51,9 +52,10 @@ def _kind(value: dict[str, Any]) -> str:
 Controller = Annotated[
     Annotated[DiscreteTransfer, tag(DiscreteTransfer.phrase)]
     | Annotated[ControllerMatrix, tag(ControllerMatrix.phrase)],
-    Discriminator(picker(_kind)),
-    needs_mapping(
-        "{numerator: [..], denominator: [..]} in q^-1; with several channels rows of columns of them"
+    pick(_kind),
+    Wording(
+        "a mapping of keys",
+        "write {numerator: [..], denominator: [..]} in q^-1; with several channels rows of columns of them",
     ),
 ]
 """C of a loop: one transfer function, or a matrix of them."""

@@ -2,73 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import Discriminator, Field
 
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
+    FileName,
     Names,
+    NonNegative,
+    PerChannel,
     Positive,
+    SemidefiniteMatrix,
     StablePerOutput,
-    WeightPerChannel,
+    Variance,
 )
-from inputdesign_cli.specification.models.findings import Finding, Findings, fail
-from inputdesign_cli.specification.models.plant import per_output
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import Polynomial
-from inputdesign_cli.specification.models.section import Section
-from inputdesign_cli.specification.models.values import Matrix, matrix, number
+from inputdesign_cli.specification.models.section import TAG, Section, tag
+from inputdesign_cli.specification.models.shapes import per_output
+from inputdesign_cli.specification.models.values import Matrix
 
-
-def _variance(value: object) -> float | Matrix:
-    if not isinstance(value, list | tuple):
-        return number(value, above=0.0, hint="noise without power needs no experiment")
-    rows = matrix(value)
-    if smallest_eigenvalue(rows) <= 0.0:
-        raise fail(
-            "not-positive-definite",
-            "{key} is not a covariance matrix: it must be positive definite",
-            "each variance must be positive, and each covariance below the geometric mean of its variances",
-        )
-    return rows
-
-
-def _information(value: object) -> str | Matrix:
-    if isinstance(value, str) and value.strip():
-        return value
-    return semidefinite(value)
-
-
-def semidefinite(value: object) -> Matrix:
-    """A symmetric positive semidefinite matrix."""
-    rows = matrix(value)
-    if smallest_eigenvalue(rows) < -1e-9:
-        raise fail(
-            "not-positive-definite", "{key} must be positive semidefinite", "check the signs of its entries"
-        )
-    return rows
-
-
-def smallest_eigenvalue(rows: Matrix) -> float:
-    """The smallest eigenvalue of a symmetric matrix, relative to its largest entry (0 for a zero matrix)."""
-    values = np.array(rows)
-    scale = float(np.max(np.abs(values)))
-    return float(np.linalg.eigvalsh(values / scale)[0]) if scale > 0 else 0.0
-
-
-_MATRIX_SCHEMA = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
-Variance = Annotated[
-    float | Matrix,
-    PlainValidator(_variance),
-    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, _MATRIX_SCHEMA]}),
-]
-SemidefiniteMatrix = Annotated[Matrix, PlainValidator(semidefinite), WithJsonSchema(_MATRIX_SCHEMA)]
 InformationSource = Annotated[
-    str | Matrix,
-    PlainValidator(_information),
-    WithJsonSchema({"anyOf": [{"type": "string"}, _MATRIX_SCHEMA]}),
+    Annotated[FileName, tag("file")] | Annotated[SemidefiniteMatrix, tag("matrix")],
+    Discriminator(lambda value: TAG + ("file" if isinstance(value, str) else "matrix")),
 ]
 
 
@@ -118,12 +78,9 @@ class SimulationNoise(NoiseShape):
         default=None, description="Standard deviation as a fraction of the smallest output rms."
     )
 
-    @model_validator(mode="after")
-    def _one(self) -> SimulationNoise:
-        findings = Findings()
-        exactly_one(findings, self, "variance", "relative_std")
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Its size is given once."""
+        yield from exactly_one(self, "variance", "relative_std")
 
 
 class Prior(Section):
@@ -136,13 +93,10 @@ class Prior(Section):
         default=None, description="Names that order the rows of the matrix (default: the order of the model)."
     )
 
-    @model_validator(mode="after")
-    def _sizes(self) -> Prior:
-        findings = Findings()
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Every row of the matrix has a name."""
         if isinstance(self.information, tuple):
-            check_names(findings, self.parameters, len(self.information), "information")
-        findings.stop()
-        return self
+            yield from check_names(self.parameters, len(self.information), "information")
 
 
 class Experiment(Section):
@@ -160,50 +114,52 @@ class Experiment(Section):
 class Cost(Section):
     """Weights of the powers that the design pays for; a number, or one per channel."""
 
-    input_power: WeightPerChannel = Field(default=0.0, description="Weight of the power of u that r causes.")
-    output_power: WeightPerChannel = Field(default=0.0, description="Weight of the power of y that r causes.")
-    excitation_power: WeightPerChannel = Field(default=0.0, description="Weight of the power of r itself.")
+    input_power: PerChannel[NonNegative] = Field(
+        default=0.0, description="Weight of the power of u that r causes."
+    )
+    output_power: PerChannel[NonNegative] = Field(
+        default=0.0, description="Weight of the power of y that r causes."
+    )
+    excitation_power: PerChannel[NonNegative] = Field(
+        default=0.0, description="Weight of the power of r itself."
+    )
 
-    @model_validator(mode="after")
-    def _some(self) -> Cost:
-        weights = [self.input_power, self.output_power, self.excitation_power]
-        if not any(w > 0 for given in weights for w in (given if isinstance(given, tuple) else (given,))):
-            raise fail(
-                "no-cost",
-                "all weights of {key} are zero: every experiment would be free",
-                "write input_power: 1",
-            )
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Something has a price."""
+        if not any(np.any(w) for w in (self.input_power, self.output_power, self.excitation_power)):
+            message = "all weights of {key} are zero: every experiment would be free"
+            yield PathDiagnostic("no-cost", message, "write input_power: 1")
 
 
-def exactly_one(findings: Findings, model: Section, *keys: str) -> None:
+def exactly_one(model: Section, *keys: str) -> Iterator[PathDiagnostic]:
     """Exactly one of the keys is given."""
-    given = [k for k in keys if getattr(model, k) is not None]
+    given = model.stated(*keys)
     alternatives = ", ".join(keys[:-1]) + " or " + keys[-1]
     if not given:
         needs = f"{{key}} needs one of {alternatives}"
-        findings.append(Finding("missing-key", needs, "add one of them", keys=keys))
+        yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
     for extra in given[1:]:
-        findings.add(
+        yield PathDiagnostic(
             "conflicting-keys",
             f"{{key}} stands beside {given[0]}; give only one of {alternatives}",
             "remove one of the two",
-            extra,
+            (extra,),
             at_key=True,
         )
 
 
-def check_names(findings: Findings, names: tuple[str, ...] | None, size: int, matrix_key: str) -> None:
+def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> Iterator[PathDiagnostic]:
     """Parameter names are distinct and as many as the matrix has rows."""
     if names is None:
         return
     repeated = sorted({n for n in names if names.count(n) > 1})
     if repeated:
-        findings.add("wrong-shape", f"{{key}} names {repeated[0]} more than once", "", "parameters")
+        message = f"{{key}} names {repeated[0]} more than once"
+        yield PathDiagnostic("wrong-shape", message, path=("parameters",))
     if len(names) != size:
-        findings.add(
+        yield PathDiagnostic(
             "wrong-shape",
             f"{{key}} holds {len(names)} names, but {matrix_key} is {size} x {size}",
             "write one name per row, in the order of the rows",
-            "parameters",
+            ("parameters",),
         )

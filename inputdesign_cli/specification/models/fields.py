@@ -1,173 +1,162 @@
-"""The value types of a spec, for the models: plain Python types with the validators of `values`."""
+"""The types of the values of a spec, with pydantic's constraints; `pydantic_errors` words what they refuse.
+
+A union names its alternatives by tags, so that pydantic tries only the one that is meant.
+"""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Annotated, Any
+from collections.abc import Callable
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import PlainValidator, WithJsonSchema
-
-from inputdesign_cli.specification.models.polynomials import Polynomial, check_delay_stable, check_monic
-from inputdesign_cli.specification.models.values import (
-    Matrix,
-    PolynomialList,
-    PolynomialMatrix,
-    band,
-    denominator,
-    flag,
-    fraction,
-    harmonics,
-    matrix,
-    name,
-    not_zero,
-    number,
-    one_or_several,
-    polynomial,
-    polynomials,
-    rising,
-    several,
-    text,
-    whole,
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Strict,
+    WithJsonSchema,
 )
 
-_NUMBER = {"type": "number"}
-_NUMBERS = {"type": "array", "items": _NUMBER, "minItems": 1}
-_LISTS = {"type": "array", "items": _NUMBERS, "minItems": 1}
-_ROWS = {"type": "array", "items": _LISTS, "minItems": 1}
+from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry, fail
+from inputdesign_cli.specification.models.polynomials import (
+    Polynomial,
+    check_delay_stable,
+    check_leading,
+    check_monic,
+    check_not_zero,
+)
+from inputdesign_cli.specification.models.section import TAG, tag
+from inputdesign_cli.specification.models.values import (
+    as_text,
+    as_whole,
+    ascending,
+    depth,
+    positive_definite,
+    product_exists,
+    rising,
+    same_columns,
+    semidefinite,
+    symmetric,
+    two_frequencies,
+)
+
+T = TypeVar("T")
 
 
-def _any(*schemas: dict[str, Any]) -> WithJsonSchema:
-    return WithJsonSchema({"anyOf": list(schemas)})
+def holds(check: Callable[[Polynomial], PathDiagnostic | None]) -> AfterValidator:
+    """The validator that raises what a check of a polynomial finds."""
+
+    def checked(polynomial: Polynomial) -> Polynomial:
+        if found := check(polynomial):
+            raise carry(found)
+        return polynomial
+
+    return AfterValidator(checked)
 
 
-_POSITIVE = partial(number, above=0.0)
-_POSITIVE_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
-_CAP = partial(number, above=0.0, hint="to have no limit, remove the key")
-_WEIGHT = partial(number, least=0.0)
-_WEIGHT_SCHEMA = {"type": "number", "minimum": 0}
-_MONIC = {"check": (check_monic, check_delay_stable)}
-_ONE = "a list of coefficients"
-_PER_OUTPUT = {1: _ONE, 2: "a list of them, one per output"}
-_MATRIX = {1: _ONE, 3: "rows (outputs) of columns (inputs) of them"}
-_FACTORS = {1: _ONE, 2: "a list of factors"}
-_CONTINUOUS = {1: _ONE, 2: "a list of factors", 3: "rows (outputs) of columns (inputs) of coefficient lists"}
+def nested(levels: int, what: str, hint: str) -> BeforeValidator:
+    """The validator that refuses lists which are not nested `levels` deep."""
 
-Number = Annotated[float, PlainValidator(number), WithJsonSchema(_NUMBER)]
-Positive = Annotated[float, PlainValidator(_POSITIVE), WithJsonSchema(_POSITIVE_SCHEMA)]
-Cap = Annotated[float, PlainValidator(_CAP), WithJsonSchema(_POSITIVE_SCHEMA)]
-NonNegative = Annotated[float, PlainValidator(_WEIGHT), WithJsonSchema(_WEIGHT_SCHEMA)]
-Fraction = Annotated[
-    float, PlainValidator(fraction), WithJsonSchema({**_POSITIVE_SCHEMA, "exclusiveMaximum": 1})
+    def check(value: object) -> object:
+        if depth(value) != levels:
+            raise fail("wrong-shape", f"{{key}} must be {what}", hint)
+        return value
+
+    return BeforeValidator(check)
+
+
+_WHOLE = BeforeValidator(as_whole)
+_DEPTH = Discriminator(lambda value: f"{TAG}{depth(value)}")
+_LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if isinstance(value, list | tuple) else "one"))
+
+# Single values
+Number = Annotated[float, Strict(), AllowInfNan(False)]
+Positive = Annotated[Number, Field(gt=0)]
+NonNegative = Annotated[Number, Field(ge=0)]
+Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
+Fraction = Annotated[Number, Field(gt=0, lt=1)]
+Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]
+Count = Annotated[int, Strict(), Field(ge=1, le=2**53), _WHOLE]
+Index = Annotated[int, Strict(), Field(ge=0, le=2**53), _WHOLE]
+RegisterLength = Annotated[int, Strict(), Field(ge=2, le=32), _WHOLE]
+Flag = Annotated[bool, Strict()]
+Text = Annotated[
+    str, Strict(), BeforeValidator(as_text), WithJsonSchema({"type": ["string", "number", "boolean"]})
 ]
-Tolerance = Annotated[
-    float,
-    PlainValidator(partial(number, above=0.0, below=1e-2)),
-    WithJsonSchema({**_POSITIVE_SCHEMA, "exclusiveMaximum": 1e-2}),
+FileName = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("the name of a file")]
+Name = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("a parameter name")]
+
+# Lists
+Several = Annotated[tuple[T, ...], Field(min_length=1)]
+Numbers = Annotated[Several[Number], Wording("a list of numbers")]
+Positives = Annotated[Several[Positive], Wording("a list of numbers above 0")]
+Names = Annotated[Several[Name], Wording("a list of parameter names")]
+PerChannel = Annotated[
+    Annotated[T, tag("one")] | Annotated[Several[T], tag("list")],
+    _LIST_OR_NOT,
 ]
-Count = Annotated[
-    int, PlainValidator(partial(whole, least=1)), WithJsonSchema({"type": "integer", "minimum": 1})
-]
-Index = Annotated[
-    int, PlainValidator(partial(whole, least=0)), WithJsonSchema({"type": "integer", "minimum": 0})
-]
-RegisterLength = Annotated[
-    int,
-    PlainValidator(partial(whole, least=2, most=32)),
-    WithJsonSchema({"type": "integer", "minimum": 2, "maximum": 32}),
-]
+"""One value, or a list with one per channel."""
+Band = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(two_frequencies), AfterValidator(ascending)]
+Frequencies = Annotated[Several[NonNegative], AfterValidator(rising), Wording("a list of frequencies")]
 Harmonics = Annotated[
-    int | str | tuple[int, ...],
-    PlainValidator(harmonics),
-    _any(
-        {"type": "integer", "minimum": 1},
-        {"const": "odd"},
-        {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 1},
+    Annotated[Count, tag("count")]
+    | Annotated[Literal["odd"], Wording("odd", "write odd, a number of harmonics, or a list"), tag("word")]
+    | Annotated[Several[Index], AfterValidator(rising), tag("list")],
+    Discriminator(
+        lambda value: (
+            TAG
+            + ("list" if isinstance(value, list | tuple) else "word" if isinstance(value, str) else "count")
+        )
     ),
 ]
 """How many harmonics of a period, "odd", or which."""
-Flag = Annotated[bool, PlainValidator(flag), WithJsonSchema({"type": "boolean"})]
-Text = Annotated[str, PlainValidator(text), WithJsonSchema({"type": ["string", "number", "boolean"]})]
-FileName = Annotated[
-    str,
-    PlainValidator(partial(name, what="the name of a file")),
-    WithJsonSchema({"type": "string", "minLength": 1}),
+
+# Matrices of numbers
+_ROWS = nested(2, "a matrix", "write rows: [[1, 0], [0, 1]]")
+SymmetricMatrix = Annotated[Several[Several[Number]], _ROWS, AfterValidator(symmetric)]
+SemidefiniteMatrix = Annotated[SymmetricMatrix, AfterValidator(semidefinite)]
+Variance = Annotated[
+    Annotated[Positive, Wording("a number", "noise without power needs no experiment"), tag("one")]
+    | Annotated[SymmetricMatrix, AfterValidator(positive_definite), tag("list")],
+    _LIST_OR_NOT,
 ]
-Numbers = Annotated[
-    tuple[float, ...], PlainValidator(partial(several, item=number, what="numbers")), WithJsonSchema(_NUMBERS)
-]
-Positives = Annotated[
-    tuple[float, ...],
-    PlainValidator(partial(several, item=_POSITIVE, what="numbers above 0")),
-    WithJsonSchema({"type": "array", "items": _POSITIVE_SCHEMA, "minItems": 1}),
-]
-Names = Annotated[
-    tuple[str, ...],
-    PlainValidator(partial(several, item=partial(name, what="a parameter name"), what="parameter names")),
-    WithJsonSchema({"type": "array", "items": {"type": "string"}, "minItems": 1}),
-]
-PerChannel = Annotated[
-    float | tuple[float, ...],
-    PlainValidator(partial(one_or_several, item=number, what="numbers, one per channel")),
-    _any(_NUMBER, _NUMBERS),
-]
-PositivePerChannel = Annotated[
-    float | tuple[float, ...],
-    PlainValidator(partial(one_or_several, item=_CAP, what="numbers, one per channel")),
-    _any(_POSITIVE_SCHEMA, {"type": "array", "items": _POSITIVE_SCHEMA}),
-]
-WeightPerChannel = Annotated[
-    float | tuple[float, ...],
-    PlainValidator(partial(one_or_several, item=_WEIGHT, what="weights, one per channel")),
-    _any(_WEIGHT_SCHEMA, {"type": "array", "items": _WEIGHT_SCHEMA}),
-]
-Band = Annotated[
-    tuple[float, float],
-    PlainValidator(band),
-    WithJsonSchema({"type": "array", "items": _WEIGHT_SCHEMA, "minItems": 2, "maxItems": 2}),
-]
-Frequencies = Annotated[
-    tuple[float, ...],
-    PlainValidator(rising),
-    WithJsonSchema({"type": "array", "items": _WEIGHT_SCHEMA, "minItems": 1}),
-]
-SymmetricMatrix = Annotated[Matrix, PlainValidator(matrix), WithJsonSchema(_LISTS)]
-Numerator = Annotated[
-    Polynomial, PlainValidator(partial(polynomial, check=(not_zero,))), WithJsonSchema(_NUMBERS)
-]
-Denominator = Annotated[
-    Polynomial | PolynomialList,
-    PlainValidator(partial(denominator, depths=_FACTORS)),
-    _any(_NUMBERS, _LISTS),
-]
+"""A variance, or a covariance matrix."""
+
+# Polynomials, one or nested in lists: depth 1 is one, 2 a list, 3 rows of columns of them
+_ONE = "a list of coefficients"
+_PER_OUTPUT = Wording(f"{_ONE}, or a list of them, one per output")
+_FACTORS = Wording(f"{_ONE}, or a list of factors")
+_MATRIX = Wording(
+    f"{_ONE}, or rows (outputs) of columns (inputs) of them",
+    "for several inputs or outputs write rows of columns of polynomials: [[[0, 1], [0, 2]]]",
+)
+_CONTINUOUS = Wording(f"{_ONE}, or a list of factors, or rows (outputs) of columns (inputs) of coefficients")
+_Coefficients = Annotated[Several[Number], Wording(_ONE)]
+_Monic = Annotated[_Coefficients, holds(check_monic)]
+_Stable = Annotated[_Monic, holds(check_delay_stable)]
+_Leading = Annotated[_Coefficients, holds(check_leading)]
+_Rows = Annotated[Several[Several[T]], AfterValidator(same_columns)]
+_OneOrList = Annotated[Annotated[T, tag("1")] | Annotated[Several[T], tag("2")], _DEPTH]
+_OneOrRows = Annotated[Annotated[T, tag("1")] | Annotated[_Rows[T], tag("3")], _DEPTH]
+
+Numerator = Annotated[_Coefficients, holds(check_not_zero)]
+Denominator = Annotated[_OneOrList[_Leading], AfterValidator(product_exists), _FACTORS]
 """One polynomial or a list of factors, in whatever variable."""
-MonicPerOutput = Annotated[
-    Polynomial | PolynomialList,
-    PlainValidator(partial(polynomials, depths=_PER_OUTPUT, check=(check_monic,))),
-    _any(_NUMBERS, _LISTS),
-]
-StablePerOutput = Annotated[
-    Polynomial | PolynomialList,
-    PlainValidator(partial(polynomials, depths=_PER_OUTPUT, **_MONIC)),
-    _any(_NUMBERS, _LISTS),
-]
-StableMatrix = Annotated[
-    Polynomial | PolynomialMatrix,
-    PlainValidator(partial(polynomials, depths=_MATRIX, **_MONIC)),
-    _any(_NUMBERS, _ROWS),
-]
-GainMatrix = Annotated[
-    Polynomial | PolynomialMatrix,
-    PlainValidator(partial(polynomials, depths=_MATRIX)),
-    _any(_NUMBERS, _ROWS),
-]
+MonicPerOutput = Annotated[_OneOrList[_Monic], _PER_OUTPUT]
+StablePerOutput = Annotated[_OneOrList[_Stable], _PER_OUTPUT]
+StableMatrix = Annotated[_OneOrRows[_Stable], _MATRIX]
+GainMatrix = Annotated[_OneOrRows[_Coefficients], _MATRIX]
 RowsMatrix = Annotated[
-    PolynomialMatrix,
-    PlainValidator(partial(polynomials, depths={3: _MATRIX[3]})),
-    WithJsonSchema(_ROWS),
+    _Rows[_Coefficients], nested(3, "rows (outputs) of columns (inputs) of coefficients", _MATRIX.hint)
 ]
 """A matrix of polynomials, never a single one."""
 ContinuousDenominator = Annotated[
-    Polynomial | PolynomialList | PolynomialMatrix,
-    PlainValidator(partial(denominator, depths=_CONTINUOUS)),
-    _any(_NUMBERS, _LISTS, _ROWS),
+    Annotated[_Leading, tag("1")]
+    | Annotated[Several[_Leading], tag("2")]
+    | Annotated[_Rows[_Leading], tag("3")],
+    _DEPTH,
+    AfterValidator(product_exists),
+    _CONTINUOUS,
 ]

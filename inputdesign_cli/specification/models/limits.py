@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, model_validator
+import numpy as np
+from pydantic import Field
 
 from inputdesign_cli.specification.models.fields import (
     Band,
@@ -12,12 +14,11 @@ from inputdesign_cli.specification.models.fields import (
     Count,
     FileName,
     NonNegative,
-    PositivePerChannel,
-    WeightPerChannel,
+    PerChannel,
 )
-from inputdesign_cli.specification.models.findings import Finding, Findings
-from inputdesign_cli.specification.models.section import TAG, Section, Shorthand, tag
-from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
+from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
 
 _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 
@@ -25,50 +26,38 @@ _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 class PowerLimit(Section):
     """Bounds on a power: of the sum over the channels, or with a list of each channel."""
 
-    max: PositivePerChannel | None = Field(
+    max: PerChannel[Cap] | None = Field(
         default=None, description="Largest power; a number or one per channel."
     )
-    min: WeightPerChannel | None = Field(
+    min: PerChannel[NonNegative] | None = Field(
         default=None, description="Smallest power; a number or one per channel."
     )
 
-    @model_validator(mode="after")
-    def _some(self) -> PowerLimit:
-        findings = Findings()
-        check_range(findings, self)
-        if isinstance(self.max, float | tuple) and isinstance(self.min, float | tuple):
-            pairs = list(zip(_listed(self.min), _listed(self.max), strict=False))
-            if isinstance(self.max, tuple) == isinstance(self.min, tuple) and any(a > b for a, b in pairs):
-                findings.add("conflicting-keys", "{key} is larger than max", "exchange the two", "min")
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """A bound is given, and the lower one is below the upper one."""
+        yield from _some(self, "max", "min", "{max: 1}")
+        if self.max is not None and self.min is not None and np.shape(self.max) == np.shape(self.min):
+            yield from _ordered(bool(np.any(np.array(self.min) > np.array(self.max))))
 
 
 class TableFile(Section, family="curve", phrase="table"):
     """A curve over frequency from a file."""
 
+    kind: ClassVar[Literal["table"]] = "table"
+
     table: FileName = Field(description="CSV file with frequency and value.")
 
 
-def _curve(value: Any) -> str:
-    if isinstance(value, dict):
-        return "table" if "table" in value else "continuous" if "continuous" in value else "ratio"
-    return "number"
-
-
-def _pick(value: Any) -> str:
-    if isinstance(value, TableFile | DiscreteTransfer | ContinuousTransfer):
-        kinds = {TableFile: "table", DiscreteTransfer: "ratio", ContinuousTransfer: "continuous"}
-        return TAG + kinds[type(value)]
-    return TAG + _curve(value)
+def _kind(value: dict[str, Any]) -> str:
+    return TableFile.phrase if "table" in value else transfer_kind(value)
 
 
 Curve = Annotated[
     Annotated[NonNegative, tag("number")]
-    | Annotated[TableFile, tag("table")]
-    | Annotated[DiscreteTransfer, tag("ratio")]
-    | Annotated[ContinuousTransfer, tag("continuous")],
-    Discriminator(_pick),
+    | Annotated[TableFile, tag(TableFile.phrase)]
+    | Annotated[DiscreteTransfer, tag(DiscreteTransfer.phrase)]
+    | Annotated[ContinuousTransfer, tag(ContinuousTransfer.phrase)],
+    pick(_kind, plain="number"),
 ]
 """A level, a tabulated curve, or |numerator/denominator|^2."""
 
@@ -81,21 +70,14 @@ class SpectrumLimit(Section):
     )
     min: Curve | None = Field(default=None, description="Smallest density, in the same forms.")
 
-    @model_validator(mode="after")
-    def _some(self) -> SpectrumLimit:
-        findings = Findings()
-        check_range(findings, self)
+    def check(self) -> Iterator[PathDiagnostic]:
+        """A bound is given, and the lower one is below the upper one, which leaves something."""
+        yield from _some(self, "max", "min", "{max: 1}")
         if self.max == 0.0:
-            findings.add(
-                "out-of-range",
-                "{key} must be greater than 0, not 0",
-                "to have no limit, remove the key",
-                "max",
-            )
-        if isinstance(self.max, float) and isinstance(self.min, float) and 0 < self.max < self.min:
-            findings.add("conflicting-keys", "{key} is larger than max", "exchange the two", "min")
-        findings.stop()
-        return self
+            message = "{key} must be greater than 0, not 0"
+            yield PathDiagnostic("out-of-range", message, "to have no limit, remove the key", ("max",))
+        if isinstance(self.max, float) and isinstance(self.min, float):
+            yield from _ordered(0 < self.max < self.min)
 
 
 Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
@@ -104,22 +86,14 @@ Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 class AmplitudeLimit(Section):
     """Bounds on single samples of what the excitation causes, noise and operating point not counted."""
 
-    input: PositivePerChannel | None = Field(
-        default=None, description="Largest |u|; a number or one per input."
-    )
-    output: PositivePerChannel | None = Field(
+    input: PerChannel[Cap] | None = Field(default=None, description="Largest |u|; a number or one per input.")
+    output: PerChannel[Cap] | None = Field(
         default=None, description="Largest |y| of the simulated output; a number or one per output."
     )
 
-    @model_validator(mode="after")
-    def _some(self) -> AmplitudeLimit:
-        findings = Findings()
-        if self.input is None and self.output is None:
-            hint = "write a number, or {input: 1, output: 2}"
-            finding = Finding("missing-key", "{key} needs input or output", hint, keys=("input", "output"))
-            findings.append(finding)
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """A bound is given."""
+        yield from _some(self, "input", "output", "{input: 1, output: 2}")
 
 
 class Limits(Section):
@@ -136,7 +110,7 @@ class Limits(Section):
     amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = Field(
         default=None, description="Largest |u|: a number or one per input; or {input, output}."
     )
-    rate: PositivePerChannel | None = Field(
+    rate: PerChannel[Cap] | None = Field(
         default=None,
         description="Largest change of u from one sample to the next; a number or one per input.",
     )
@@ -153,12 +127,12 @@ class Limits(Section):
         return self.energy is not None or any(p is not None and p.max is not None for p in powers)
 
 
-def check_range(findings: Findings, limit: PowerLimit | SpectrumLimit) -> None:
-    """At least one of max and min is given."""
-    if limit.max is None and limit.min is None:
-        hint = "write a number, or {max: 1}"
-        findings.append(Finding("missing-key", "{key} needs max or min", hint, keys=("max", "min")))
+def _some(limit: Section, first: str, second: str, example: str) -> Iterator[PathDiagnostic]:
+    if not limit.stated(first, second):
+        message, hint = f"{{key}} needs {first} or {second}", f"write a number, or {example}"
+        yield PathDiagnostic("missing-key", message, hint, keys=(first, second))
 
 
-def _listed(value: float | tuple[float, ...]) -> tuple[float, ...]:
-    return value if isinstance(value, tuple) else (value,)
+def _ordered(crossed: bool) -> Iterator[PathDiagnostic]:
+    if crossed:
+        yield PathDiagnostic("conflicting-keys", "{key} is larger than max", "exchange the two", ("min",))

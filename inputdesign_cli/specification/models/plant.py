@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, model_validator
+from pydantic import Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     ContinuousDenominator,
     Count,
@@ -15,11 +17,22 @@ from inputdesign_cli.specification.models.fields import (
     Numbers,
     StableMatrix,
 )
-from inputdesign_cli.specification.models.findings import Findings
-from inputdesign_cli.specification.models.polynomials import Polynomial, check_left_half_plane, product
-from inputdesign_cli.specification.models.section import Section, needs_mapping, picker, tag
-from inputdesign_cli.specification.models.transfer import check_proper
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.polynomials import Polynomial, check_left_half_plane
+from inputdesign_cli.specification.models.section import Section, pick, tag
+from inputdesign_cli.specification.models.shapes import (
+    as_matrix,
+    check_each,
+    check_gain,
+    check_proper,
+    check_shapes,
+    denominators_of,
+    per_output,
+    shape_words,
+    size_of,
+)
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+from inputdesign_cli.specification.wording import count
 
 _POLYNOMIALS = "a plant of polynomials A, B, F"
 _CONTINUOUS = "a continuous-time plant"
@@ -29,6 +42,8 @@ _PARAMETERS = "a list of true parameters"
 
 class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
     """A(q) y = B(q)/F(q) u + noise, coefficients in ascending powers of q^-1."""
+
+    kind: ClassVar[Literal["polynomial"]] = "polynomial"
 
     A: MonicPerOutput = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."
@@ -41,26 +56,23 @@ class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
         default=None, description="Monic and stable, in the shape of B (default 1)."
     )
 
-    @model_validator(mode="after")
-    def _shapes(self) -> PolynomialPlant:
-        findings = Findings()
-        _check_gain(findings, self.B_matrix, "B")
+    def check(self) -> Iterator[PathDiagnostic]:
+        """B is not zero, and A and F have its shape."""
+        yield from check_gain(self.B_matrix, "B")
         if depth(self.A) == 2 and len(self.A) != self.outputs:
-            findings.add(
+            yield PathDiagnostic(
                 "wrong-shape",
-                f"{{key}} holds {len(self.A)} polynomials for {_outputs(self.outputs)}",
+                f"{{key}} holds {len(self.A)} polynomials for {count(self.outputs, 'output')}",
                 "write one polynomial for all outputs, or a list with one per output",
-                "A",
+                ("A",),
             )
-        if self.F is not None and (depth(self.F) != depth(self.B) or _size(self.F) != _size(self.B)):
-            findings.add(
+        if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
+            yield PathDiagnostic(
                 "wrong-shape",
-                "{key} must have the shape of B: " + _shape_words(self.B),
+                "{key} must have the shape of B: " + shape_words(self.B),
                 "write [1] where an entry has no poles",
-                "F",
+                ("F",),
             )
-        findings.stop()
-        return self
 
     @property
     def outputs(self) -> int:
@@ -103,20 +115,16 @@ class ContinuousMatrix(Section):
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
 
-    @model_validator(mode="after")
-    def _shapes(self) -> ContinuousMatrix:
-        findings = Findings()
-        numerators = as_matrix(self.numerator)
-        check_shapes(findings, self.numerator, self.denominator)
-        for path, factor in with_paths(self.denominator):
-            if finding := check_left_half_plane(factor):
-                findings.add(finding.code, finding.message, finding.hint, "denominator", *path)
-        for i, row in enumerate(numerators):
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Numerator and denominator have one shape, the poles lie on the left, every entry is proper."""
+        if shapes := list(check_shapes(self.numerator, self.denominator)):
+            yield from shapes
+            return
+        yield from check_each(self.denominator, check_left_half_plane, "denominator")
+        for i, row in enumerate(self.numerator_matrix):
             for j, entry in enumerate(row):
                 where = (i, j) if depth(self.numerator) == 3 else ()
-                check_proper(findings, entry, self.denominator_matrix[i][j], "numerator", *where)
-        findings.stop()
-        return self
+                yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
 
     @property
     def numerator_matrix(self) -> PolynomialMatrix:
@@ -131,6 +139,8 @@ class ContinuousMatrix(Section):
 
 class ContinuousPlant(Section, family="plant", phrase=_CONTINUOUS):
     """A continuous-time transfer matrix; without `sample` the design stays in continuous time."""
+
+    kind: ClassVar[Literal["continuous"]] = "continuous"
 
     continuous: ContinuousMatrix = Field(description="Transfer matrix in s; rows are outputs.")
     sample: Literal["zoh"] | None = Field(
@@ -166,6 +176,8 @@ class RegressionSize(Section):
 class RegressionPlant(Section, family="plant", phrase=_REGRESSION):
     """A linear regression of which some regressors are neglected."""
 
+    kind: ClassVar[Literal["regression"]] = "regression"
+
     regression: RegressionSize = Field(description="The numbers of estimated and neglected regressors.")
 
     @property
@@ -187,10 +199,12 @@ class RegressionPlant(Section, family="plant", phrase=_REGRESSION):
 class TrueParameters(Section, family="plant", phrase=_PARAMETERS):
     """The true parameters of a regression: the estimated ones, then the neglected ones."""
 
+    kind: ClassVar[Literal["parameters"]] = "parameters"
+
     parameters: Numbers = Field(description="True values of all regression parameters, estimated ones first.")
 
 
-_EXAMPLE = "{B: [0, 1], F: [1, -0.5]}, {continuous: ..} or {regression: ..}"
+_FORMS = Wording("a mapping of keys", "write {B: [0, 1], F: [1, -0.5]}, {continuous: ..} or {regression: ..}")
 _Polynomials = Annotated[PolynomialPlant, tag(_POLYNOMIALS)]
 _Continuous = Annotated[ContinuousPlant, tag(_CONTINUOUS)]
 _Regression = Annotated[RegressionPlant, tag(_REGRESSION)]
@@ -200,75 +214,12 @@ def _kind(value: dict[str, object]) -> str:
     return _REGRESSION if "regression" in value else _CONTINUOUS if "continuous" in value else _POLYNOMIALS
 
 
-Plant = Annotated[
-    _Polynomials | _Continuous | _Regression, Discriminator(picker(_kind)), needs_mapping(_EXAMPLE)
-]
+Plant = Annotated[_Polynomials | _Continuous | _Regression, pick(_kind), _FORMS]
 """The nominal plant."""
 
 TruePlant = Annotated[
     _Polynomials | _Continuous | _Regression | Annotated[TrueParameters, tag(_PARAMETERS)],
-    Discriminator(picker(lambda v: _PARAMETERS if "parameters" in v else _kind(v))),
-    needs_mapping(_EXAMPLE),
+    pick(lambda v: _PARAMETERS if "parameters" in v else _kind(v)),
+    _FORMS,
 ]
 """The plant of a simulation; of a regression only its parameters."""
-
-
-def as_matrix(value: tuple) -> PolynomialMatrix:
-    """One polynomial as a 1 x 1 matrix; a matrix as it is."""
-    return value if depth(value) == 3 else ((value,),)
-
-
-def per_output(value: tuple, outputs: int) -> tuple[Polynomial, ...]:
-    """One polynomial repeated for every output; a list as it is."""
-    return value if depth(value) == 2 else (value,) * outputs
-
-
-def check_shapes(findings: Findings, numerator: tuple, denominator: tuple) -> None:
-    """The numerator is not zero, and denominators for each entry have its shape; stops if not."""
-    _check_gain(findings, as_matrix(numerator), "numerator")
-    if depth(denominator) == 3 and _size(denominator) != _size(as_matrix(numerator)):
-        findings.add(
-            "wrong-shape",
-            "{key} must have the shape of the numerator: " + _shape_words(numerator),
-            "or write one polynomial, a denominator common to all entries",
-            "denominator",
-        )
-        findings.stop()
-
-
-def denominators_of(numerator: tuple, denominator: tuple) -> PolynomialMatrix:
-    """Denominators as rows of columns, those that are common repeated and factors multiplied out."""
-    if depth(denominator) == 3:
-        return as_matrix(denominator)
-    common = product(factor for _, factor in with_paths(denominator))
-    return tuple(tuple(common for _ in row) for row in as_matrix(numerator))
-
-
-def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
-    """Every polynomial of a nested value with the indices that lead to it."""
-    if depth(value) == 1:
-        return [((), value)]
-    return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
-
-
-def _check_gain(findings: Findings, entries: PolynomialMatrix, name: str) -> None:
-    if not any(any(p) for row in entries for p in row):
-        findings.add(
-            "zero-polynomial", "all coefficients of {key} are zero: the input has no effect", "", name
-        )
-
-
-def _size(value: tuple) -> tuple[int, int]:
-    entries = as_matrix(value)
-    return len(entries), len(entries[0])
-
-
-def _shape_words(value: tuple) -> str:
-    if depth(value) == 1:
-        return "one list of coefficients"
-    rows, columns = _size(value)
-    return f"{rows} x {columns} lists of coefficients"
-
-
-def _outputs(count: int) -> str:
-    return "1 output" if count == 1 else f"{count} outputs"

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from inputdesign_cli.specification.models.findings import Finding, show
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.wording import show
 
 Polynomial = tuple[float, ...]
 
@@ -22,38 +23,56 @@ def product(factors: Iterable[Polynomial]) -> Polynomial:
     return tuple(float(c) for c in full)
 
 
-def check_monic(polynomial: Polynomial) -> Finding | None:
+def check_not_zero(polynomial: Polynomial) -> PathDiagnostic | None:
+    """Some coefficient differs from zero."""
+    if any(polynomial):
+        return None
+    return PathDiagnostic(
+        "zero-polynomial", "all coefficients of {key} are zero", "write at least one that is not"
+    )
+
+
+def check_leading(polynomial: Polynomial) -> PathDiagnostic | None:
+    """The first coefficient differs from zero."""
+    if polynomial[0] != 0.0:
+        return None
+    return check_not_zero(polynomial) or PathDiagnostic(
+        "zero-leading-coefficient", "{key} must not start with 0", "remove the leading zeros"
+    )
+
+
+def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
     """In q^-1, ascending: the first coefficient is exactly 1."""
     lead = polynomial[0]
     if lead == 1.0:
         return None
     if lead == 0.0:
-        return Finding(
+        return PathDiagnostic(
             "not-monic",
             "{key} must start with 1, not 0",
             "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0",
         )
     scaled = ", ".join(show(c / lead) for c in polynomial[:6])
     more = ", ..." if len(polynomial) > 6 else ""
-    return Finding(
+    return PathDiagnostic(
         "not-monic",
         f"{{key}} must start with 1, not {show(lead)}",
         f"divide all its coefficients by {show(lead)}: [{scaled}{more}]",
     )
 
 
-def check_delay_stable(polynomial: Polynomial) -> Finding | None:
+def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
     """In q^-1, ascending: all roots in z lie strictly inside the unit circle."""
-    roots, finding = _roots(polynomial)
-    if finding or not roots.size:
-        return finding
+    roots, found = _roots(polynomial)
+    if found or not roots.size:
+        return found
     worst = roots[np.argmax(np.abs(roots))]
     radius = float(abs(worst))
     if radius < 1.0:
         return None
     angle = abs(float(np.angle(worst)))
     where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"
-    return Finding(
+    return PathDiagnostic(
         "unstable-polynomial",
         f"{{key}} has a root of radius {where} at {angle:.4g} rad/sample; "
         "all roots (in z) must lie inside the unit circle",
@@ -61,25 +80,25 @@ def check_delay_stable(polynomial: Polynomial) -> Finding | None:
     )
 
 
-def check_left_half_plane(polynomial: Polynomial) -> Finding | None:
+def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
     """In s, descending: all roots lie in the open left half plane."""
-    roots, finding = _roots(polynomial)
-    if finding or not roots.size:
-        return finding
+    roots, found = _roots(polynomial)
+    if found or not roots.size:
+        return found
     worst = roots[np.argmax(roots.real)]
     if worst.real < 0:
         return None
     place = f"{worst.real:.4g}" + (f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else "")
-    return Finding(
+    return PathDiagnostic(
         "unstable-polynomial",
         f"{{key}} has a root at s = {place}; all poles must lie in the left half plane",
         "check the signs, and that the powers of s descend: [1, 2, 3] is s^2 + 2 s + 3",
     )
 
 
-def _roots(polynomial: Polynomial) -> tuple[np.ndarray, Finding | None]:
+def _roots(polynomial: Polynomial) -> tuple[np.ndarray, PathDiagnostic | None]:
     if len(polynomial) - 1 > MAX_ORDER:
-        return np.zeros(0), Finding(
+        return np.zeros(0), PathDiagnostic(
             "bad-polynomial",
             f"{{key}} has order {len(polynomial) - 1}; orders above {MAX_ORDER} are not supported",
             "reduce the order, or write it as a list of factors where that is allowed",
@@ -90,7 +109,7 @@ def _roots(polynomial: Polynomial) -> tuple[np.ndarray, Finding | None]:
     except np.linalg.LinAlgError:
         roots = np.full(1, np.nan)
     if not np.all(np.isfinite(roots)):
-        return np.zeros(0), Finding(
+        return np.zeros(0), PathDiagnostic(
             "bad-polynomial",
             "the roots of {key} cannot be computed: its coefficients differ by too many orders of magnitude",
             "rescale it, or choose another time unit",

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.fields import (
     Count,
     Harmonics,
     Index,
+    Number,
     PerChannel,
-    PositivePerChannel,
+    Positive,
     RegisterLength,
     Tolerance,
 )
-from inputdesign_cli.specification.models.findings import Findings
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import Section
 
@@ -36,7 +38,7 @@ class Quantisation(Section):
     """The digital-to-analogue converter that applies the signal."""
 
     bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
-    range: PositivePerChannel = Field(
+    range: PerChannel[Positive] = Field(
         description="They span [-range, range), in the unit of u, the offset included; a number or one per "
         "input.",
         examples=[10.0],
@@ -59,11 +61,11 @@ class Signal(Section):
     lines: Harmonics | None = Field(
         default=None, description="Harmonics of a period that are used: their number, odd, or a list."
     )
-    amplitudes: PositivePerChannel | None = Field(
+    amplitudes: PerChannel[Positive] | None = Field(
         default=None,
         description="Amplitude (level) to scale to, whatever it buys; a number or one per input.",
     )
-    offset: PerChannel | None = Field(
+    offset: PerChannel[Number] | None = Field(
         default=None, description="Operating point added; a number or one per input."
     )
     ramp: Index | None = Field(default=None, description="Samples over which the signal fades in and out.")
@@ -91,20 +93,18 @@ class Signal(Section):
         default=None, description="Number of random realisations to choose the best of."
     )
 
-    @model_validator(mode="after")
-    def _companions(self) -> Signal:
-        findings = Findings()
-        for key, types in _ONLY_FOR.items():
-            if getattr(self, key) is not None and self.type is not None and self.type not in types:
-                findings.add(
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Every setting means something for the type of signal."""
+        for key in self.stated(*_ONLY_FOR):
+            types = _ONLY_FOR[key]
+            if self.type is not None and self.type not in types:
+                yield PathDiagnostic(
                     "unsuitable-key",
                     f"{{key}} does not go with type: {self.type}",
                     f"it belongs to type: {types[0]}; remove it, or change the type",
-                    key,
+                    (key,),
                     at_key=True,
                 )
-        findings.stop()
-        return self
 
 
 class Solver(Section):

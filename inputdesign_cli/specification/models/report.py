@@ -2,44 +2,33 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import BeforeValidator, Field
 
-from inputdesign_cli.specification.models.findings import fail
+from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.fields import Name, Several
+from inputdesign_cli.specification.models.path_diagnostic import fail
 from inputdesign_cli.specification.models.section import Section
-from inputdesign_cli.specification.models.values import name, several
 
 
-def _pair(value: Any) -> tuple[str, ...]:
-    names = several(value, partial(name, what="a parameter name"), "two parameter names")
-    if len(names) != 2 or names[0] == names[1]:
+def _pair(value: object) -> object:
+    if isinstance(value, list | tuple) and (len(value) != 2 or value[0] == value[1]):
         raise fail(
             "wrong-shape",
             "{key} must hold two different parameters, which span the plane of the ellipse",
             'write a pair, such as ["b1", "f1"] or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
         )
-    return names
+    return value
 
 
-Pairs = Annotated[
-    tuple[tuple[str, str], ...],
-    PlainValidator(partial(several, item=_pair, what="pairs of parameter names")),
-    WithJsonSchema(
-        {
-            "type": "array",
-            "minItems": 1,
-            "items": {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
-        }
-    ),
-]
+Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of two parameter names")]
 
 
 class Report(Section):
     """What the figures show."""
 
-    ellipses: Pairs | None = Field(
+    ellipses: Several[Pair] | None = Field(
         default=None,
         description="Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
         "the most correlated ones; with one: none).",

@@ -1,22 +1,14 @@
-"""The base of every model of the spec: frozen, no unknown keys, and it says which model read which data."""
+"""The base of every model of the spec: frozen, without unknown keys, and with one form of check."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterator
+from typing import Any, ClassVar, Self
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    GetJsonSchemaHandler,
-    Tag,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
 from pydantic_core import core_schema
 
-from inputdesign_cli.specification.models.findings import describe, fail
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
 
 TAG = "\x00"
 """Marks the tags that pydantic puts into the path of an error inside a union; they are not keys."""
@@ -29,7 +21,7 @@ class Section(BaseModel):
     """A mapping of the spec.
 
     A subclass that is one of several alternatives names its `family` as a class argument and calls itself
-    by a `phrase` in diagnostics ("type: fir").
+    by a `phrase` in diagnostics ("type: fir"); the phrase is its tag in the union of the alternatives.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,14 +35,19 @@ class Section(BaseModel):
             cls.family, cls.phrase = family, phrase
             FAMILIES.setdefault(family, []).append(cls)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _remember(cls, value: Any, info: ValidationInfo) -> Any:
-        # The context maps the identity of each mapping of the input to the model that read it: pydantic
-        # does not say which keys would have been right where it found an unknown one.
-        if isinstance(info.context, dict):
-            info.context[id(value)] = cls
-        return value
+    def check(self) -> Iterator[PathDiagnostic]:
+        """What is wrong with the section as a whole, once each of its values is valid."""
+        return iter(())
+
+    def stated(self, *keys: str) -> tuple[str, ...]:
+        """Those of the keys that have a value."""
+        return tuple(key for key in keys if getattr(self, key) is not None)
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        if found := tuple(self.check()):
+            raise carry(*found)
+        return self
 
 
 def tag(word: str) -> Tag:
@@ -58,28 +55,20 @@ def tag(word: str) -> Tag:
     return Tag(TAG + word)
 
 
-def picker(choose: Callable[[dict[str, Any]], str]) -> Callable[[Any], str]:
-    """A discriminator: the tag that `choose` names for a mapping; instances are of their own class."""
+def pick(choose: Callable[[dict[str, Any]], str], plain: str = "") -> Discriminator:
+    """The discriminator of a union of sections.
 
-    def pick(value: Any) -> str:
+    Args:
+        choose: The phrase of the alternative that a mapping of the file stands for.
+        plain: The tag of the alternative that is no mapping, if there is one.
+    """
+
+    def chosen(value: object) -> str:
         if isinstance(value, Section):
             return TAG + value.phrase
-        return TAG + choose(value if isinstance(value, dict) else {})
+        return TAG + (choose(value) if isinstance(value, dict) else plain)
 
-    return pick
-
-
-def needs_mapping(example: str) -> BeforeValidator:
-    """Refuse what is not a mapping, with an example of what to write."""
-
-    def check(value: Any) -> Any:
-        if isinstance(value, dict | Section):
-            return value
-        raise fail(
-            "wrong-shape", f"{{key}} must be a mapping of keys, not {describe(value)}", f"write {example}"
-        )
-
-    return BeforeValidator(check)
+    return Discriminator(chosen)
 
 
 class Shorthand:

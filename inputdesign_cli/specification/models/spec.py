@@ -1,11 +1,11 @@
-"""The spec as a whole: the frozen object that the other rooms read."""
+"""The spec as a whole: the frozen object that tasks are built from."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr
 
@@ -18,7 +18,7 @@ from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.realisation import Signal, Simulation, Solver
 from inputdesign_cli.specification.models.report import Report
 from inputdesign_cli.specification.models.section import Section
-from inputdesign_cli.specification.models.spectrum import GivenSpectrum, Spectrum
+from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.yaml.places import parse_key
 from inputdesign_cli.specification.yaml.source import Source
@@ -69,6 +69,8 @@ class Spec(Section):
     report: Report = Field(default=Report(), description="What the figures show.")
     sweep: Sweep | None = Field(default=None, description="What `idesign sweep` varies.")
 
+    phrase: ClassVar[str] = "a spec"
+
     _source: Source = PrivateAttr(default_factory=Source)
 
     @property
@@ -84,9 +86,16 @@ class Spec(Section):
         return self.experiment.controller is not None
 
     @property
+    def given(self) -> Given | None:
+        """The excitation that is given, if none is to be designed."""
+        if self.spectrum is None or self.spectrum.type != "given":
+            return None
+        return self.spectrum.given
+
+    @property
     def designs(self) -> bool:
         """Whether an excitation is to be designed (not given)."""
-        return not isinstance(self.spectrum, GivenSpectrum)
+        return self.given is None
 
     @property
     def signal_samples(self) -> int:
@@ -99,7 +108,10 @@ class Spec(Section):
         return math.pi / self.sample_time if self.plant.sampled else math.inf
 
     def clip_band(self, band: tuple[float, float] | None) -> tuple[float, float]:
-        """The band within [0, nyquist]; None is all frequencies. 3.1416 for pi passes the checks."""
+        """The band within [0, nyquist] in rad per time unit; None stands for all frequencies.
+
+        The end needs a clip: the checks let 3.1416 pass for pi.
+        """
         low, high = band or (0.0, math.inf)
         return low, min(high, self.nyquist)
 
@@ -118,11 +130,11 @@ class Spec(Section):
         return places.location(places.mark(parse_key(key)))
 
     def resolve_path(self, name: str) -> Path:
-        """The path of a file that the spec names, relative to the folder of the spec."""
+        """The path of a file that the spec names: relative names start in the folder of the spec."""
         return self._source.folder / name
 
     def complain(self, code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
-        """A `SpecError` with a single diagnostic that points at `key`."""
+        """An error with a single diagnostic that points at the line of `key`, for the caller to raise."""
         return SpecError(Diagnostic(code, message, hint, key, self.locate(key)))
 
     def place(self, error: _Error) -> _Error:

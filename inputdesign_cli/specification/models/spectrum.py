@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, get_args
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal, cast
 
-from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import Discriminator, Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.experiment import exactly_one
 from inputdesign_cli.specification.models.fields import (
     Band,
@@ -13,12 +15,18 @@ from inputdesign_cli.specification.models.fields import (
     FileName,
     Frequencies,
     Index,
-    PositivePerChannel,
+    Number,
+    PerChannel,
+    Positive,
+    Several,
 )
-from inputdesign_cli.specification.models.findings import Findings, fail
-from inputdesign_cli.specification.models.section import Section, needs_mapping, picker, tag
-from inputdesign_cli.specification.models.values import PolynomialList, depth, number, several
-from inputdesign_cli.specification.near_words import unknown_word
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
+from inputdesign_cli.specification.models.values import depth
+
+
+def _type(value: dict[str, Any]) -> str:
+    return f"type: {value.get('type')}"
 
 
 class WhiteSpectrum(Section, family="spectrum", phrase="type: white"):
@@ -43,12 +51,9 @@ class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
         default=None, description="The candidate frequencies, increasing."
     )
 
-    @model_validator(mode="after")
-    def _one(self) -> MultisineSpectrum:
-        findings = Findings()
-        exactly_one(findings, self, "lines", "frequencies")
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """The lines are given once."""
+        yield from exactly_one(self, "lines", "frequencies")
 
 
 class FreeSpectrum(Section, family="spectrum", phrase="type: free"):
@@ -94,19 +99,14 @@ class GivenWhite(Section, family="given", phrase="type: white"):
     """White noise of a given power."""
 
     type: Literal["white"] = Field(description="White noise.")
-    power: PositivePerChannel = Field(description="Its power; a number or one per channel.")
-
-
-def _amplitudes(value: Any) -> Any:
-    if depth(value) == 2:
-        return several(value, lambda row: several(row, number, "amplitudes"), "lists of amplitudes")
-    return several(value, number, "amplitudes, one per frequency")
+    power: PerChannel[Positive] = Field(description="Its power; a number or one per channel.")
 
 
 Amplitudes = Annotated[
-    tuple[float, ...] | PolynomialList,
-    PlainValidator(_amplitudes),
-    WithJsonSchema({"type": "array", "minItems": 1}),
+    Annotated[Several[Number], Wording("a list of amplitudes, one per frequency"), tag("1")]
+    | Annotated[Several[Several[Number]], tag("2")],
+    Discriminator(lambda value: f"{TAG}{depth(value)}"),
+    Wording("a list of amplitudes, one per frequency, or one such list per input"),
 ]
 
 
@@ -119,21 +119,24 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
         description="An amplitude per frequency; for several inputs one list per input."
     )
 
-    @model_validator(mode="after")
-    def _sizes(self) -> GivenMultisine:
-        several = depth(self.amplitudes) == 2
-        rows = self.amplitudes if several else (self.amplitudes,)
-        for row in rows:
-            if isinstance(row, tuple) and len(row) != len(self.frequencies):
-                raise fail(
+    @property
+    def rows(self) -> tuple[tuple[float, ...], ...]:
+        """The amplitudes of each input; with several inputs a single list holds for all of them."""
+        listed = self.amplitudes if depth(self.amplitudes) == 2 else (self.amplitudes,)
+        return cast(tuple[tuple[float, ...], ...], listed)
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Every frequency has an amplitude."""
+        listed = depth(self.amplitudes) == 2
+        for row in self.rows:
+            if len(row) != len(self.frequencies):
+                yield PathDiagnostic(
                     "wrong-shape",
                     f"{{key}} holds {len(row)} amplitudes for {len(self.frequencies)} frequencies",
-                    "write one list per input, with one amplitude per frequency"
-                    if several
-                    else "write one amplitude per frequency",
-                    "amplitudes",
+                    f"write one {'list per input, with one ' if listed else ''}amplitude per frequency",
+                    ("amplitudes",),
                 )
-        return self
+                return
 
 
 class GivenTable(Section, family="given", phrase="type: table"):
@@ -146,34 +149,18 @@ class GivenTable(Section, family="given", phrase="type: table"):
 class GivenSignal(Section, family="given", phrase="signal"):
     """A recorded or planned signal."""
 
+    type: ClassVar[Literal["signal"]] = "signal"
+
     signal: FileName = Field(description="CSV file with the samples of the signal.")
 
-
-def choose(value: Any, words: tuple[str, ...], other: str) -> Any:
-    """Refuse a mapping whose `type` is not one of the words, unless it has the key `other`."""
-    if not isinstance(value, dict) or other in value:
-        return value
-    if "type" not in value:
-        raise fail(
-            "missing-key", "{key} needs a type", f"write type: {words[0]}; the types are {', '.join(words)}"
-        )
-    kind = value["type"]
-    if not isinstance(kind, str) or kind not in words:
-        message, hint = unknown_word(kind, words)
-        raise fail("unknown-word", message, hint, "type")
-    return value
-
-
-_GIVEN = ("white", "multisine", "table")
 
 Given = Annotated[
     Annotated[GivenWhite, tag("type: white")]
     | Annotated[GivenMultisine, tag("type: multisine")]
     | Annotated[GivenTable, tag("type: table")]
     | Annotated[GivenSignal, tag("signal")],
-    Discriminator(picker(lambda v: "signal" if "signal" in v else f"type: {v.get('type')}")),
-    BeforeValidator(lambda v: choose(v, _GIVEN, "signal")),
-    needs_mapping("{type: white, power: 1} or {signal: u.csv}"),
+    pick(lambda v: "signal" if "signal" in v else _type(v)),
+    Wording("a mapping of keys", "write {type: white, power: 1} or {signal: u.csv}"),
 ]
 """An excitation that is not designed."""
 
@@ -181,19 +168,10 @@ Given = Annotated[
 class GivenSpectrum(Section, family="spectrum", phrase="given"):
     """The excitation is fixed; nothing is designed."""
 
+    type: ClassVar[Literal["given"]] = "given"
+
     given: Given = Field(description="The excitation: white, multisine, a tabulated spectrum, or a signal.")
 
-
-Designed = (
-    WhiteSpectrum
-    | FirSpectrum
-    | MultisineSpectrum
-    | FreeSpectrum
-    | PolynomialSpectrum
-    | PointwiseSpectrum
-    | MomentsSpectrum
-)
-_TYPES = tuple(get_args(c.model_fields["type"].annotation)[0] for c in get_args(Designed))
 
 Spectrum = Annotated[
     Annotated[WhiteSpectrum, tag("type: white")]
@@ -204,8 +182,7 @@ Spectrum = Annotated[
     | Annotated[PointwiseSpectrum, tag("type: pointwise")]
     | Annotated[MomentsSpectrum, tag("type: moments")]
     | Annotated[GivenSpectrum, tag("given")],
-    Discriminator(picker(lambda v: "given" if "given" in v else f"type: {v.get('type')}")),
-    BeforeValidator(lambda v: choose(v, _TYPES, "given")),
-    needs_mapping("{type: fir, order: 20}"),
+    pick(lambda v: "given" if "given" in v else _type(v)),
+    Wording("a mapping of keys", "write {type: fir, order: 20}"),
 ]
 """A parametrisation to design in, or a given excitation."""

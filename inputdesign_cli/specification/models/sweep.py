@@ -6,11 +6,13 @@ import re
 from decimal import Decimal
 from typing import Annotated, Any
 
-from pydantic import Field, PlainValidator, StrictBool, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from inputdesign_cli.specification.models.findings import Findings, describe, fail
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.fields import Flag, Several
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
 from inputdesign_cli.specification.models.section import Section
-from inputdesign_cli.specification.models.values import collect
 from inputdesign_cli.specification.yaml.scalars import resolve
 
 MOST_VALUES = 100_000
@@ -23,25 +25,26 @@ def range_values(text: str) -> tuple[str, ...] | None:
 
     They are counted in decimals, so that 0:1:0.1 holds 0.3 and not 0.30000000000000004.
 
-    Raises
-    ------
-    PydanticCustomError : `bad-range`.
+    Raises:
+        SpecError: `bad-range`.
     """
     match = _RANGE.fullmatch(text)
     if match is None:
         return None
     if match.group(3) is None:
-        raise fail("bad-range", f'the range "{text.strip()}" has no step', "write low:high:step, as 0:40:5")
+        message = f'the range "{text.strip()}" has no step'
+        raise bad_spec("bad-range", message, hint="write low:high:step, as 0:40:5")
     low, high, step = (Decimal(part) for part in match.groups())
     if step == 0 or (high - low) * step < 0:
-        raise fail(
+        raise bad_spec(
             "bad-range",
             f'the range "{text.strip()}" never gets from {low} to {high}',
-            "the step must lead from the first number to the second, as in 0:40:5 or 40:0:-5",
+            hint="the step must lead from the first number to the second, as in 0:40:5 or 40:0:-5",
         )
     count = int((high - low) / step) + 1
     if count > MOST_VALUES:
-        raise fail("bad-range", f'the range "{text.strip()}" holds {count} values', "take a larger step")
+        message = f'the range "{text.strip()}" holds {count} values'
+        raise bad_spec("bad-range", message, hint="take a larger step")
     return tuple(_plain(low + i * step) for i in range(count))
 
 
@@ -54,43 +57,37 @@ def _plain(value: Decimal) -> str:
     return f"{normal + 0:E}"
 
 
-def _values(value: Any) -> tuple[Any, ...]:
-    """The values of one key: a list, or a range as text."""
-    if isinstance(value, str) and (found := range_values(value)) is not None:
-        return tuple(resolve(text) for text in found)
-    if not isinstance(value, list | tuple):
-        hint = "write [250, 500, 1000] or 0:40:5"
-        raise fail("wrong-shape", f"{{key}} must be a list of values or a range, not {describe(value)}", hint)
-    if not value:
-        raise fail("wrong-shape", "{key} is an empty list", "name at least one value")
-    return tuple(value)
+def _expanded(value: object) -> object:
+    """The values that a range stands for; everything else as it is."""
+    if not isinstance(value, str):
+        return value
+    try:
+        found = range_values(value)
+    except SpecError as error:
+        raise carry(*(PathDiagnostic(d.code, d.message, d.hint) for d in error.diagnostics)) from None
+    return value if found is None else tuple(resolve(text) for text in found)
 
 
-def _axes(value: Any) -> dict[str, tuple[Any, ...]]:
-    if not isinstance(value, dict):
-        hint = "write set: {experiment.samples: [250, 500, 1000]}"
-        raise fail("wrong-shape", f"{{key}} must be a mapping of keys to values, not {describe(value)}", hint)
-    findings = Findings()
-    axes = {key: collect(findings, _values, entry, key) for key, entry in value.items()}
-    findings.stop()
-    return axes
-
-
-_SCHEMA = {
-    "type": "object",
-    "minProperties": 1,
-    "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, {"type": "string"}]},
-}
+Values = Annotated[
+    Several[Any],
+    BeforeValidator(_expanded),
+    Wording("a list of values or a range", "write [250, 500, 1000] or 0:40:5"),
+    WithJsonSchema({"anyOf": [{"type": "array", "minItems": 1}, {"type": "string"}]}),
+]
 
 
 class Sweep(Section):
     """What `idesign sweep` varies; the other commands pay no attention to it."""
 
-    set: Annotated[dict[str, tuple[Any, ...]], PlainValidator(_axes), WithJsonSchema(_SCHEMA)] = Field(
+    set: Annotated[
+        dict[str, Values],
+        Field(json_schema_extra={"minProperties": 1}),
+        Wording("a mapping of keys to values", "write set: {experiment.samples: [250, 500, 1000]}"),
+    ] = Field(
         description="Keys of the spec and their values: a list, or low:high:step.",
         examples=[{"experiment.samples": [250, 500, 1000]}],
     )
-    zip: StrictBool = Field(
+    zip: Flag = Field(
         default=False,
         description="Take the values side by side, not in every combination (default false).",
     )

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, cast
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal, cast
 
-from pydantic import Discriminator, Field, model_validator
+from pydantic import Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import Denominator, Numerator
-from inputdesign_cli.specification.models.findings import Findings
-from inputdesign_cli.specification.models.polynomials import Polynomial, product
-from inputdesign_cli.specification.models.section import Section, needs_mapping, picker, tag
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.polynomials import (
+    Polynomial,
+    check_delay_stable,
+    check_left_half_plane,
+    product,
+)
+from inputdesign_cli.specification.models.section import Section, pick, tag
+from inputdesign_cli.specification.models.shapes import check_each, check_proper
 from inputdesign_cli.specification.models.values import PolynomialList, depth
 
 
 def factors_of(denominator: Polynomial | PolynomialList) -> PolynomialList:
-    """The factors of a denominator; one polynomial is its own only factor."""
+    """The factors of a denominator; a single polynomial is its own only factor."""
     return cast(PolynomialList, denominator if depth(denominator) == 2 else (denominator,))
 
 
@@ -40,50 +48,51 @@ class Ratio(Section):
 class DiscreteTransfer(Ratio, family="transfer", phrase="a transfer function in q^-1"):
     """A transfer function in the delay operator: coefficients in ascending powers of q^-1."""
 
+    kind: ClassVar[Literal["discrete"]] = "discrete"
+
+    def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
+        """Its poles lie inside the unit circle; `path` leads to the transfer function."""
+        yield from check_each(self.denominator, check_delay_stable, *path, "denominator")
+
 
 class ContinuousRatio(Ratio):
     """A proper transfer function in s: coefficients in descending powers of s."""
 
-    @model_validator(mode="after")
-    def _proper(self) -> ContinuousRatio:
-        findings = Findings()
-        check_proper(findings, self.numerator, self.denominator_polynomial, "numerator")
-        findings.stop()
-        return self
+    def check(self) -> Iterator[PathDiagnostic]:
+        """It is proper."""
+        yield from check_proper(self.numerator, self.denominator_polynomial, "numerator")
 
 
 class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time transfer function"):
     """A transfer function in s, and how it is sampled."""
+
+    kind: ClassVar[Literal["continuous"]] = "continuous"
 
     continuous: ContinuousRatio = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = Field(
         default=None, description="How it is sampled at sample_time: zoh, a zero-order hold."
     )
 
+    def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
+        """Its poles lie in the left half plane; `path` leads to the transfer function."""
+        yield from check_each(
+            self.continuous.denominator, check_left_half_plane, *path, "continuous", "denominator"
+        )
+
+
+def transfer_kind(value: dict[str, Any]) -> str:
+    """Which of the two a mapping of the file stands for."""
+    return ContinuousTransfer.phrase if "continuous" in value else DiscreteTransfer.phrase
+
 
 Transfer = Annotated[
     Annotated[DiscreteTransfer, tag(DiscreteTransfer.phrase)]
     | Annotated[ContinuousTransfer, tag(ContinuousTransfer.phrase)],
-    Discriminator(
-        picker(lambda v: ContinuousTransfer.phrase if "continuous" in v else DiscreteTransfer.phrase)
-    ),
-    needs_mapping(
-        "{numerator: [..], denominator: [..]} in q^-1, or {continuous: {numerator: [..], denominator: [..]}}"
+    pick(transfer_kind),
+    Wording(
+        "a mapping of keys",
+        "write {numerator: [..], denominator: [..]} in q^-1, or "
+        "{continuous: {numerator: [..], denominator: [..]}}",
     ),
 ]
 """A filter or weight, in q^-1 or in s."""
-
-
-def check_proper(
-    findings: Findings, numerator: Polynomial, denominator: Polynomial, *path: str | int
-) -> None:
-    """In s, descending: the degree of the numerator is at most that of the denominator."""
-    zeros = next((i for i, c in enumerate(numerator) if c), len(numerator) - 1)
-    above, below = len(numerator) - zeros - 1, len(denominator) - 1
-    if above > below:
-        findings.add(
-            "improper-transfer",
-            f"{{key}} has degree {above} in s, more than its denominator ({below}): the system is not proper",
-            "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other",
-            *path,
-        )

@@ -12,7 +12,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.tables import read_columns
 
 _UNITS = ("s", "ms", "us", "min", "h", "d")
@@ -25,43 +25,32 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class Data:
-    """u (samples, r) and y (samples, p) of one experiment, and what a user should know of them.
-
-    Of one input and one output they are (samples,).
-    """
+    """u (samples, r) and y (samples, p) of one experiment, and what a user should know of them."""
 
     u: Array
     y: Array
     notes: tuple[str, ...] = field(default=())
 
 
-def read_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
-    """The columns u (or u1), y (or y1) and, if there is one, time, of one input and one output.
+def read_data(path: Path, units: Units, *, remove_means: bool = False) -> Data:
+    """The columns u1, u2, .., y1, y2, .. of all channels of the plant and, if there is one, time.
+
+    The only input may be called u, the only output y.
 
     Raises:
         DataError: the file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
             the spec says.
     """
-    data = read_channel_data(spec, path, remove_means=remove_means)
-    return replace(data, u=data.u[:, 0], y=data.y[:, 0])
-
-
-def read_channel_data(spec: Spec, path: Path, *, remove_means: bool = False) -> Data:
-    """The columns u1, u2, .., y1, y2, .. of all channels of the plant and, if there is one, time.
-
-    Raises:
-        DataError: see `read_data`.
-    """
     header = _header(path)
-    channels = {"u": _names("u", spec.plant.inputs, header), "y": _names("y", spec.plant.outputs, header)}
+    channels = {"u": _names("u", units.inputs, header), "y": _names("y", units.outputs, header)}
     wanted = {name: column for names in channels.values() for name, column in names.items()}
     timed = [name for name in header if name == "time" or name.startswith("time_")]
     if timed:
         wanted["time"] = timed[0]
-        _check_unit(spec, path, timed[0])
+        _check_unit(path, units, timed[0])
     columns = read_columns(path, wanted, key="")
     if timed:
-        _check_times(spec, path, columns["time"])
+        _check_times(path, units, columns["time"])
     notes = []
     for name in (name for name in wanted if name != "time"):
         x = columns[name]
@@ -78,8 +67,8 @@ def read_channel_data(spec: Spec, path: Path, *, remove_means: bool = False) -> 
 
 
 @contextmanager
-def told_of(path: Path) -> Iterator[None]:
-    """What an estimator says against the signals is said of the columns of the file that they came from.
+def blaming_columns(path: Path) -> Iterator[None]:
+    """Lays what an estimator says against the signals at the columns of the file that they came from.
 
     Raises:
         DataError: in place of the estimator's `SpecError`.
@@ -115,13 +104,13 @@ def _header(path: Path) -> list[str]:
         return []
 
 
-def _check_unit(spec: Spec, path: Path, name: str) -> None:
+def _check_unit(path: Path, units: Units, name: str) -> None:
     unit = name.removeprefix("time").removeprefix("_")
-    if unit in _UNITS and unit != spec.time_unit:
+    if unit in _UNITS and unit != units.time_unit:
         raise DataError(
             Diagnostic(
                 "data-wrong-unit",
-                f"the times are in {unit}, but the spec counts in {spec.time_unit}",
+                f"the times are in {unit}, but the spec counts in {units.time_unit}",
                 f"set time_unit: {unit} (and sample_time in it), or convert the column",
                 "time_unit",
                 Location(str(path), 1, 1, name),
@@ -129,25 +118,25 @@ def _check_unit(spec: Spec, path: Path, name: str) -> None:
         )
 
 
-def _check_times(spec: Spec, path: Path, time: Array) -> None:
+def _check_times(path: Path, units: Units, time: Array) -> None:
     steps = np.diff(time)
-    off = np.abs(steps - spec.sample_time) > _JITTER * spec.sample_time
+    off = np.abs(steps - units.sample_time) > _JITTER * units.sample_time
     if not np.any(off):
         return
     row = int(np.argmax(off))
     typical = float(np.median(steps))
-    if abs(typical - spec.sample_time) > _JITTER * spec.sample_time:
-        message = f"the data are sampled every {typical:.6g} {spec.time_unit}"
+    if abs(typical - units.sample_time) > _JITTER * units.sample_time:
+        message = f"the data are sampled every {typical:.6g} {units.time_unit}"
         hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
     else:
         message = (
-            f"the time advances by {steps[row]:.6g} {spec.time_unit} here ({int(off.sum())} such places)"
+            f"the time advances by {steps[row]:.6g} {units.time_unit} here ({int(off.sum())} such places)"
         )
         hint = "fill the gap, or use a part of the record without gaps"
     raise DataError(
         Diagnostic(
             "data-not-uniform",
-            f"{message}, but sample_time is {spec.sample_time:g} {spec.time_unit}",
+            f"{message}, but sample_time is {units.sample_time:g} {units.time_unit}",
             hint,
             "sample_time",
             Location(str(path), row + 3, 1, f"{time[row + 1]:.10g}"),

@@ -46,7 +46,7 @@ def _price(question: Question) -> NDArray | None:
         return None
     else:
         counted = [(limit.kind, limit.channel, 1.0 / limit.bound) for limit in question.limits if limit.upper]
-    lo, hi = question.band
+    lo, hi = question.experiment.band
     w = lo + (hi - lo) * _PLACES
     parts = [
         weight * matrices(question.experiment.power_density(kind, w, channel))

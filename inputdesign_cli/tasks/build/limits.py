@@ -6,17 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from inputdesign_cli.accuracy.continuous_weight import weight_singularities
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, Experiment
+from inputdesign_cli.information import POWER_KINDS, Experiment
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve, TableFile
-from inputdesign_cli.tasks.build.channel_requirements import any_weight
-from inputdesign_cli.tasks.build.channels import frequency_unit
+from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.tasks.build.weights import build_weight
 
 _KEY = "limits.spectrum"
 
@@ -24,8 +23,13 @@ _KEY = "limits.spectrum"
 def build_power_limits(spec: Spec) -> list[PowerLimit]:
     """Upper and lower limits on the powers; lower limits of zero say nothing and are left out."""
     limits: list[PowerLimit] = []
+    stated_limits = {
+        "input": spec.limits.input_power,
+        "output": spec.limits.output_power,
+        "excitation": spec.limits.excitation_power,
+    }
     for kind in POWER_KINDS:
-        stated = getattr(spec.limits, f"{kind}_power")
+        stated = stated_limits[kind]
         if stated is None:
             continue
         for value, upper in ((stated.max, True), (stated.min, False)):
@@ -41,7 +45,7 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
     return limits
 
 
-def build_density_limits(spec: Spec, experiment: Experiment | ChannelExperiment) -> list[DensityLimit]:
+def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
     """Bounds on the density of the excitation at every frequency of its band.
 
     Raises:
@@ -50,7 +54,7 @@ def build_density_limits(spec: Spec, experiment: Experiment | ChannelExperiment)
     stated = spec.limits.spectrum
     if stated is None:
         return []
-    unit, limits = frequency_unit(spec), []
+    unit, limits = build_units(spec).frequency, []
     for curve, upper in ((stated.max, True), (stated.min, False)):
         if curve is None or curve == 0.0:
             continue
@@ -92,14 +96,14 @@ def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array]
     if isinstance(curve, TableFile):
         frequency, value = _table(spec, curve.table, key)
         return lambda w: np.interp(w, frequency, value), frequency, smooth
-    W = any_weight(spec, curve, key)
-    return lambda w: np.abs(W.at(w)) ** 2, nowhere, weight_singularities(W)
+    W = build_weight(spec, curve, key)
+    return lambda w: np.abs(W.at(w)) ** 2, nowhere, W.singularities
 
 
 def _table(spec: Spec, name: str, key: str) -> tuple[Array, Array]:
     path = spec.resolve_path(name)
     columns = read_columns(path, {"frequency": "frequency", "value": "phi"}, key=key)
-    frequency, value = columns["frequency"] * frequency_unit(spec), columns["value"]
+    frequency, value = columns["frequency"] * build_units(spec).frequency, columns["value"]
     if np.any(np.diff(frequency) <= 0) or frequency[0] < 0 or np.any(value < 0):
         raise DataError(
             Diagnostic(

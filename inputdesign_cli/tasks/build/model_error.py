@@ -1,8 +1,6 @@
-"""Spec -> the requirement on the model error over frequency."""
+"""Spec -> the requirement on the model error over frequency, entry by entry or of the norm of G."""
 
 from __future__ import annotations
-
-from typing import Literal
 
 import numpy as np
 import scipy.special
@@ -11,20 +9,24 @@ from inputdesign_cli.accuracy import (
     Absolute,
     AdmissibleError,
     EllipsoidError,
+    Entry,
     ModelError,
     Relative,
     Sensitivity,
     Weighted,
+    active_entries,
 )
-from inputdesign_cli.accuracy.model_error import check_positive
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Loop, Rational
+from inputdesign_cli.plant import Model, Rational
+from inputdesign_cli.specification import ModelError as StatedError
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
-from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.tasks.build.bound_table import read_bound
-from inputdesign_cli.tasks.build.experiment import rational, weight
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.system import build_loop
+from inputdesign_cli.tasks.build.tables import has_column
+from inputdesign_cli.tasks.build.weights import build_weight, rational
 
 _KEY = "accuracy.model_error"
 
@@ -34,8 +36,29 @@ def confidence_factor(probability: float, parameters: int) -> float:
     return float(np.sqrt(2.0 * scipy.special.gammaincinv(parameters / 2.0, probability)))
 
 
-def build_model_error(spec: Spec, experiment: Experiment) -> ModelError | EllipsoidError:
-    """`accuracy.model_error` in raw coordinates; `dataclasses.replace` moves it to others.
+def model_error_alpha(spec: Spec, model: Model) -> float:
+    """alpha as given, or from the confidence and the number of parameters of G."""
+    error = spec.accuracy.model_error
+    if error is not None and error.alpha is not None:
+        return error.alpha
+    probability = (error.probability if error is not None else None) or DEFAULT_CONFIDENCE
+    return confidence_factor(probability, int(np.sum(model.in_plant)))
+
+
+def required_band(
+    spec: Spec, experiment: Experiment, stated: tuple[float, float] | None
+) -> tuple[float, float]:
+    """The band of a requirement: as stated, or all frequencies, in continuous time those that are excited."""
+    if not spec.plant.sampled:
+        return stated or experiment.band
+    lo, hi = spec.clip_band(stated)
+    return lo * spec.sample_time, min(hi * spec.sample_time, float(np.pi))
+
+
+def build_model_errors(spec: Spec, experiment: Experiment) -> list[OnModelError]:
+    """`accuracy.model_error` in raw coordinates: one an entry of G that is not zero, or one of the norm.
+
+    Empty when it is not asked for.
 
     Raises:
         SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
@@ -43,76 +66,108 @@ def build_model_error(spec: Spec, experiment: Experiment) -> ModelError | Ellips
     """
     error = spec.accuracy.model_error
     if error is None:
-        raise ValueError("the spec states no model_error")
-    band = sampled_band(spec, error.band)
-    admissible = _admissible(spec, experiment, band)
-    if error.weight is not None:
-        admissible = Weighted(admissible, weight(spec, error.weight, f"{_KEY}.weight"))
-    alpha = model_error_alpha(spec, experiment)
-    requirement: ModelError | EllipsoidError
-    if error.region == "first_order":
-        requirement = ModelError(experiment, admissible, alpha, band)
+        return []
+    band = required_band(spec, experiment, error.band)
+    if error.norm == "frobenius" or error.sensitivity is not None:
+        places: list[Entry | None] = [(0, 0) if build_units(spec).single else None]
     else:
-        model = experiment.model
-        if len(model.A) > 1 and len(model.F) > 1:
-            raise spec.complain(
-                "not-supported",
-                "region: ellipsoid needs a denominator that is linear in the parameters, A or F but not both",
-                hint="use region: first_order for this structure",
-                key=f"{_KEY}.region",
-            )
-        against: Literal["relative", "absolute"] = "absolute" if error.relative is None else "relative"
-        requirement = EllipsoidError(experiment, admissible, alpha, against, band)
-    check_positive(admissible, requirement.grid, unit=spec.sample_time, named=f"rad/{spec.time_unit}")
-    return requirement
+        places = list(active_entries(experiment.model, band[1]))
+    return [_on_entry(spec, error, experiment, band, entry) for entry in places]
 
 
-def no_feedback(spec: Spec, key: str) -> SpecError:
-    """The diagnostic about a sensitivity without a controller."""
-    return spec.complain(
-        "no-feedback",
-        "the controller is zero: no model error can harm the sensitivity",
-        hint="give the controller of the loop to be kept",
-        key=key,
-    )
+def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
+    """What has r_u of every entry where no bound on it is stated; r_adm means nothing."""
+    band, alpha = required_band(spec, experiment, None), model_error_alpha(spec, experiment.model)
+    return [
+        ModelError(experiment=experiment, band=band, entry=entry, admissible=Absolute(1.0), alpha=alpha)
+        for entry in active_entries(experiment.model, band[1])
+    ]
 
 
-def model_error_alpha(spec: Spec, experiment: Experiment) -> float:
-    """alpha as given, or from the confidence and the number of parameters of G."""
-    error = spec.accuracy.model_error
-    if error is not None and error.alpha is not None:
-        return error.alpha
-    probability = (error.probability if error is not None else None) or DEFAULT_CONFIDENCE
-    return confidence_factor(probability, int(np.sum(experiment.model.in_plant)))
+def _on_entry(
+    spec: Spec,
+    error: StatedError,
+    experiment: Experiment,
+    band: tuple[float, float],
+    entry: Entry | None,
+) -> OnModelError:
+    admissible = _admissible(spec, error, experiment.model, band, entry)
+    if error.weight is not None:
+        admissible = Weighted(admissible, build_weight(spec, error.weight, f"{_KEY}.weight"))
+    alpha = model_error_alpha(spec, experiment.model)
+    made: OnModelError
+    if error.region == "first_order":
+        made = ModelError(experiment=experiment, band=band, entry=entry, admissible=admissible, alpha=alpha)
+    else:
+        _check_fraction(spec, experiment.model, entry)
+        made = EllipsoidError(
+            experiment=experiment,
+            band=band,
+            entry=entry,
+            admissible=admissible,
+            alpha=alpha,
+            against="absolute" if error.relative is None else "relative",
+        )
+    units = build_units(spec)
+    check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
+    return made
 
 
-def sampled_band(spec: Spec, band: tuple[float, float] | None) -> tuple[float, float]:
-    """A band of the spec in rad/sample."""
-    lo, hi = spec.clip_band(band)
-    return lo * spec.sample_time, min(hi * spec.sample_time, float(np.pi))
+def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
+    """Raise `SpecError` (`not-supported`) unless the entry is a fraction affine in the parameters."""
+    if entry is None:
+        raise spec.complain(
+            "not-supported",
+            "region: ellipsoid is for the entries of G one by one, not for the norm of the error",
+            hint="use region: first_order, or norm: entry with relative, absolute or table",
+            key=f"{_KEY}.region",
+        )
+    if not model.is_fraction(*entry):
+        named = build_units(spec).entry(*entry) or "G"
+        raise spec.complain(
+            "not-supported",
+            f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not: it has "
+            "both A and F, or is sampled from s",
+            hint="use region: first_order for this structure",
+            key=f"{_KEY}.region",
+        )
 
 
-def _admissible(spec: Spec, experiment: Experiment, band: tuple[float, float]) -> AdmissibleError:
-    error = spec.accuracy.model_error
-    assert error is not None
-    model = experiment.model
+def _admissible(
+    spec: Spec,
+    error: StatedError,
+    model: Model,
+    band: tuple[float, float],
+    entry: Entry | None,
+) -> AdmissibleError:
+    """r_adm; of a table its column r_adm_21 for an entry, or r_adm for all alike."""
     if error.relative is not None:
-        return Relative(model, error.relative)
+        return Relative(model, error.relative, entry)
     if error.absolute is not None:
         return Absolute(error.absolute)
     if error.table is not None:
-        return read_bound(spec, error.table, band, unit=spec.sample_time)
-    sensitivity = error.sensitivity
-    assert sensitivity is not None
-    given = sensitivity.controller or spec.experiment.controller
-    assert not isinstance(given, ControllerMatrix)  # the spec has been checked
-    assert given is not None
-    controller = rational(given)
-    Loop(model, controller).check_stability()
-    if not np.any(controller.numerator):
-        raise no_feedback(spec, f"{_KEY}.sensitivity")
-    if sensitivity.max_db is not None:
-        return Sensitivity(model, controller, Rational.build([10 ** (-sensitivity.max_db / 20)]))
-    weight = sensitivity.weight
-    assert weight is not None
-    return Sensitivity(model, controller, rational(weight))
+        units, column = build_units(spec), "r_adm"
+        path = spec.resolve_path(error.table)
+        if entry is not None and not units.single and has_column(path, "r_adm_", key=f"{_KEY}.table"):
+            column += units.suffix(*entry)
+        return read_bound(spec, error.table, band, unit=units.frequency, column=column)
+    return _sensitivity(spec, error, model)
+
+
+def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
+    asked = error.sensitivity
+    given = None if asked is None else asked.controller or spec.experiment.controller
+    if asked is None or given is None:
+        raise ValueError("the spec has been checked: a bound on the sensitivity has a loop")
+    loop = build_loop(model, given)
+    if not np.any(loop.controller.numerator):
+        raise spec.complain(
+            "no-feedback",
+            "the controller is zero: no model error can harm the sensitivity",
+            hint="give the controller of the loop to be kept",
+            key=f"{_KEY}.sensitivity",
+        )
+    if asked.weight is not None:
+        return Sensitivity(loop, rational(asked.weight))
+    peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
+    return Sensitivity(loop, Rational.build([peak]))

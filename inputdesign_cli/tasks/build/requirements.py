@@ -6,56 +6,46 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from inputdesign_cli.accuracy import (
-    Criterion,
-    EllipsoidError,
-    InformationTarget,
-    ModelError,
-    WeightedVariance,
-)
+from inputdesign_cli.accuracy import Criterion, InformationTarget, WeightedVariance, active_entries
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.design.convex.problem import RequirementFactory
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Rational
-from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.experiment import embedded, weight
-from inputdesign_cli.tasks.build.model_error import confidence_factor, sampled_band
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.model_error import build_model_errors, confidence_factor, required_band
+from inputdesign_cli.tasks.build.system import embedded
+from inputdesign_cli.tasks.build.weights import build_weight
 
 _RELATIVE_ZERO = 1e-9
 
 
-def build_requirements(
-    spec: Spec, experiment: Experiment, error: ModelError | EllipsoidError | None
-) -> list[RequirementFactory]:
+def build_requirements(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
     """One maker for each requirement that `accuracy` states, in the order of the contract.
 
-    Args:
-        error: the one on the model error, from `build_model_error`.
+    Requirements over frequency are made entry by entry of G.
 
     Raises:
         SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
             cannot be met or is not supported.
         DataError: a table cannot be used.
     """
-    makers: list[RequirementFactory] = []
-    accuracy = spec.accuracy
-    if error is not None:
-        makers.append(lambda e: replace(error, experiment=e))
+    accuracy, names = spec.accuracy, experiment.model.names
+    makers = [_moved(error) for error in build_model_errors(spec, experiment)]
     if accuracy.information is not None:
-        target = accuracy.information
-        makers.append(
-            _target(spec, experiment, target.matrix, target.parameters, "accuracy.information", "information")
-        )
+        stated, key = accuracy.information, "accuracy.information"
+        makers.append(_target(spec, names, stated.matrix, stated.parameters, key, "information"))
     if accuracy.application is not None:
-        makers.append(_application(spec, experiment))
-    if accuracy.weighted_variance is not None:
-        variance = _weighted_variance(spec, experiment)
-        makers.append(lambda e: replace(variance, experiment=e))
+        # M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over.
+        asked, key = accuracy.application, "accuracy.application"
+        chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
+        hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
+        makers.append(_target(spec, names, hessian, asked.parameters, key, "application"))
+    makers += [_moved(variance) for variance in _weighted_variances(spec, experiment)]
     for name, deviation in (accuracy.standard_deviation or {}).items():
-        key = "accuracy.standard_deviation"
-        precision = np.array([[1.0 / deviation**2]])
-        makers.append(_target(spec, experiment, precision, (name,), key, f"standard_deviation of {name}"))
+        key, precision = "accuracy.standard_deviation", np.array([[1.0 / deviation**2]])
+        makers.append(_target(spec, names, precision, (name,), key, f"standard_deviation of {name}"))
     return makers
 
 
@@ -87,42 +77,56 @@ def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | 
     return make
 
 
+def _moved(requirement: OverFrequency) -> RequirementFactory:
+    return lambda experiment: replace(requirement, experiment=experiment)
+
+
 def _target(
     spec: Spec,
-    experiment: Experiment,
-    matrix: Sequence[Sequence[float]] | Array,
+    known: Sequence[str],
+    matrix: ArrayLike,
     names: Sequence[str] | None,
     key: str,
     label: str,
 ) -> RequirementFactory:
-    full = embedded(spec, experiment.model.names, np.array(matrix, dtype=float), names, key)
-    return lambda e: InformationTarget(e.whiten_matrix(full), label)
+    full = embedded(spec, known, np.array(matrix, dtype=float), names, key)
+    return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
 
 
-def _application(spec: Spec, experiment: Experiment) -> RequirementFactory:
-    """M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over."""
-    application = spec.accuracy.application
-    assert application is not None
-    chi2 = confidence_factor(application.confidence, len(application.parameters)) ** 2
-    hessian = 0.5 * chi2 * application.gamma * np.array(application.hessian, dtype=float)
-    return _target(spec, experiment, hessian, application.parameters, "accuracy.application", "application")
+def _weighted_variances(spec: Spec, experiment: Experiment) -> list[WeightedVariance]:
+    """`accuracy.weighted_variance` of every entry of G that is not zero."""
+    stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
+    if stated is None:
+        return []
+    weight = build_weight(spec, stated.weight, f"{key}.weight")
+    band = required_band(spec, experiment, stated.band)
+    found = [
+        WeightedVariance(
+            experiment=experiment,
+            band=band,
+            entry=entry,
+            weight=weight,
+            limit=stated.max,
+            relative=stated.relative,
+        )
+        for entry in active_entries(experiment.model, band[1])
+    ]
+    if stated.relative:
+        for variance in found:
+            _check_nowhere_zero(spec, variance)
+    return found
 
 
-def _weighted_variance(spec: Spec, experiment: Experiment) -> WeightedVariance:
-    variance, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
-    assert variance is not None
-    transfer = variance.weight
-    W = Rational.build([1.0]) if transfer is None else weight(spec, transfer, f"{key}.weight")
-    band = sampled_band(spec, variance.band)
-    requirement = WeightedVariance(experiment, W, variance.max, band, variance.relative)
-    if variance.relative:
-        G = np.abs(experiment.model.plant_at(requirement.grid))
-        if G.min() <= _RELATIVE_ZERO * np.median(G):
-            at = requirement.grid[int(np.argmin(G))] / spec.sample_time
-            raise spec.complain(
-                "admissible-not-positive",
-                f"G vanishes at {at:.6g} rad/{spec.time_unit}, where its relative variance is infinite",
-                hint="restrict `band` to the frequencies that matter",
-                key=key,
-            )
-    return requirement
+def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
+    """Raise `SpecError` (`admissible-not-positive`) where G vanishes: its relative variance is infinite."""
+    grid, units = variance.grid, build_units(spec)
+    size = variance.nominal_size(grid)
+    if size.min() <= _RELATIVE_ZERO * np.median(size):
+        at = grid[int(np.argmin(size))] / units.frequency
+        named = f"entry {units.entry(*variance.entry)} of G" if variance.entry and not units.single else "G"
+        raise spec.complain(
+            "admissible-not-positive",
+            f"{named} vanishes at {at:.6g} {units.per_time}, where its relative variance is infinite",
+            hint="restrict `band` to the frequencies that matter",
+            key="accuracy.weighted_variance",
+        )

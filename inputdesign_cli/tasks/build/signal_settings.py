@@ -11,8 +11,8 @@ from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.plant import PolynomialPlant
 from inputdesign_cli.specification.models.spectrum import GivenSignal, GivenSpectrum, PolynomialSpectrum
-from inputdesign_cli.tasks.build.channels import build_cost, excitation_band, record_step
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
 
 # Shared by the inputs: each adds a period to a record, which varies the less and takes the longer.
@@ -68,7 +68,7 @@ def build_signal_settings(spec: Spec) -> SignalSettings:
     return SignalSettings(
         method=method,
         phases=phases,
-        lines=signal.lines,  # type: ignore[arg-type]
+        lines=signal.lines,
         periods=signal.periods or 1,
         hold=signal.hold or 1,
         ramp=signal.ramp or 0,

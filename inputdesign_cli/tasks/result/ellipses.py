@@ -6,31 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.information import ChannelExperiment, Experiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Ellipse, EllipseCurves
-from inputdesign_cli.specification import Spec
 
 _PAIRS = 6
 
 
-def check_pairs(spec: Spec, known: Sequence[str]) -> None:
-    """Raise `SpecError` (`unknown-parameter`) where `report.ellipses` names what the model does not have."""
-    for n, pair in enumerate(spec.report.ellipses or ()):
-        for m, name in enumerate(pair):
-            if name not in known:
-                raise spec.complain(
-                    "unknown-parameter",
-                    f'the model has no parameter "{name}"',
-                    hint=f"its parameters are {', '.join(known)}",
-                    key=f"report.ellipses[{n}][{m}]",
-                )
+Pairs = Sequence[tuple[str, str]]
 
 
 def experiment_ellipses(
-    spec: Spec, experiment: Experiment | ChannelExperiment, information: Array, white: Array | None
+    experiment: Experiment, information: Array, white: Array | None, pairs: Pairs | None
 ) -> EllipseCurves | None:
-    """The pairs under `report.ellipses`, by default those most correlated, where there are several channels.
+    """The chosen `pairs`, by default those most correlated where there are several channels.
 
     Args:
         information, white: (k, k) in the coordinates of `experiment`, by the design and by flat excitation.
@@ -38,8 +27,8 @@ def experiment_ellipses(
     Returns:
         None when there is no pair to show, or some parameter has no finite variance.
     """
-    pairs = spec.report.ellipses
-    if experiment.size < 2 or (pairs is None and isinstance(experiment, Experiment)):
+    single = experiment.model.outputs == experiment.model.inputs == 1
+    if experiment.size < 2 or (pairs is None and single):
         return None
     try:
         covariance = experiment.raw_covariance(information)

@@ -1,55 +1,50 @@
-"""What `result.json` and `model.yaml` say of an estimate, of one channel or several."""
+"""What `result.json` and `model.yaml` say of an estimate."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification import ChannelEstimate, Estimate, ResidualTest
-from inputdesign_cli.plant.polynomial import Array, roots_in_z
+from inputdesign_cli.identification import Estimate, ResidualTest
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import roots_in_z
+from inputdesign_cli.runs.results import Json
+from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 
 # A residual test below this probability speaks against the model.
-REFUTED = 0.01
-
-AnyEstimate = Estimate | ChannelEstimate
-Blocks = dict[str, dict[str, Any]]
+_REFUTED = 0.01
 
 
-def identification_entry(estimate: AnyEstimate, variance: Any, fit: Any) -> dict[str, Any]:
-    """`identification` of `result.json`.
-
-    Args:
-        variance: of e, a number or its covariance matrix.
-        fit: per cent, a number or one an output; None where the model cannot be simulated.
-    """
-    entry: dict[str, Any] = {
+def identification_entry(estimate: Estimate) -> dict[str, Json]:
+    """`identification` of `result.json`."""
+    single = estimate.noise.size == 1
+    entry: dict[str, Json] = {
         "theta": dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
         "standard_deviation": _deviations(estimate),
-        "variance": variance,
+        "variance": float(estimate.noise[0, 0]) if single else estimate.noise.tolist(),
         "converged": estimate.converged,
         "steps": estimate.steps,
         "starts": estimate.starts,
         "whiteness": _test(estimate.whiteness),
         "independence": _test(estimate.independence),
     }
-    if fit is not None:
-        entry["fit_percent"] = fit
+    if not single:
+        entry["fit_percent"] = list(estimate.fit)
+    elif estimate.fit[0] is not None:
+        entry["fit_percent"] = estimate.fit[0]
     return entry
 
 
-def estimate_result(
-    title: str, samples: int, estimate: AnyEstimate, entry: Mapping[str, Any]
-) -> dict[str, Any]:
-    """The head of `result.json`; `entry` is its `identification`."""
+def estimate_result(title: str, estimate: Estimate) -> dict[str, Json]:
+    """The head of `result.json`."""
     return {
         "format": 1,
         "title": title,
         "status": "identified" if estimate.converged else "not_converged",
-        "samples": samples,
-        "identification": entry,
+        "samples": len(estimate.errors),
+        "identification": identification_entry(estimate),
         "information": {
             "parameters": list(estimate.names),
             "matrix": estimate.information,
@@ -59,12 +54,12 @@ def estimate_result(
     }
 
 
-def _deviations(estimate: AnyEstimate) -> dict[str, float]:
+def _deviations(estimate: Estimate) -> dict[str, float]:
     deviations = np.sqrt(np.diag(estimate.covariance))
     return dict(zip(estimate.names, deviations.tolist(), strict=True))
 
 
-def _test(test: ResidualTest) -> dict[str, Any]:
+def _test(test: ResidualTest) -> dict[str, Json]:
     return {
         "statistic": test.statistic,
         "degrees_of_freedom": test.freedom,
@@ -72,13 +67,13 @@ def _test(test: ResidualTest) -> dict[str, Any]:
     }
 
 
-def model_notes(estimate: AnyEstimate, predictor: Mapping[str, Sequence[Array]]) -> list[str]:
-    """What speaks against trusting the estimate.
+def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Estimate) -> list[str]:
+    """What a user should know of the data, and what speaks against trusting the estimate.
 
     Args:
-        predictor: the polynomials that must be stable: "C", "D" and "F".
+        model: the estimate as a model.
     """
-    notes, samples = [], len(estimate.errors)
+    notes, samples, predictor = list(of_the_data), len(estimate.errors), predictor_of(model)
     if not estimate.converged:
         notes.append(
             f"the search did not settle after {estimate.steps} steps from the best of {estimate.starts} "
@@ -95,13 +90,13 @@ def model_notes(estimate: AnyEstimate, predictor: Mapping[str, Sequence[Array]])
             "samples can tell: the covariance is not to be trusted there, and a design on this model would "
             "count on noise that vanishes or never fades; take more data, or a lower order"
         )
-    if estimate.whiteness.probability < REFUTED:
+    if estimate.whiteness.probability < _REFUTED:
         remedy = "raise the orders of C and D (or A)" if predictor else "a model in q^-1 can describe it"
         notes.append(
             f"the residuals are not white (probability {estimate.whiteness.probability:.1e}): the noise has "
             f"more structure than the model, and the covariance is not to be trusted; {remedy}"
         )
-    if estimate.independence.probability < REFUTED:
+    if estimate.independence.probability < _REFUTED:
         remedy = ", or another delay; raise the orders of B and F (or A)" if predictor else ""
         notes.append(
             f"past inputs explain residuals (probability {estimate.independence.probability:.1e}): the plant "
@@ -111,16 +106,21 @@ def model_notes(estimate: AnyEstimate, predictor: Mapping[str, Sequence[Array]])
     vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
     if vague:
         notes.append(f"zero lies within a standard deviation of {', '.join(vague)}: an order may be too high")
+    if model.continuous and min(estimate.whiteness.probability, estimate.independence.probability) < _REFUTED:
+        notes.append(
+            "the input was taken for the band-limited interpolation of its samples; where it is held "
+            "between them, write plant.sample: zoh"
+        )
     return notes
 
 
-def model_text(blocks: Blocks, estimate: AnyEstimate) -> str:
+def model_text(model: Model, estimate: Estimate) -> str:
     """The blocks to paste, with the covariance and, as a comment, the same as prior information."""
     lines = [
         f"# Estimated from {len(estimate.errors)} samples: paste in place of the blocks of the same names,",
         "# or write include: and the name of this file in a spec without them.",
     ]
-    for key, block in blocks.items():
+    for key, block in blocks_of(model).items():
         lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]
     names = ", ".join(estimate.names)
     quoted = names if "[" not in names else ", ".join(json.dumps(name) for name in estimate.names)

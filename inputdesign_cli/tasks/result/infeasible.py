@@ -11,35 +11,32 @@ from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
-from inputdesign_cli.plant import graded_grid
-from inputdesign_cli.specification import Spec
-from inputdesign_cli.spectrum import free_lines
-from inputdesign_cli.tasks.build.channels import frequency_unit
-from inputdesign_cli.tasks.build.task import Task
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.spectrum import LinesBasis
 
 # A limit takes part in the conflict when its share of the proof's weight is above this.
 _TAKES_PART = 1e-4
 _TOLERANCE = 1e-5
 
 
-def explain(spec: Spec, task: Task, unreachable: UnreachableError) -> InfeasibleError:
+def explain(units: Units, question: Question, unreachable: UnreachableError) -> InfeasibleError:
     """The proof that came with the failure, in the words of the spec."""
     problem, nearest = unreachable.problem, unreachable.nearest
     proved = nearest.certificate.bound
     weights = nearest.certificate.limits * np.array([limit.bound for limit in problem.limits])
-    stated = len(task.question.limits)  # limits implied by those on the density follow
+    stated = len(question.limits)  # limits implied by those on the density follow
     involved = [
         limit
         for limit, weight in zip(problem.limits[:stated], weights, strict=False)
         if weight > _TAKES_PART * max(weights.max(initial=0.0), 1e-300)
     ]
     if unreachable.limits_alone:
-        return _contradiction(spec, involved, proved)
+        return _contradiction(involved, proved)
     asked = _conflicting(unreachable)
     names = " and ".join(dict.fromkeys(requirement.name for requirement, _ in asked))
     where = sorted({w for _, w in asked if w is not None})
-    at = f" (hardest at {_list(where, spec)})" if where else ""
-    needs = [_needed(task, limit) for limit in involved if limit.upper]
+    at = f" (hardest at {_list(where, units)})" if where else ""
+    needs = [_needed(question, limit) for limit in involved if limit.upper]
     parts = [text for text in needs if text]
     looser = np.sqrt(max(proved, 1.0))
     if not parts:
@@ -53,12 +50,12 @@ def explain(spec: Spec, task: Task, unreachable: UnreachableError) -> Infeasible
         f"raise the limit, or loosen the accuracy: within the limits the error can be made no smaller than "
         f"{looser:.4g} times what is asked"
     )
-    if _within_reach_of_any(task):
+    if _within_reach_of_any(question):
         hint += "; spectrum: {type: free} can meet it"
     if problem.densities and stated:
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
-    return InfeasibleError(Diagnostic("infeasible", message, hint, key, spec.locate(key)))
+    return InfeasibleError(Diagnostic("infeasible", message, hint, key))
 
 
 def _conflicting(unreachable: UnreachableError) -> list[tuple[Requirement, float | None]]:
@@ -66,9 +63,8 @@ def _conflicting(unreachable: UnreachableError) -> list[tuple[Requirement, float
     return [(requirements[index], frequency) for index, frequency in unreachable.nearest.active]
 
 
-def _needed(task: Task, limit: PowerLimit) -> str:
+def _needed(question: Question, limit: PowerLimit) -> str:
     """The least power of this kind with which the other limits allow the accuracy; empty if none does."""
-    question = task.question
     others = [other for other in question.limits if other is not limit]
     if limit.channel is not None:
         return ""
@@ -81,7 +77,6 @@ def _needed(task: Task, limit: PowerLimit) -> str:
         cost={limit.kind: 1.0},
         limits=others,
         densities=question.densities,
-        band=question.band,
     )
     try:
         least = solve_design(alone, tolerance=_TOLERANCE).result.certificate.bound
@@ -91,21 +86,20 @@ def _needed(task: Task, limit: PowerLimit) -> str:
     return f"needs {kind} power >= {_up(least)}, limit is {limit.bound:.6g}"
 
 
-def _within_reach_of_any(task: Task) -> bool:
+def _within_reach_of_any(question: Question) -> bool:
     """Whether some spectrum of another type meets what this type cannot (densities are left out)."""
-    question = task.question
-    if question.densities or (getattr(question.basis, "free", False)):
+    if question.densities or question.basis.free:
         return False
-    lo, hi = question.band
-    grid = graded_grid(question.experiment.singularities, lo, hi)
+    experiment = question.experiment
+    anything = LinesBasis.anywhere(*experiment.band, experiment.inputs)
     try:
-        solve_design(replace(question, basis=free_lines(question.experiment, grid)), tolerance=_TOLERANCE)
+        solve_design(replace(question, basis=anything), tolerance=_TOLERANCE)
     except (UnreachableError, np.linalg.LinAlgError):
         return False
     return True
 
 
-def _contradiction(spec: Spec, involved: list[PowerLimit], proved: float) -> InfeasibleError:
+def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError:
     lower = [limit for limit in involved if not limit.upper]
     upper = [limit for limit in involved if limit.upper]
     names = ", ".join(dict.fromkeys(limit.key for limit in (*lower, *upper))) or "limits.spectrum"
@@ -117,18 +111,17 @@ def _contradiction(spec: Spec, involved: list[PowerLimit], proved: float) -> Inf
             "times as large for the lower ones to be reached",
             "lower min, or raise max",
             where,
-            spec.locate(where),
         )
     )
 
 
-def _list(frequencies: list[float], spec: Spec) -> str:
+def _list(frequencies: list[float], units: Units) -> str:
     shown: list[float] = []
     for w in frequencies:
         if not shown or w > 1.01 * shown[-1] + 1e-6:
             shown.append(w)
-    text = ", ".join(f"{w / frequency_unit(spec):.4g}" for w in shown[:3])
-    return f"{text}{', ..' if len(shown) > 3 else ''} rad/{spec.time_unit}"
+    text = ", ".join(f"{w / units.frequency:.4g}" for w in shown[:3])
+    return f"{text}{', ..' if len(shown) > 3 else ''} {units.per_time}"
 
 
 def _up(value: float) -> str:

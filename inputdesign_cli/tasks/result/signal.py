@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, Requirement
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import SignalCurves, Table
 from inputdesign_cli.runs.units import Units
@@ -22,7 +22,7 @@ _LAGS = 50
 def signal_entry(
     request: RecordRequest,
     units: Units,
-    experiment: ChannelExperiment,
+    experiment: Experiment,
     record: Record,
     requirements: Sequence[Requirement] = (),
     *,
@@ -44,12 +44,12 @@ def signal_entry(
     if record.method == "multisine":
         entry["phases"] = request.settings.phases
     entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
-    first = requirements[0] if requirements else None
-    if isinstance(first, Criterion):
-        reached = first.level(experiment.samples / len(samples) * plant.information(samples))
-        entry["criterion"] = first.value(reached)
+    criterion = requirements[0].criterion if requirements else None
+    if criterion is not None:
+        reached = criterion.level(experiment.samples / len(samples) * plant.information(samples))
+        entry["criterion"] = criterion.value(reached)
         if designed is not None:
-            entry["efficiency"] = reached / first.level(designed)
+            entry["efficiency"] = reached / criterion.level(designed)
     elif requirements and np.isfinite(record.worst_ratio):
         entry["worst_ratio"] = record.worst_ratio
     if record.method != "given":

@@ -1,0 +1,191 @@
+"""Prediction-error estimates of polynomial models in q^-1, and of their noise.
+
+The covariance of e is estimated along with theta: the estimate minimises the determinant of the residuals'
+covariance, so that each residual is weighed by what the others tell of it; Ljung, System Identification
+(1999), Sections 7.2 and 15.2. With one output it is the sum of squares.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.identification.checks import (
+    check_apart,
+    check_length,
+    check_noisy,
+    check_varying,
+    fit_percent,
+)
+from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, concluded
+from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
+from inputdesign_cli.identification.orders import OutputOrders
+from inputdesign_cli.identification.predictor import prediction_errors
+from inputdesign_cli.identification.problem import PredictionErrors, inverses
+from inputdesign_cli.identification.starts import starting_points
+from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.polynomial import Array
+
+# Many runs share the cost of a pass over time; with more outputs at once the blocks no longer fit the cache.
+_OUTPUTS_AT_ONCE = 512
+
+
+def identify_polynomials(
+    model: PolynomialModel,
+    u: ArrayLike,
+    y: ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    noise: ArrayLike | None = None,
+    feedback: bool = False,
+) -> Estimate:
+    """Prediction-error estimate from one record; in closed loop the direct method.
+
+    Each output is first estimated alone, from several starts (`start` among them if given). What outputs
+    share is then weighed by how well each knows it, and the search for all of them begins there and at
+    `start`. Without C, D and F (ARX) this is least squares, generalised by the covariance of e.
+
+    Args:
+        model: its orders and delays, zero entries and common polynomials are those of the estimate; its
+            numbers mean nothing.
+        u, y: (samples, r), (samples, p).
+        start: (k,).
+        noise: the covariance of e (p, p) if it is known; it is then not estimated.
+        feedback: whether u(t) answers y(t), which a test of the residuals heeds.
+
+    Raises:
+        SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
+            `not-exciting`.
+    """
+    structure = Structure.of(model)
+    inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
+    check_length(len(outputs), structure.size, structure.memory, outputs=len(structure.rows))
+    check_varying(structure.names, inputs, outputs)
+    known = None if noise is None else np.asarray(noise, dtype=float)
+    record = structure.problem(inputs[None], outputs[None], known)
+    points, tried = _starts(structure, record, None if start is None else np.asarray(start, dtype=float))
+    found = minimise(record.repeated(len(points)), points)
+    best = best_run(found)
+    theta = found.theta[best]
+    errors = np.stack(
+        [
+            prediction_errors(row, theta[None, place], record.u, y_i)[:, 0]
+            for row, place, y_i in zip(structure.rows, structure.places, record.y, strict=True)
+        ],
+        axis=1,
+    )
+    covariance = _covariances(structure, (errors.T @ errors)[None], len(errors))[0]
+    check_noisy(np.diag(covariance), outputs)
+    check_apart(covariance)
+    if known is not None:
+        covariance = known
+    information, _ = record.gathered(record.sums(theta[None]), np.linalg.inv(covariance)[None])
+    return concluded(
+        structure.names,
+        theta,
+        information[0],
+        covariance,
+        errors,
+        inputs,
+        feedback=feedback,
+        in_noise=structure.in_noise,
+        in_plant=structure.in_plant,
+        fit=_fits(model.at(theta), inputs, outputs),
+        converged=bool(found.converged[best]),
+        steps=int(found.steps[best]),
+        starts=tried,
+    )
+
+
+def fit_polynomials(model: PolynomialModel, u: ArrayLike, y: ArrayLike, *, start: ArrayLike) -> BatchEstimate:
+    """Prediction-error estimates of many records in one pass.
+
+    Args:
+        model: of which the structure is meant, see `identify_polynomials`.
+        u, y: (runs, samples, r), (runs, samples, p).
+        start: (k,) for all runs, or (runs, k).
+    """
+    structure = Structure.of(model)
+    inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
+    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), structure.size))
+    size = max(1, _OUTPUTS_AT_ONCE // len(structure.rows))
+    parts = []
+    for first in range(0, len(outputs), size):
+        some = slice(first, first + size)
+        record = structure.problem(inputs[some], outputs[some])
+        found = minimise(record, begin[some])
+        noise, information = _noise_and_information(structure, record, found)
+        parts.append((found.theta, noise, information, found.converged, found.steps))
+    theta, noise, information, converged, steps = (
+        np.concatenate([part[index] for part in parts]) for index in range(5)
+    )
+    return BatchEstimate(theta, noise, information, converged, steps)
+
+
+def _starts(structure: Structure, record: PredictionErrors, start: Array | None) -> tuple[Array, int]:
+    """Where the search for all outputs begins (points, k), and how many starts an output alone has had."""
+    own = [
+        _starts_alone(row, place, record, y, start) if place.size else np.zeros((0, 0))
+        for row, place, y in zip(structure.rows, structure.places, record.y, strict=True)
+    ]
+    tried = max(len(points) for points in own)
+    if len(own) == 1:
+        points = np.empty_like(own[0])
+        points[:, structure.places[0]] = own[0]
+        return points, tried
+    alone = _one_by_one(structure, record, own)
+    return np.array([alone] if start is None else [start, alone]), tried
+
+
+def _starts_alone(
+    row: OutputOrders, place: NDArray[np.int64], record: PredictionErrors, y: Array, start: Array | None
+) -> Array:
+    """(points, own k): those of one output, by itself."""
+    points = starting_points(row, [x[:, 0] for x in record.u], y[:, 0])
+    return points if start is None else np.concatenate([start[None, place], points])
+
+
+def _one_by_one(structure: Structure, record: PredictionErrors, starts: list[Array]) -> Array:
+    """theta (k,) from each output alone: the information of all, added up."""
+    total, moment = np.zeros((structure.size, structure.size)), np.zeros(structure.size)
+    for row, place, y, points in zip(structure.rows, structure.places, record.y, starts, strict=True):
+        if not place.size:
+            continue
+        single = PredictionErrors.single(row, record.u, y)
+        found = minimise(single.repeated(len(points)), points)
+        best = best_run(found)
+        information = found.hessian[best] / max(found.cost[best], 1e-300)
+        total[np.ix_(place, place)] += information
+        moment[place] += information @ found.theta[best]
+    scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    scaled = np.linalg.lstsq(total / np.outer(scale, scale), moment / scale, rcond=None)[0]
+    return np.asarray(scaled / scale)
+
+
+def _noise_and_information(
+    structure: Structure, record: PredictionErrors, found: Minimum
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The covariance of e (runs, p, p) and the information of theta (runs, k, k) at the minima."""
+    samples = record.y[0].shape[0]
+    if len(structure.rows) == 1:  # the search has computed it already
+        noise = _covariances(structure, found.cost[:, None, None], samples)
+        return noise, found.hessian / np.maximum(noise, 1e-300)
+    sums = record.sums(found.theta)
+    noise = _covariances(structure, sums.errors, samples)
+    return noise, record.gathered(sums, inverses(noise)[0])[0]
+
+
+def _covariances(structure: Structure, squares: NDArray[np.float64], samples: int) -> NDArray[np.float64]:
+    """The covariance of e (runs, p, p) from sums of epsilon epsilon^T; every output's parameters count."""
+    left = np.sqrt(np.maximum(samples - structure.own(), 1.0))
+    return squares / np.outer(left, left)
+
+
+def _fits(model: PolynomialModel, u: Array, y: Array) -> tuple[float | None, ...]:
+    """Per cent of the rms of each output that the simulation explains; None where it is unstable."""
+    simulated, _ = model.simulate(u, np.zeros(y.shape), 1.0)
+    return tuple(
+        fit_percent(y[:, i], simulated[:, i]) if stable else None
+        for i, stable in enumerate(model.stable_outputs)
+    )

@@ -1,0 +1,93 @@
+"""Many experiments on the true system: simulate each from rest, and identify it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import BatchEstimate, fit_batch, identify
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.monte_carlo.excitations import Excitation
+from inputdesign_cli.monte_carlo.trials import Trials
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class TrialJob:
+    """What all batches of one study share.
+
+    Attributes:
+        true: the true system and the length of its experiment.
+        model: of which the structure is estimated; the search begins at its parameters.
+        step: time between samples in the unit of the experiment's frequencies.
+    """
+
+    true: Experiment
+    model: Model
+    excitation: Excitation
+    step: float
+
+
+def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
+    """Simulate a batch of experiments from rest on the true system and identify each of them.
+
+    The noise is drawn first, so that it is the same for every excitation. Runs where the search does not
+    settle are repeated from several starts. Prior information enters as an estimate from earlier data would:
+    with an error of its own in each run.
+    """
+    true, system = job.true, job.true.model
+    e = rng.standard_normal((runs, true.samples, system.outputs)) @ np.linalg.cholesky(system.covariance).T
+    r = job.excitation.draw(runs, true.samples, rng)
+    if true.loop is None:
+        u_r, u = r, r
+        y_r, y_e = system.simulate(r, e, job.step)
+    else:
+        (y_r, u_r), (y_e, u_e) = true.loop.signals(r, 0.0 * e), true.loop.signals(0.0 * r, e)
+        u = u_r + u_e
+    y = y_r + y_e
+    found = _again_where_lost(job, u, y, fit_batch(job.model, u, y, job.step, start=job.model.theta))
+    theta = found.theta
+    if true.prior is not None and system.names == job.model.names:
+        theta = _with_prior(found, true.prior, system.theta, rng)
+    caused = {"input": u_r, "output": y_r, "excitation": r}
+    power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
+    total = {"input": _mean_squares(u), "output": _mean_squares(y)}
+    return Trials(true, job.model, theta, found.converged, power, total, first=np.array(r[0]))
+
+
+def _again_where_lost(job: TrialJob, u: Array, y: Array, found: BatchEstimate) -> BatchEstimate:
+    """The same, each run whose search did not settle estimated anew from several starts."""
+    theta, noise, information = found.theta.copy(), found.noise.copy(), found.information.copy()
+    converged, steps = found.converged.copy(), found.steps.copy()
+    feedback = job.true.loop is not None
+    for run in np.flatnonzero(~converged):
+        try:
+            other = identify(job.model, u[run], y[run], job.step, start=job.model.theta, feedback=feedback)
+        except SpecError:  # the noise of this run leaves some parameter without an estimate
+            continue
+        theta[run], noise[run], information[run] = other.theta, other.noise, other.information
+        converged[run], steps[run] = other.converged, other.steps
+    return BatchEstimate(theta, noise, information, converged, steps)
+
+
+def _with_prior(found: BatchEstimate, prior: Array, centre: Array, rng: np.random.Generator) -> Array:
+    """Estimates (runs, k) combined with earlier ones.
+
+    Args:
+        prior: the information (k, k) of the earlier estimates, which may be singular.
+        centre: (k,), about which they scatter.
+    """
+    values, vectors = np.linalg.eigh(prior)
+    root: NDArray[np.float64] = vectors * np.sqrt(np.maximum(values, 0.0))
+    earlier = prior @ centre + rng.standard_normal(found.theta.shape) @ root.T
+    own = np.einsum("rij,rj->ri", found.information, found.theta)
+    return np.linalg.solve(found.information + prior, (own + earlier)[:, :, None])[:, :, 0]
+
+
+def _mean_squares(x: Array) -> list[float]:
+    """Channel by channel over all runs (runs, samples, channels)."""
+    return [float(value) for value in np.mean(x**2, axis=(0, 1))]

@@ -1,0 +1,50 @@
+"""Transfer matrices in s driven by samples: what happens between the samples, exactly.
+
+Everything is at rest before the record. With a hold, outputs are those of the plant behind it. Without, what
+is applied is the band-limited interpolation of the samples and of zeros around them, as many on each side,
+and the outputs are read at the same instants. Both by FFT: an entry is one chain of states in time, of which
+its output and all its gradients are linear combinations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.held import HeldEntry
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class Intersample:
+    """Instants `sample_time` apart between which signals are held (`hold`), or band-limited."""
+
+    sample_time: float
+    hold: bool
+
+    def entry(self, numerator: Array, denominator: Array) -> HeldEntry:
+        """A transfer function in s, ascending coefficients, at these instants."""
+        return HeldEntry.of(numerator, denominator, self.sample_time)
+
+    def states(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
+        """The states (.., N, 2 order) of an entry that samples (.., N) drive from rest.
+
+        Measured outputs are never held, whatever the input is.
+        """
+        samples = signal.shape[-1]
+        length = 2 * scipy.fft.next_fast_len(samples, real=True)
+        angles = 2.0 * np.pi * np.arange(length // 2 + 1) / length
+        z = np.exp(1j * angles)
+        states = entry.states(z) if hold else entry.interpolated_states(angles / self.sample_time)
+        states = entry.forgetting(states, z, samples)
+        transform = scipy.fft.rfft(signal, length, axis=-1)
+        driven = scipy.fft.irfft(transform[..., None] * states, length, axis=-2)
+        return np.asarray(driven[..., :samples, :])
+
+    def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
+        """The output (.., N) of an entry that samples u (.., N) drive."""
+        driven = self.states(entry, u, hold=self.hold)
+        return np.asarray(entry.direct * u + driven @ entry.gain)

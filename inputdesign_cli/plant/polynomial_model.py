@@ -1,0 +1,271 @@
+"""Polynomial plants with several inputs and outputs: G, H and their gradients.
+
+The five-polynomial form A y = (B/F) u + (C/D) e ([ljung-1999], Section 4.2) with a matrix of B and F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label
+from inputdesign_cli.plant.polynomial import (
+    Array,
+    ComplexArray,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
+from inputdesign_cli.plant.simulation import caused_by_inputs, caused_by_noise
+
+Rows = tuple[tuple[Array, ...], ...]
+
+
+@dataclass(frozen=True)
+class PolynomialModel(Parametrised):
+    """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
+
+    A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. An
+    entry B_ij = 0 has no parameters. Otherwise the rules and names are those of `PolynomialModel`, with
+    output and input in brackets: `b1[2,1]`, `a1[2]`; common coefficients go without: `a1`.
+    """
+
+    B: Rows
+    A: tuple[Array, ...]
+    F: Rows
+    C: tuple[Array, ...]
+    D: tuple[Array, ...]
+    covariance: Array
+
+    continuous = False
+
+    @classmethod
+    def single(
+        cls,
+        B: ArrayLike,
+        *,
+        A: ArrayLike = (1.0,),
+        C: ArrayLike = (1.0,),
+        D: ArrayLike = (1.0,),
+        F: ArrayLike = (1.0,),
+        variance: float = 1.0,
+    ) -> PolynomialModel:
+        """One input and one output."""
+        a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
+        return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
+
+    @property
+    def outputs(self) -> int:
+        return len(self.B)
+
+    @property
+    def inputs(self) -> int:
+        return len(self.B[0])
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All free coefficients: those of A, B, C, D, F in turn."""
+        found: list[Parameter] = []
+        for letter in "abcdf":
+            if letter in "bf":
+                found += self._entry_parameters(letter)
+            else:
+                found += self._row_parameters(letter, {"a": self.A, "c": self.C, "d": self.D}[letter])
+        return tuple(found)
+
+    def _entry_parameters(self, letter: str) -> list[Parameter]:
+        found = []
+        single = self.outputs == self.inputs == 1
+        for i in range(self.outputs):
+            for j in range(self.inputs):
+                if not np.any(self.B[i][j]):
+                    continue
+                first = int(np.flatnonzero(self.B[i][j])[0]) if letter == "b" else 1
+                values = self.B[i][j] if letter == "b" else self.F[i][j]
+                label = entry_label(i, j, single=single)
+                found += [
+                    Parameter(letter, lag, ((i, j),), label, float(values[lag]))
+                    for lag in range(first, len(values))
+                ]
+        return found
+
+    def _row_parameters(self, letter: str, rows: Sequence[Array]) -> list[Parameter]:
+        found = []
+        for i, values in enumerate(rows):
+            common = len(rows) == 1
+            outputs = range(self.outputs) if common else [i]
+            places = (
+                tuple((o, j) for o in outputs for j in range(self.inputs))
+                if letter == "a"
+                else tuple((o, o) for o in outputs)
+            )
+            label = "" if common else f"[{i + 1}]"
+            found += [
+                Parameter(letter, lag, places, label, float(values[lag])) for lag in range(1, len(values))
+            ]
+        return found
+
+    @cached_property
+    def active(self) -> tuple[tuple[int, int], ...]:
+        """The entries (output, input) of G that are not zero."""
+        places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
+        return tuple((i, j) for i, j in places if np.any(self.B[i][j]))
+
+    @cached_property
+    def _active(self) -> frozenset[tuple[int, int]]:
+        return frozenset(self.active)
+
+    @cached_property
+    def in_plant(self) -> NDArray[np.bool_]:
+        return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
+
+    def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
+        """A, C or D as one polynomial an output, a common one repeated."""
+        return tuple(rows) * self.outputs if len(rows) == 1 else tuple(rows)
+
+    def _row(self, rows: Sequence[Array], output: int) -> Array:
+        return rows[0] if len(rows) == 1 else rows[output]
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        polynomials = [*self.A, *self.C, *self.D, *(p for row in self.F for p in row)]
+        return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        polynomials = (self._row(self.A, output), self.F[output][input], self.B[output][input])
+        return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        q = unit_circle(w)
+        return self._entries(q, lambda i, j: evaluate(self.B[i][j], q) / self._denominator(q, i, j))
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
+        q = unit_circle(w)
+        H = np.zeros((q.size, self.outputs, self.outputs), dtype=complex)
+        for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
+            H[:, i, i] = evaluate(c, q) / (evaluate(a, q) * evaluate(d, q))
+        return H
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Whether an entry is a fraction of two polynomials that are affine in theta."""
+        return len(self._row(self.A, output)) == 1 or len(self.F[output][input]) == 1
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as such a fraction, gradients (n, k), where `is_fraction`."""
+        q = unit_circle(w)
+        above = np.zeros((q.size, len(self.parameters)), dtype=complex)
+        below = np.zeros_like(above)
+        for index, parameter in enumerate(self.parameters):
+            if parameter.letter in "abf" and (output, input) in parameter.places:
+                gradient = above if parameter.letter == "b" else below
+                gradient[:, index] = q**parameter.power
+        numerator = evaluate(self.B[output][input], q)
+        return Fraction(numerator, self._denominator(q, output, input), above, below)
+
+    def _denominator(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
+        return evaluate(self._row(self.A, i), q) * evaluate(self.F[i][j], q)
+
+    def _entries(self, q: ComplexArray, entry: Callable[[int, int], ComplexArray]) -> ComplexArray:
+        rows = [[entry(i, j) for j in range(self.inputs)] for i in range(self.outputs)]
+        return np.moveaxis(np.array(rows, dtype=complex), -1, 0)
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        q = unit_circle(w)
+        gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        factors: dict[tuple[str, int, int], ComplexArray] = {}
+        for i, j in self.active:
+            A, B, F = (evaluate(p, q) for p in (self._row(self.A, i), self.B[i][j], self.F[i][j]))
+            AF = A * F
+            factors |= {("a", i, j): -B / (A * AF), ("b", i, j): 1.0 / AF, ("f", i, j): -B / (F * AF)}
+        for index, parameter in enumerate(self.parameters):
+            if parameter.letter in "abf":
+                shift = q**parameter.power
+                for i, j in parameter.places:
+                    if (i, j) in self._active:
+                        gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
+        return gradient
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        G = self.plant_at(w)
+        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (G.shape[0], self.inputs, self.inputs))
+        return self.prediction_gradient(w, G, u, np.zeros_like(G))
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        H = self.noise_at(w)
+        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), H.shape)
+        return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j).
+
+        Written with the polynomials of the predictor alone, as `PolynomialModel.prediction_gradient`.
+        """
+        q = unit_circle(w)
+        gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)
+        C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
+        noise = {
+            (letter, i): (factor[:, None] * source[:, i])
+            for i in range(self.outputs)
+            for letter, factor, source in (
+                ("a", -D[i] / C[i], y),
+                ("c", 1.0 / C[i], e),
+                ("d", -1.0 / D[i], e),
+            )
+        }
+        plant: dict[tuple[str, int, int], ComplexArray] = {}
+        for i, j in self.active:
+            F = evaluate(self.F[i][j], q)
+            filtered = D[i] / (C[i] * F)
+            plant["b", i, j] = filtered[:, None] * u[:, j]
+            plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
+        for index, parameter in enumerate(self.parameters):
+            shift = (q**parameter.power)[:, None]
+            if parameter.letter in "bf":
+                i, j = parameter.places[0]
+                gradient[:, index, i] = shift * plant[parameter.letter, i, j]
+                continue
+            for i in {place[0] for place in parameter.places}:
+                gradient[:, index, i] = shift * noise[parameter.letter, i]
+        return gradient
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialModel:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        B, F = ([[entry.copy() for entry in row] for row in rows] for rows in (self.B, self.F))
+        common = {"a": self.A, "c": self.C, "d": self.D}
+        rows = {letter: [polynomial.copy() for polynomial in given] for letter, given in common.items()}
+        for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):
+            for i, j in parameter.places:
+                if parameter.letter in rows:
+                    own = rows[parameter.letter]
+                    own[0 if len(own) == 1 else i][parameter.power] = value
+                else:
+                    (B if parameter.letter == "b" else F)[i][j][parameter.power] = value
+        return PolynomialModel(
+            tuple(tuple(row) for row in B),
+            tuple(rows["a"]),
+            tuple(tuple(row) for row in F),
+            tuple(rows["c"]),
+            tuple(rows["d"]),
+            self.covariance if covariance is None else covariance,
+        )
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        A, C, D = (self.per_output(rows) for rows in (self.A, self.C, self.D))
+        return caused_by_inputs(A, self.B, self.F, u), caused_by_noise(A, C, D, e)
+
+    @property
+    def stable_outputs(self) -> tuple[bool, ...]:
+        """Output by output, whether its row of G is stable."""
+        rows = [
+            [a, *(f for b, f in zip(bs, fs, strict=True) if np.any(b))]
+            for a, bs, fs in zip(self.per_output(self.A), self.B, self.F, strict=True)
+        ]
+        return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)

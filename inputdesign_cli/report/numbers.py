@@ -1,0 +1,40 @@
+"""Numbers and names as people read them, and tables of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from inputdesign_cli.runs.results import Json
+
+# A line of a table of facts: name, value, and a note that may be empty.
+Fact = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A table: the first column holds names, the others numbers, what follows a line break being a remark."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def shown(value: Json) -> str:
+    """A number with seven digits."""
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
+
+
+def listed(values: Json, *, digits: int = 7) -> str:
+    """A number, or several with commas between them."""
+    each = values if isinstance(values, list) else [values]
+    return ", ".join(f"{value:.{digits}g}" if isinstance(value, float) else str(value) for value in each)
+
+
+def spoken(name: str) -> str:
+    """A name of the program as words."""
+    return name.replace("_", " ")
+
+
+def provenance(environment: Mapping[str, Json], more: Iterable[Fact] = ()) -> list[Fact]:
+    """Versions, and what else tells where numbers come from."""
+    return [*more, *((name, str(version), "") for name, version in environment.items() if version)]

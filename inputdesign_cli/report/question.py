@@ -1,0 +1,196 @@
+"""A spec in words: the system, the experiment and what is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from inputdesign_cli.report.numbers import spoken
+from inputdesign_cli.specification import PolynomialPlant, RegressionPlant, Spec, parse_spec
+from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
+
+_SPECTRA = {
+    "white": "white excitation",
+    "fir": "spectra of finite impulse response type",
+    "multisine": "sums of sinusoids on given frequencies",
+    "free": "every spectrum",
+    "polynomial": "spectra that are polynomials in frequency",
+    "pointwise": "spectra given point by point on a grid",
+    "moments": "second moments of the regressors",
+}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a spec asks, in words, and what a page has to know of the spec beside them."""
+
+    title: str
+    sentences: tuple[str, ...]  # the system, the experiment, what is asked
+    time_unit: str
+    closed_loop: bool
+    regression: bool
+    linearised: bool  # r_u is of first order in the parameters
+    asked: frozenset[str]  # the keys under `accuracy`
+    family: str  # the type of the spectrum; empty for a given one
+    seed: int  # of the signal
+
+
+def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:
+    """The question of the spec of a run.
+
+    Args:
+        text: the spec as resolved (YAML).
+        file: its name in messages.
+        verb: the command that answered.
+
+    Raises:
+        SpecError: `text` is no spec of this version.
+    """
+    spec = parse_spec(text, file)
+    error = spec.accuracy.model_error
+    sentences = [_system(spec), _experiment(spec), *_accuracy(spec), *_limits(spec), _goal(spec, verb)]
+    return Question(
+        title=spec.title or "",
+        sentences=tuple(sentences),
+        time_unit=spec.time_unit,
+        closed_loop=spec.closed_loop,
+        regression=isinstance(spec.plant, RegressionPlant),
+        linearised=error is None or error.region != "ellipsoid",
+        asked=frozenset(name for name, value in spec.accuracy if value is not None),
+        family=_family(spec),
+        seed=spec.signal.seed or 0,
+    )
+
+
+def _family(spec: Spec) -> str:
+    stated = spec.spectrum
+    return "" if stated is None or isinstance(stated, GivenSpectrum) else stated.type
+
+
+def _system(spec: Spec) -> str:
+    plant = spec.plant
+    if isinstance(plant, RegressionPlant):
+        return "The system is a linear regression with neglected regressors."
+    size = f"{_count(plant.inputs, 'input')} and {_count(plant.outputs, 'output')}"
+    kind = _structure(spec) if isinstance(plant, PolynomialPlant) else "continuous-time"
+    clock = f", sampled every {spec.sample_time:g} {spec.time_unit}" if plant.sampled else ""
+    article = "an" if kind[0] in "AEFIO" else "a"
+    return f"The system is {article} {kind} system with {size}{clock}."
+
+
+def _structure(spec: Spec) -> str:
+    plant = spec.plant
+    assert isinstance(plant, PolynomialPlant)
+    dynamic = {
+        "A": plant.A != (1.0,),
+        "C": spec.noise.C != (1.0,),
+        "D": spec.noise.D != (1.0,),
+        "F": plant.F is not None,
+    }
+    present = "".join(name for name, there in dynamic.items() if there)
+    names = {
+        "": "finite impulse response", "A": "ARX", "AC": "ARMAX", "F": "output-error",
+        "CF": "Box-Jenkins", "DF": "Box-Jenkins", "CDF": "Box-Jenkins",
+    }  # fmt: skip
+    return names.get(present, "general polynomial")
+
+
+def _experiment(spec: Spec) -> str:
+    samples = spec.experiment.samples
+    length = f"{samples} samples" if samples > 1 else "one sample, so that figures are per sample"
+    if isinstance(spec.plant, RegressionPlant):
+        return f"The experiment has {length}; the moments of its regressors are summed over all samples."
+    loop = "in closed loop, with the controller in operation" if spec.closed_loop else "in open loop"
+    if spec.designs and spec.goal == "shortest_experiment":
+        return f"The length of the experiment is sought; it runs {loop}."
+    return f"The experiment has {length}, {loop}."
+
+
+def _accuracy(spec: Spec) -> list[str]:
+    accuracy = spec.accuracy
+    sentences = []
+    error = accuracy.model_error
+    if error is not None:
+        size = (
+            f"alpha = {error.alpha:g}" if error.alpha else f"{100 * (error.probability or 0):g} % confidence"
+        )
+        if error.relative is not None:
+            bound = f"{100 * error.relative:g} % of |G|"
+        elif error.absolute is not None:
+            bound = f"{error.absolute:g}"
+        elif error.table is not None:
+            bound = f"the table {error.table}"
+        else:
+            bound = "what keeps the sensitivity of the loop within its bound"
+        band = "every frequency"
+        if error.band is not None:
+            low, high = error.band
+            band += f" from {low:g} to {high:.6g} rad/{spec.time_unit}"
+        sentences.append(
+            f"At {band}, the error r_u of the model ({size}) must not exceed the admissible error r_adm: "
+            f"{bound}."
+        )
+    others = {
+        "information": "The information matrix must exceed a given matrix.",
+        "application": "The confidence region of the model must lie where the application tolerates it.",
+        "weighted_variance": "The weighted variance of the frequency response is bounded.",
+        "standard_deviation": "Standard deviations of parameters are bounded.",
+        "closed_loop_error": "A controller is designed on the model; what counts is the error of its loop.",
+    }
+    sentences += [others[name] for name, value in accuracy if name in others and value is not None]
+    if accuracy.mean_squared_error is not None:
+        target = accuracy.mean_squared_error.target
+        most = "is to be small" if target is None else f"must not exceed {target:g}"
+        sentences.append(
+            f"The mean squared error of the estimate, bias and variance together, {most}, whatever the "
+            f"neglected parameters up to a norm of {accuracy.mean_squared_error.neglected_norm:g}."
+        )
+    if accuracy.criterion is not None:
+        sentences.append(f"What counts is criterion {accuracy.criterion} of the information matrix.")
+    return sentences
+
+
+def _limits(spec: Spec) -> list[str]:
+    names = [spoken(name) for name, value in spec.limits if value is not None]
+    return [f"Limits hold for: {', '.join(names)}."] if names else []
+
+
+def _goal(spec: Spec, verb: str) -> str:
+    if verb == "identify":
+        return "Asked: the model that explains the recorded data, and how sure it is."
+    if verb == "assess":
+        return "Asked: do the recorded data meet this accuracy; if not, which experiment makes up for it?"
+    if not spec.designs or verb == "analyse":
+        return "Asked: what accuracy the given excitation buys."
+    family, stated = _SPECTRA.get(_family(spec), ""), spec.spectrum
+    among = f" among {family}" if family else ""
+    if isinstance(stated, FirSpectrum | PolynomialSpectrum) and stated.order:
+        among += f" of order {stated.order}"
+    if spec.goal == "best_accuracy":
+        return f"Asked: {_best(spec)}{among}."
+    if spec.goal == "shortest_experiment":
+        return f"Asked: the shortest experiment that does it{among}."
+    if isinstance(spec.plant, RegressionPlant):
+        return f"Asked: the least energy that does it{among}; the energy is their trace."
+    weights = {"input": spec.cost.input_power, "output": spec.cost.output_power}
+    weights["excitation"] = spec.cost.excitation_power
+    cost = " + ".join(
+        f"{'' if weight == 1 else f'{weight:g} × '}{name} power"
+        for name, weight in weights.items()
+        if isinstance(weight, int | float) and weight
+    )
+    return f"Asked: the cheapest experiment that does it{among}; its cost is the {cost or 'weighted power'}."
+
+
+def _best(spec: Spec) -> str:
+    accuracy = spec.accuracy
+    if accuracy.closed_loop_error is not None:
+        return "the experiment after which the loop errs least"
+    if accuracy.mean_squared_error is not None:
+        return "the least error"
+    if accuracy.criterion is not None:
+        return "the experiment that teaches most"
+    return "the smallest multiple of what is admitted that the limits allow"
+
+
+def _count(n: int, what: str) -> str:
+    return f"{'one' if n == 1 else n} {what}{'' if n == 1 else 's'}"

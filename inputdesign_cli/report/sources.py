@@ -1,0 +1,84 @@
+"""What the numbers of a run rest on, and whose methods gave them."""
+
+from __future__ import annotations
+
+from inputdesign_cli.report.question import Question
+from inputdesign_cli.runs.results import Result
+
+_LEAST_COSTLY = (
+    "X. Bombois and G. Scorletti, Design of least costly identification experiments, Journal Européen des "
+    "Systèmes Automatisés 46 (2012) 587-610."
+)
+_ASYMPTOTIC = (
+    "C. R. Rojas, H. Hjalmarsson and R. Hildebrand, MIMO experiment design based on asymptotic model order "
+    "theory."
+)
+_MEAN_SQUARED = (
+    "D. Eckhard, H. Hjalmarsson, C. R. Rojas and M. Gevers, Mean-squared error experiment design for linear "
+    "regression models."
+)
+_SPECTRAL = (
+    "M. Mohan, Mithun and B. Bhikkaji, Optimal input design for system identification using spectral "
+    "decomposition."
+)
+_EQUIVALENCE = (
+    "J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canadian Journal of Mathematics "
+    "12 (1960) 363-366: the idea behind the bound over every spectrum."
+)
+_PREDICTION_ERROR = (
+    "L. Ljung, System Identification: Theory for the User, second edition, Prentice Hall, 1999: prediction "
+    "errors and their asymptotic covariance."
+)
+
+
+def assumptions(question: Question, result: Result) -> list[str]:
+    """What the numbers rest on, beyond the arithmetic."""
+    rests = "The design is best" if "objective" in result else "The figures hold"
+    said = [
+        f"The plant and the noise are as the spec has them. {rests} for this nominal system; the accuracy "
+        "of a model of another system may differ.",
+    ]
+    if "worst_ratio" in result.get("model_error", {}):
+        first = " and of first order in the parameters" if question.linearised else ""
+        said.append(
+            "The covariance of the estimate is the asymptotic one of a consistent and efficient estimate; "
+            f"r_u is therefore asymptotic in the number of samples{first}."
+        )
+    objective = result.get("objective", {})
+    if "lower_bound" in objective or "upper_bound" in objective:
+        said.append(
+            "The proved bounds are values of dual points, computed in double precision; they hold to the "
+            "rounding of integrals and eigenvalues, and of maxima over frequency sought on a refined grid."
+        )
+    if question.closed_loop:
+        said.append(
+            "Powers are those that the excitation r adds to the normal operation of the loop; what the noise "
+            "causes anyway is not counted."
+        )
+    if "worst_ratio" in result.get("signal", {}):
+        said.append(
+            "The worst ratio of the signal is computed from the very samples of signal.csv, which start "
+            "from rest; the spectrum's own figures hold for a stationary signal of that spectrum."
+        )
+    if result.get("solver", {}).get("method") == "lmi":
+        said.append("The accuracy was imposed on a grid of frequencies: between them it may be violated.")
+    return said
+
+
+def citations(question: Question, result: Result) -> list[str]:
+    """The sources of the methods that were used."""
+    kind = result.get("objective", {}).get("kind")
+    cited = []
+    if kind in ("least_cost", "shortest_experiment") and not question.regression:
+        cited.append(_LEAST_COSTLY)
+    if "closed_loop_error" in question.asked:
+        cited.append(_ASYMPTOTIC)
+    if "mean_squared_error" in question.asked:
+        cited.append(_MEAN_SQUARED)
+    if question.family == "polynomial":
+        cited.append(_SPECTRAL)
+    if "any_spectrum_bound" in result.get("objective", {}):
+        cited.append(_EQUIVALENCE)
+    if not question.regression:
+        cited.append(_PREDICTION_ERROR)
+    return cited

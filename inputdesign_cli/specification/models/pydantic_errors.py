@@ -1,0 +1,194 @@
+"""Pydantic's errors as diagnostics in plain words, each with the path of the key that it is about."""
+
+from __future__ import annotations
+
+import math
+import typing
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from inputdesign_cli.specification.models.annotations import Declared, declared_at, sections_in
+from inputdesign_cli.specification.models.path_diagnostic import CARRIER, PathDiagnostic
+from inputdesign_cli.specification.models.section import FAMILIES, TAG, Section
+from inputdesign_cli.specification.wording import choices, describe, nearest, show, unknown_word
+from inputdesign_cli.specification.yaml.places import Path, format_key
+from inputdesign_cli.specification.yaml.scalars import clip, why_not_number
+
+# Pydantic's name of a bound that a number breaks -> our words.
+_BOUNDS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+# Where a type says nothing of itself: what it is called, and what to write.
+_DEFAULTS = {
+    "float_type": ("a number", ""),
+    "int_type": ("a whole number", ""),
+    "string_type": ("a text", "put it in quotes"),
+    "tuple_type": ("a list", "write [.., ..]"),
+    "model_type": ("a mapping of keys", 'write "key: value" pairs below it'),
+    "dict_type": ("a mapping", 'write "key: value" pairs below it'),
+}
+
+_TYPE = f"{TAG}type: "
+"""How the tags begin of alternatives that a key `type` tells apart."""
+
+
+def translate(error: ValidationError, data: Any, root: type[Section]) -> list[PathDiagnostic]:
+    """The diagnostics behind a pydantic error.
+
+    Args:
+        error: What `root.model_validate(data)` raised.
+        data: Plain data, as a file holds them.
+        root: The model that the data were read by.
+
+    Returns:
+        Diagnostics with absolute paths, which exist in `data` up to their last step.
+    """
+    details = error.errors(include_url=False)
+    return [shorten(found, data) for detail in details for found in _translate(detail, root)]
+
+
+def shorten(diagnostic: PathDiagnostic, data: Any) -> PathDiagnostic:
+    """Drop the steps that a shorthand added: `limits.input_power: 5` has no `limits.input_power.max`."""
+    kept: list[str | int] = []
+    for step in diagnostic.path:
+        if isinstance(data, list):
+            if isinstance(step, str):
+                continue
+            kept.append(step)
+            data = data[step] if step < len(data) else None
+        elif isinstance(data, dict):
+            kept.append(step)
+            data = data.get(str(step))
+        else:
+            break
+    return replace(diagnostic, path=tuple(kept))
+
+
+def _translate(error: ErrorDetails, root: type[Section]) -> list[PathDiagnostic]:
+    location, kind, context = error["loc"], error["type"], error.get("ctx", {})
+    path = tuple(step for step in location if not (isinstance(step, str) and step.startswith(TAG)))
+    if kind == CARRIER:
+        return [replace(found, path=path + found.path) for found in context[CARRIER]]
+    if kind == "extra_forbidden":
+        return [_unknown_key(path, declared_at(root, location[:-1]).section, root)]
+    if kind == "missing":
+        return [_missing(path, declared_at(root, location[:-1]).section)]
+    if kind == "too_short" and error["input"]:
+        return []  # pydantic does not count the items that are wrong, which have errors of their own
+    declared = declared_at(root, location)
+    types = [tag.removeprefix(_TYPE) for tag in declared.alternatives if tag.startswith(_TYPE)]
+    if types and isinstance(error["input"], dict):
+        return [_unknown_type(path, types, error["input"])]
+    return [PathDiagnostic(*_wrong_value(kind, error["input"], context, declared), path)]
+
+
+def _wrong_value(kind: str, value: Any, context: dict[str, Any], declared: Declared) -> tuple[str, str, str]:
+    """Code, message and hint for a value that is not what its key wants."""
+    hint = declared.wording.hint
+    usual, advice = _DEFAULTS.get(kind, ("something else", ""))
+    what = declared.wording.what or usual
+    if kind in ("float_type", "int_type", "finite_number"):
+        return _no_number(value, what, hint)
+    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        ((bound, limit),) = context.items()
+        if bound == "lt" and limit == 1 and value < 100:
+            hint = f"write {value / 100:g} for {value:g} percent"
+        return "out-of-range", f"{{key}} must be {_BOUNDS[bound]} {show(limit)}, not {show(value)}", hint
+    if kind == "literal_error":
+        words = [describe(word) if word is True else word for word in typing.get_args(declared.type)]
+        message, near = unknown_word(value, words)
+        return "unknown-word", message, near or hint
+    if kind == "bool_type":
+        return "unknown-word", f"{{key}} must be true or false, not {describe(value)}", "write true or false"
+    if kind == "too_short":
+        empty = describe(value).replace("a ", "an empty ")
+        return "wrong-shape", f"{{key}} is {empty}; it needs at least one entry", hint
+    # A list that is nested wrongly is a list; that it is one says nothing.
+    mistaken = kind == "union_tag_invalid" and isinstance(value, list)
+    wrong = f"{{key}} must be {what}" + ("" if mistaken else f", not {describe(value)}")
+    if kind in ("string_type", "string_pattern_mismatch"):
+        return "not-a-text", wrong, hint or advice
+    if isinstance(value, int | float) and not isinstance(value, bool) and kind == "tuple_type":
+        advice = f"write [{show(value)}]"
+    return "wrong-shape", wrong, hint or advice
+
+
+def _no_number(value: Any, what: str, hint: str) -> tuple[str, str, str]:
+    if isinstance(value, str):
+        code, reason, mend = why_not_number(value)
+        return code, f"{{key}} {reason}", mend or hint
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return "not-a-number", f"{{key}} must be {what}, not {describe(value)}", hint
+    if abs(value) >= 2**1024 or math.isnan(value):
+        return "not-finite", "{key} must be finite", "numbers must stay below 1.8e308"
+    below = math.floor(value)
+    message = f"{{key}} must be {what}, not {show(value)}"
+    return "not-a-whole-number", message, f"write {below} or {below + 1}"
+
+
+def _unknown_type(path: Path, types: list[str], value: dict[str, Any]) -> PathDiagnostic:
+    """A mapping whose `type` is missing or names none of the alternatives."""
+    if "type" in value:
+        message, hint = unknown_word(value["type"], types)
+        return PathDiagnostic("unknown-word", message, hint, (*path, "type"))
+    hint = f"write type: {types[0]}; the types are {', '.join(types)}"
+    return PathDiagnostic("missing-key", "{key} needs a type", hint, path)
+
+
+def _missing(path: Path, model: type[Section] | None) -> PathDiagnostic:
+    key = str(path[-1])
+    field = model.model_fields.get(key) if model else None
+    owner = format_key(path[:-1]) or "the spec"
+    if model is not None and model.phrase.startswith("type: "):
+        owner = f"{owner} of {model.phrase}"
+    hint = f"add {key}"
+    if field and field.examples:
+        example = yaml.safe_dump({key: field.examples[0]}, default_flow_style=None, sort_keys=False)
+        hint = f"for example {example.strip()}"
+    elif field and field.description:
+        hint = f"add {key}: {field.description}"
+    return PathDiagnostic("missing-key", f'{owner} needs "{key}"', hint.rstrip("."), path)
+
+
+def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -> PathDiagnostic:
+    key, known = str(path[-1]), list(model.model_fields) if model else []
+    owner = format_key(path[:-1]) or root.phrase or "this file"
+    siblings = FAMILIES.get(model.family, []) if model else []
+    others = [sibling.phrase for sibling in siblings if key in sibling.model_fields]
+    if others and model:
+        return PathDiagnostic(
+            "unsuitable-key",
+            f"{format_key(path)} does not go with {model.phrase}",
+            f'"{key}" belongs to {choices(list(dict.fromkeys(others)))}; remove it, or change to that',
+            path,
+            at_key=True,
+        )
+    near, homes = nearest(key, known), _homes(root).get(key, [])
+    hint = f"the keys of {owner} are {', '.join(known)}" if known else "remove it"
+    if 0 < len(homes) <= 3 and not (near and near.lower() == key.lower()):
+        hint = f"{key} belongs {choices(homes)}"
+    elif near:
+        hint = f'did you mean "{near}"?'
+    message = f"{clip(key)} is not a key of {owner}"
+    return PathDiagnostic("unknown-key", message, hint, path, at_key=True, meant=near or "")
+
+
+@cache
+def _homes(root: type[Section]) -> dict[str, list[str]]:
+    """Every key below the root -> where it belongs, for a key that was written elsewhere."""
+    homes: dict[str, set[str]] = {}
+    for path, model in _walk(root, ""):
+        for name in model.model_fields:
+            homes.setdefault(name, set()).add(f"under {path}" if path else "at the top level")
+    return {name: sorted(home) for name, home in homes.items()}
+
+
+def _walk(model: type[Section], path: str) -> Iterator[tuple[str, type[Section]]]:
+    yield path, model
+    for name, field in model.model_fields.items():
+        for part in sections_in(field.annotation):
+            yield from _walk(part, f"{path}.{name}" if path else name)

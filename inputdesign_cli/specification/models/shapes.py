@@ -1,0 +1,92 @@
+"""Polynomials alone, in a list, or in rows (outputs) of columns (inputs), and the checks of such shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.polynomials import Polynomial, product
+from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+
+
+def as_matrix(value: tuple) -> PolynomialMatrix:
+    """One polynomial as a 1 x 1 matrix; a matrix as it is."""
+    return value if depth(value) == 3 else ((value,),)
+
+
+def per_output(value: tuple, outputs: int) -> tuple[Polynomial, ...]:
+    """One polynomial repeated for every output; a list as it is."""
+    return value if depth(value) == 2 else (value,) * outputs
+
+
+def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
+    """The numerator is not zero, and denominators for each entry have its shape."""
+    yield from check_gain(as_matrix(numerator), "numerator")
+    if depth(denominator) == 3 and size_of(denominator) != size_of(as_matrix(numerator)):
+        yield PathDiagnostic(
+            "wrong-shape",
+            "{key} must have the shape of the numerator: " + shape_words(numerator),
+            "or write one polynomial, a denominator common to all entries",
+            ("denominator",),
+        )
+
+
+def check_each(
+    value: tuple, check: Callable[[Polynomial], PathDiagnostic | None], *path: str
+) -> Iterator[PathDiagnostic]:
+    """What the check finds in each polynomial of the value at `path`."""
+    for indices, polynomial in with_paths(value):
+        if found := check(polynomial):
+            yield replace(found, path=(*path, *indices))
+
+
+def denominators_of(numerator: tuple, denominator: tuple) -> PolynomialMatrix:
+    """Denominators as rows of columns, those that are common repeated and factors multiplied out."""
+    if depth(denominator) == 3:
+        return as_matrix(denominator)
+    common = product(factor for _, factor in with_paths(denominator))
+    return tuple(tuple(common for _ in row) for row in as_matrix(numerator))
+
+
+def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
+    """Every polynomial of a nested value with the indices that lead to it."""
+    if depth(value) == 1:
+        return [((), value)]
+    return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
+
+
+def check_gain(entries: PolynomialMatrix, name: str) -> Iterator[PathDiagnostic]:
+    """Some entry is not zero."""
+    if not any(any(p) for row in entries for p in row):
+        message = "all coefficients of {key} are zero: the input has no effect"
+        yield PathDiagnostic("zero-polynomial", message, path=(name,))
+
+
+def size_of(value: tuple) -> tuple[int, int]:
+    """The numbers of rows and columns."""
+    entries = as_matrix(value)
+    return len(entries), len(entries[0])
+
+
+def shape_words(value: tuple) -> str:
+    """The shape in a sentence."""
+    if depth(value) == 1:
+        return "one list of coefficients"
+    rows, columns = size_of(value)
+    return f"{rows} x {columns} lists of coefficients"
+
+
+def check_proper(
+    numerator: Polynomial, denominator: Polynomial, *path: str | int
+) -> Iterator[PathDiagnostic]:
+    """In s, descending: the degree of the numerator is at most that of the denominator."""
+    zeros = next((i for i, c in enumerate(numerator) if c), len(numerator) - 1)
+    above, below = len(numerator) - zeros - 1, len(denominator) - 1
+    if above > below:
+        yield PathDiagnostic(
+            "improper-transfer",
+            f"{{key}} has degree {above} in s, more than its denominator ({below}): the system is not proper",
+            "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other",
+            path,
+        )

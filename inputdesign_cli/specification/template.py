@@ -1,0 +1,111 @@
+"""A spec before validation: what a sweep varies many times over, cheaper than reading the file each time."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from pydantic import ValidationError
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification.loading import parse_spec
+from inputdesign_cli.specification.models.pydantic_errors import translate
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.sweep import Sweep
+from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.yaml.overrides import apply_overrides, compose
+from inputdesign_cli.specification.yaml.places import Places
+from inputdesign_cli.specification.yaml.reader import Tree, read
+from inputdesign_cli.specification.yaml.writer import fingerprint
+
+
+@dataclass(frozen=True)
+class SpecTemplate:
+    """The text of a spec, where it came from, the overrides that hold for all variants, and their data."""
+
+    text: str
+    file: str
+    folder: FilePath
+    overrides: tuple[str, ...]
+    data: dict[str, Any]
+
+    def spec(self, overrides: Sequence[str]) -> Spec:
+        """The checked spec of one variant, without the `sweep` block.
+
+        Raises:
+            SpecError: As `load_spec`.
+        """
+        every = [*self.overrides, *overrides, "sweep=null"]
+        return parse_spec(self.text, self.file, every, folder=self.folder)
+
+    def variant(self, overrides: Sequence[str]) -> dict[str, Any]:
+        """The plain data of one variant, without the `sweep` block; nothing is checked but the overrides.
+
+        Raises:
+            SpecError: An override that cannot be applied.
+        """
+        tree = Tree(copy.deepcopy(self.data), Places())
+        apply_overrides(tree, [*overrides, "sweep=null"])
+        if tree.diagnostics:
+            raise SpecError(tree.diagnostics)
+        data: dict[str, Any] = tree.data
+        return data
+
+    def digest(self, data: dict[str, Any]) -> str:
+        """SHA-256 of what a variant says and of the contents of every file that it names."""
+        files = self.files(data)
+        if not files:
+            return fingerprint(data)
+        contents = {name: hashlib.sha256((self.folder / name).read_bytes()).hexdigest() for name in files}
+        return fingerprint({"spec": data, "files": contents})
+
+    def files(self, data: dict[str, Any]) -> list[str]:
+        """The texts of a variant that name files which are there, as the spec writes them."""
+        return sorted({name for name in _texts(data) if (self.folder / name).is_file()})
+
+    def sweep(self) -> Sweep | None:
+        """The `sweep` block, checked; None where there is none.
+
+        Raises:
+            SpecError: With the place of all that is wrong in the block.
+        """
+        if "sweep" not in self.data:
+            return None
+        try:
+            return Sweep.model_validate(self.data["sweep"])
+        except ValidationError as error:
+            found = translate(error, self.data["sweep"], Sweep)
+            places = read(self.text, self.file).places
+            absolute = [replace(one, path=("sweep", *one.path)) for one in found]
+            raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
+
+
+def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> SpecTemplate:
+    """Read a spec file with `overrides` applied, and check nothing yet.
+
+    Raises:
+        SpecError: The file cannot be read or is no mapping in YAML, an override cannot be applied, or a
+            file cannot be included.
+    """
+    text, file = read_text(path), os.fspath(path)
+    tree = read(text, file)
+    if not isinstance(tree.data, dict):
+        parse_spec(text, file, overrides)  # says what is wrong with it
+    compose(tree, FilePath(path).parent, overrides)
+    if tree.diagnostics:
+        raise SpecError(tree.diagnostics)
+    return SpecTemplate(text, file, FilePath(path).parent, tuple(overrides), tree.data)
+
+
+def _texts(value: Any) -> list[str]:
+    """Every text in the data that could be the name of a file."""
+    if isinstance(value, dict):
+        return [text for item in value.values() for text in _texts(item)]
+    if isinstance(value, list):
+        return [text for item in value for text in _texts(item)]
+    return [value] if isinstance(value, str) and 0 < len(value) < 1000 and value.isprintable() else []

@@ -1,0 +1,82 @@
+"""Values and choices in words: "the number 5", "a, b or c", and the word that was probably meant."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+from inputdesign_cli.specification.yaml.scalars import clip
+
+# Words that people use for ours; difflib would not find them.
+_SYNONYMS = {
+    "Ts": "sample_time",
+    "dt": "sample_time",
+    "sampling_time": "sample_time",
+    "N": "samples",
+    "length": "samples",
+    "num": "numerator",
+    "den": "denominator",
+    "lambda": "variance",
+    "sigma2": "variance",
+    "sec": "s",
+    "second": "s",
+    "seconds": "s",
+    "minute": "min",
+    "minutes": "min",
+    "hour": "h",
+    "hours": "h",
+    "day": "d",
+    "days": "d",
+    "optimized": "optimised",
+    "gaussian": "filtered_noise",
+}
+
+
+def describe(value: object) -> str:
+    """A value in words: "the number 5", "a list"."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return f"the number {show(value)}"
+    if isinstance(value, str):
+        return f"the text {clip(value)}"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, dict):
+        return "a mapping"
+    return "nothing" if value is None else "something else"
+
+
+def show(value: float) -> str:
+    """A number as a person would write it."""
+    if isinstance(value, int) and (abs(value) < 10**9 or abs(value) >= 2**1024):
+        return str(value) if abs(value) < 10**9 else clip(str(value))
+    return f"{float(value):.6g}"
+
+
+def count(number: int, noun: str) -> str:
+    """A number of things: "1 input", "2 inputs"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def choices(known: Sequence[str]) -> str:
+    """Alternatives in a sentence: "a, b or c"."""
+    return known[0] if len(known) == 1 else ", ".join(known[:-1]) + " or " + known[-1]
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that was probably meant, if there is one."""
+    known = list(known)
+    if (synonym := _SYNONYMS.get(word)) in known:
+        return synonym
+    lower = {k.lower(): k for k in known}
+    flat = word[:80].lower().replace("-", "_").replace(" ", "_")
+    near = difflib.get_close_matches(flat, lower, n=1, cutoff=0.6)
+    return lower[near[0]] if near else None
+
+
+def unknown_word(value: object, known: Sequence[str]) -> tuple[str, str]:
+    """Message and hint for a value that is none of the known words."""
+    message = f"{{key}} must be {choices(known)}, not {describe(value)}"
+    near = nearest(value, known) if isinstance(value, str) else None
+    return message, f'did you mean "{near}"?' if near else ""

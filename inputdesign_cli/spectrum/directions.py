@@ -1,0 +1,96 @@
+"""Spectra over frequency: prices per direction of the channels, and integrals against tables of functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from inputdesign_cli.information import Quadrature
+from inputdesign_cli.plant import local_maxima
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.spectrum.basis import Density, Functional
+
+_NODES_AT_ONCE = 256
+_SINGULAR = 1e-13
+
+
+def matrices(density: NDArray) -> NDArray:
+    """Values (n,) of a density for one input as (n, 1, 1); Hermitian values (n, r, r) as they are."""
+    return density[:, None, None] if density.ndim == 1 else density
+
+
+def weighted_sums(table: NDArray, density: Density, rule: Quadrature, inputs: int) -> NDArray:
+    """sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r), a part of the nodes at a time."""
+    total: NDArray | float = 0.0
+    for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
+        part = slice(start, start + _NODES_AT_ONCE)
+        values = density(rule.nodes[part])
+        if inputs == 1:
+            values = values[..., None, None]
+        weighted = table[part] * rule.weights[part, None]
+        total = total + np.tensordot(weighted, values, axes=(0, 0))
+    return np.asarray(total)
+
+
+def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
+    """At each frequency the direction v with the largest v^* value v / v^* price v.
+
+    Args:
+        price, value: densities, (n,) or Hermitian (n, r, r), `price` positive.
+
+    Returns:
+        The ratios (n,) and unit directions (n, r).
+    """
+    if price.ndim == 1:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quotient = value / price
+        # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
+        return np.where(price > 0, quotient, -np.inf), np.ones((price.size, 1), dtype=complex)
+    r = price.shape[-1]
+    P = price + _SINGULAR * np.eye(r) * np.einsum("naa->na", price).real.max(axis=0, initial=0.0)
+    inverse = np.linalg.inv(np.linalg.cholesky(P))
+    ratios, vectors = np.linalg.eigh(inverse @ value @ inverse.conj().swapaxes(1, 2))
+    directions = (inverse.conj().swapaxes(1, 2) @ vectors[..., -1:])[..., 0]
+    return ratios[:, -1], directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def directed_scale(
+    price: Functional, value: Functional, grid: Array
+) -> tuple[float, Array, Array, ComplexArray]:
+    """The largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
+
+    Valid for every spectrum whatever on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of
+    some direction across the channels. What a price picks up at single frequencies only adds to it and is
+    left out; a value that does proves nothing (s = 0).
+
+    Returns:
+        s, and at the local maxima of the largest generalised eigenvalue: frequencies, ratios, directions.
+    """
+
+    def ratio(w: Array) -> Array:
+        return best_directions(price.density(w), value.density(w))[0]
+
+    peaks, heights = local_maxima(ratio, grid, ratio(grid))
+    directions = best_directions(price.density(peaks), value.density(peaks))[1]
+    top = heights.max(initial=0.0)
+    if value.concentrated:
+        return 0.0, peaks, heights, directions
+    return (np.inf if top <= 0 else 1.0 / top), peaks, heights, directions
+
+
+def first_directions(units: Array) -> ComplexArray:
+    """(number, r): along each channel, and along each pair of channels in phase and in counterphase.
+
+    Of a pair each takes part in proportion to its unit (r,); directions have length one.
+    """
+    axes = np.diag(units)
+    both = [axes[i] + sign * axes[j] for i in range(len(units)) for j in range(i) for sign in (1.0, -1.0)]
+    found = np.array([*axes, *both], dtype=complex)
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def leading_pairs(worth: NDArray, metric: NDArray, number: int) -> tuple[Array, NDArray]:
+    """The `number` largest generalised eigenvalues, ascending, and their vectors as columns."""
+    first = max(len(worth) - number, 0)
+    return scipy.linalg.eigh(worth, metric, subset_by_index=[first, len(worth) - 1])

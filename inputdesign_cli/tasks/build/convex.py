@@ -1,0 +1,174 @@
+"""Spec -> the question of a convex design: everything that can be wrong comes to light here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from inputdesign_cli.design.convex.designs import Question
+from inputdesign_cli.design.convex.problem import Goal
+from inputdesign_cli.specification import PolynomialSpectrum, Spec
+from inputdesign_cli.specification.models.spectrum import FirSpectrum, WhiteSpectrum
+from inputdesign_cli.spectrum import Basis, PolynomialBasis
+from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
+from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits
+from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
+from inputdesign_cli.tasks.build.signal_checks import check_signal
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
+from inputdesign_cli.tasks.build.simulation import build_simulation
+from inputdesign_cli.tasks.build.spectra import build_basis
+from inputdesign_cli.tasks.build.system import build_cost, build_experiment
+from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
+from inputdesign_cli.tasks.factor_columns import FewColumns
+
+_GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
+
+
+def build_convex(spec: Spec) -> ConvexTask:
+    """The task of a design for requirements and criteria that are convex in the information matrix.
+
+    Raises:
+        SpecError, DataError: see the builders of the parts; `not-identifiable`.
+    """
+    check_supported(spec)
+    experiment = build_experiment(spec)
+    requirements = build_requirements(spec, experiment)
+    criterion = build_criterion(spec, experiment)
+    goal, cost = _GOALS[spec.goal], build_cost(spec)
+    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    check_pairs(spec, experiment.model.names)
+    check_signal(spec)
+    basis = build_basis(spec, experiment.inputs, experiment.band)
+    question = Question(
+        experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
+        basis=basis,
+        goal=goal,
+        requirements=requirements if criterion is None else [criterion],
+        side=[] if criterion is None else requirements,
+        cost=cost if goal == "cost" else {},
+        limits=build_power_limits(spec),
+        densities=build_density_limits(spec, experiment),
+    )
+    check_every_direction_counts(spec, question)
+    return ConvexTask(
+        header=build_header(spec),
+        question=question,
+        experiment=experiment,
+        cost=cost,
+        alpha=model_error_alpha(spec, experiment.model),
+        tolerance=spec.solver.tolerance,
+        most_samples=spec.limits.samples,
+        ellipses=spec.report.ellipses,
+        grid=_grid_method(spec),
+        columns=_few_columns(spec, basis),
+        record=build_record_request(spec),
+        unstated=unstated_errors(spec, experiment),
+        simulation=build_simulation(spec, experiment),
+    )
+
+
+def check_supported(spec: Spec) -> None:
+    """Say plainly what is not designed here, rather than ignore it.
+
+    Raises:
+        SpecError: `not-supported`.
+    """
+
+    def refuse(key: str, what: str, hint: str) -> Exception:
+        return spec.complain("not-supported", f"this version does not {what}", hint=hint, key=key)
+
+    for name, asked in (
+        ("closed_loop_error", spec.accuracy.closed_loop_error),
+        ("mean_squared_error", spec.accuracy.mean_squared_error),
+    ):
+        if asked is not None:
+            raise refuse(
+                f"accuracy.{name}", f"handle {name} here", "state the accuracy as model_error or a criterion"
+            )
+    if spec.limits.energy is not None:
+        raise refuse("limits.energy", "enforce limits.energy here", "limit input_power, its mean a sample")
+    if spec.solver.method == "alternating":
+        raise refuse("solver.method", "use the alternating method here", "use exchange or lmi")
+    if spec.signal.order is not None:
+        raise refuse("signal.order", "fit rational filters here", "remove it: noise comes from a long filter")
+    if not spec.plant.sampled:
+        _check_interpolated(spec)
+
+
+def check_pairs(spec: Spec, known: Sequence[str]) -> None:
+    """Raise `SpecError` (`unknown-parameter`) where `report.ellipses` names what the model does not have."""
+    for n, pair in enumerate(spec.report.ellipses or ()):
+        for m, name in enumerate(pair):
+            if name not in known:
+                raise spec.complain(
+                    "unknown-parameter",
+                    f'the model has no parameter "{name}"',
+                    hint=f"its parameters are {', '.join(known)}",
+                    key=f"report.ellipses[{n}][{m}]",
+                )
+
+
+def _check_interpolated(spec: Spec) -> None:
+    """In continuous time samples are interpolated within their band: between them there are no levels."""
+    signal = spec.signal
+    levels = signal.type in ("binary", "ternary", "prbs")
+    if levels or signal.hold is not None or signal.bits is not None:
+        key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
+        raise spec.complain(
+            "not-supported",
+            "a plant in s is driven by the band-limited interpolation of the samples, which has no levels "
+            "and holds nothing between them",
+            hint="write plant.sample: zoh for a signal that is held between samples, or use a multisine",
+            key=f"signal.{key}",
+        )
+
+
+def _grid_method(spec: Spec) -> GridMethod | None:
+    """The papers' own program is for one requirement, a bound on the model error to first order.
+
+    Raises:
+        SpecError: `not-supported` for any other question.
+    """
+    if spec.solver.method != "lmi":
+        return None
+    error, stated = spec.accuracy.model_error, spec.limits
+    # Limits on single samples bind the signal, not the spectrum.
+    limited = stated.model_dump(exclude={"amplitude", "rate"}, exclude_none=True)
+    plain = (
+        spec.goal == "least_cost"
+        and spec.accuracy.requirements == ("model_error",)
+        and error is not None
+        and error.region == "first_order"
+        and (spec.spectrum is None or isinstance(spec.spectrum, FirSpectrum | WhiteSpectrum))
+        and spec.plant.inputs == spec.plant.outputs == 1
+        and spec.plant.sampled
+        and not limited
+    )
+    if not plain:
+        raise spec.complain(
+            "not-supported",
+            "solver.method lmi is the papers' program: the least cost of a FIR spectrum of one input for "
+            "model_error alone, without limits",
+            hint="use method: exchange, which does the rest, at every frequency",
+            key="solver.method",
+        )
+    return GridMethod(int(spec.solver.grid), spec.solver.positivity)
+
+
+def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
+    """`factor_columns`: a factor of few columns is for criteria under upper power limits."""
+    spectrum = spec.spectrum
+    if not isinstance(spectrum, PolynomialSpectrum) or spectrum.factor_columns is None:
+        return None
+    plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
+    floors = any(not limit.upper for limit in build_power_limits(spec))
+    if not isinstance(basis, PolynomialBasis) or not plain or floors or spec.limits.spectrum is not None:
+        raise spec.complain(
+            "not-supported",
+            "factor_columns is for a criterion under upper limits on powers",
+            hint="remove factor_columns: the default, a factor of full rank, is the true optimum",
+            key="spectrum.factor_columns",
+        )
+    return FewColumns(spectrum.factor_columns, spec.signal.seed or 0)

@@ -1,0 +1,203 @@
+"""Spec -> the analysis of an excitation that is given: its spectrum, or its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.spectrum import (
+    GivenMultisine,
+    GivenSignal,
+    GivenSpectrum,
+    GivenTable,
+    GivenWhite,
+)
+from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
+from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
+from inputdesign_cli.tasks.build.header import build_header, build_units
+from inputdesign_cli.tasks.build.limits import build_power_limits
+from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.requirements import build_requirements
+from inputdesign_cli.tasks.build.signal_checks import check_signal
+from inputdesign_cli.tasks.build.signal_settings import build_record_request
+from inputdesign_cli.tasks.build.simulation import build_simulation
+from inputdesign_cli.tasks.build.system import (
+    build_cost,
+    build_experiment,
+    read_excitation_record,
+    record_step,
+)
+from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.tasks.given import GivenExcitation, GivenTask
+from inputdesign_cli.tasks.result.given_limits import StatedLimits
+
+_NEGATIVE = -1e-9
+_TABLE = "spectrum.given.file"
+_REFUSED = ("spectrum", "energy")
+
+
+def build_given(spec: Spec) -> GivenTask:
+    """The task of a given excitation: its requirements, if any, are checked, not met.
+
+    Raises:
+        SpecError, DataError: `nothing-given` when there is no excitation; see the builders of the parts.
+    """
+    if not isinstance(spec.spectrum, GivenSpectrum):
+        raise spec.complain(
+            "nothing-given",
+            "there is no excitation to analyse",
+            hint="give one, spectrum: {given: {type: white, power: 1}}, or design one: idesign solve SPEC",
+            key="spectrum",
+        )
+    check_supported(spec)
+    stated = spec.limits.model_dump(include=set(_REFUSED), exclude_none=True)
+    for name in stated:
+        raise spec.complain(
+            "not-supported",
+            f"this version does not compare a given excitation with limits.{name}",
+            hint="remove it",
+            key=f"limits.{name}",
+        )
+    check_signal(spec)
+    experiment = build_experiment(spec)
+    requirements = build_requirements(spec, experiment)
+    experiment.whitened(1.0)  # says which parameters cannot be told apart
+    check_pairs(spec, experiment.model.names)
+    return GivenTask(
+        header=build_header(spec),
+        experiment=experiment,
+        requirements=requirements,
+        unstated=unstated_errors(spec, experiment),
+        excitation=_excitation(spec, spec.spectrum, experiment),
+        cost=build_cost(spec),
+        alpha=model_error_alpha(spec, experiment.model),
+        limits=_limits(spec),
+        record=build_record_request(spec),
+        ellipses=spec.report.ellipses,
+        simulation=build_simulation(spec, experiment),
+    )
+
+
+def _limits(spec: Spec) -> StatedLimits:
+    amplitude = spec.limits.amplitude
+    return StatedLimits(
+        powers=tuple(build_power_limits(spec)),
+        input=None if amplitude is None else amplitude.input,
+        output=None if amplitude is None else amplitude.output,
+        rate=spec.limits.rate,
+        samples=spec.limits.samples,
+    )
+
+
+def _excitation(spec: Spec, stated: GivenSpectrum, experiment: Experiment) -> GivenExcitation:
+    """The excitation that stands under `spectrum.given`.
+
+    A power of white excitation is spread evenly over the channels unless there is one for each. The
+    sinusoids of one frequency are in phase over the channels; a negative amplitude is in counterphase.
+
+    Raises:
+        DataError: its file cannot be used.
+    """
+    r = experiment.inputs
+    match stated.given:
+        case GivenSignal() as given:
+            return _recorded(spec, experiment, given)
+        case GivenWhite(power=power):
+            powers = np.array(power if isinstance(power, tuple) else [power / r] * r, dtype=float)
+            white = TabulatedSpectrum.white(powers, experiment.band)
+            return GivenExcitation.spectral("white", white, np.ones(1), experiment)
+        case GivenMultisine() as given:
+            frequencies, amplitudes = _sinusoids(spec, given)
+            constant = (frequencies <= 0.0) | (spec.plant.sampled & (frequencies >= np.pi))
+            size = np.linalg.norm(amplitudes, axis=1)
+            lines = LinesBasis(frequencies, amplitudes / size[:, None] + 0j, frequencies, np.ones(r))
+            x = np.where(constant, 1.0, 0.5) * size**2
+            return GivenExcitation.spectral(
+                "multisine", lines, x, experiment, sinusoids=(frequencies, amplitudes)
+            )
+        case GivenTable() as given:
+            return GivenExcitation.spectral("table", _table(spec, given, r), np.ones(1), experiment)
+
+
+def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
+    """Frequencies (L,) in the unit of the experiment and amplitudes (L, r), of those that are not zero."""
+    frequencies = np.array(given.frequencies) * build_units(spec).frequency
+    if spec.plant.sampled:
+        frequencies = np.minimum(frequencies, np.pi)
+    rows = given.amplitudes if depth(given.amplitudes) == 2 else (given.amplitudes,)
+    amplitudes = np.array(rows, dtype=float).T
+    there = np.any(amplitudes != 0.0, axis=1)
+    if not there.any():
+        raise spec.complain(
+            "not-exciting",
+            "all amplitudes are zero: nothing is excited",
+            hint="give the sinusoids amplitudes",
+            key="spectrum.given.amplitudes",
+        )
+    return frequencies[there], amplitudes[there]
+
+
+def _recorded(spec: Spec, experiment: Experiment, given: GivenSignal) -> GivenExcitation:
+    samples = read_excitation_record(spec, given.signal, "spectrum.given.signal")
+    plant = FiniteRecord(experiment, len(samples), record_step(spec))
+    power: dict[PowerKind, list[float]] = {
+        kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS
+    }
+
+    def information(coordinates: Experiment) -> Array:
+        return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
+
+    return GivenExcitation("signal", power, information, samples=samples)
+
+
+def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedSpectrum:
+    """The columns of `spectrum.csv`: phi, or phi_11, phi_12_re, phi_12_im, phi_22, .."""
+    pairs = [(i, j) for i in range(r) for j in range(i + 1, r)]
+    names: dict[str, tuple[int, int, complex]] = {"phi": (0, 0, 1.0)}
+    if r > 1:
+        names = {f"phi_{i + 1}{i + 1}": (i, i, 1.0) for i in range(r)}
+    for i, j in pairs:
+        names |= {f"phi_{i + 1}{j + 1}_re": (i, j, 1.0), f"phi_{i + 1}{j + 1}_im": (i, j, 1j)}
+    columns = _columns(spec, given, list(names))
+    phi = np.zeros((columns["frequency"].size, r, r), dtype=complex)
+    for name, (i, j, unit) in names.items():
+        phi[:, i, j] += unit * columns[name]
+    for i, j in pairs:
+        phi[:, j, i] = phi[:, i, j].conj()
+    eigenvalues = np.linalg.eigvalsh(phi)
+    if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
+        wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
+        message = f"phi must be {wanted}"
+        raise _bad_table(spec, given, message, "give the spectral density, such as the spectrum.csv of a run")
+    frequency = columns["frequency"] * build_units(spec).frequency
+    return TabulatedSpectrum(np.minimum(frequency, np.pi) if spec.plant.sampled else frequency, phi)
+
+
+def _columns(spec: Spec, given: GivenTable, names: Sequence[str]) -> dict[str, Array]:
+    """Columns `frequency` (rad per time unit) and `names`, each (n,).
+
+    Raises:
+        DataError: the file cannot be read, or its frequencies make no table (`bad-table`).
+    """
+    path = spec.resolve_path(given.file)
+    columns = read_columns(path, {"frequency": "frequency", **{name: name for name in names}}, key=_TABLE)
+    frequency = columns["frequency"]
+    if frequency.size < 2 or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
+        message = "the frequencies must be nonnegative and increase from row to row"
+        raise _bad_table(spec, given, message, "sort the rows")
+    if frequency[-1] > spec.nyquist * (1 + 1e-4):
+        message = f"it reaches {frequency[-1]:g} rad/{spec.time_unit}, beyond the Nyquist frequency"
+        raise _bad_table(spec, given, message, "frequencies end at pi/sample_time")
+    return columns
+
+
+def _bad_table(spec: Spec, given: GivenTable, message: str, hint: str) -> DataError:
+    """The error about a table that cannot be a spectrum."""
+    name = spec.resolve_path(given.file).name
+    return DataError(Diagnostic("bad-table", f"{name}: {message}", hint, _TABLE))

@@ -1,0 +1,83 @@
+"""Spec -> what is to be estimated from data, and the same question at the model that is found."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Results
+from inputdesign_cli.specification import RegressionPlant, Spec, parse_spec
+from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.requirements import build_requirements
+from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
+from inputdesign_cli.tasks.identification import Identification, ModelQuestion
+from inputdesign_cli.tasks.result.blocks import blocks_of
+
+
+def build_identification(spec: Spec) -> Identification:
+    """What `identify` and `assess` run on.
+
+    Raises:
+        SpecError: the plant has no such model.
+    """
+    if isinstance(spec.plant, RegressionPlant):
+        raise bad_spec(
+            "not-supported",
+            "a regression is no model of a plant that could be estimated from u and y",
+            hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
+            key="plant",
+        )
+    record_step(spec)  # says where samples are too far apart for the plant
+    return Identification(
+        header=build_header(spec),
+        nominal=build_model(spec),
+        assessable=bool(spec.accuracy.requirements),
+        at=lambda model, samples, source: _question(_restated(spec, model, source), samples),
+    )
+
+
+def _restated(spec: Spec, model: Model, source: str) -> Spec:
+    """The spec with another model in place of its nominal plant and noise."""
+    return parse_spec(
+        spec.to_yaml(),
+        file=source,
+        overrides=[f"{key}={json.dumps(block)}" for key, block in blocks_of(model).items()],
+        folder=spec.resolve_path("."),
+    )
+
+
+def _question(spec: Spec, samples: int) -> ModelQuestion:
+    """What a spec asks of an experiment of so many samples.
+
+    Raises:
+        SpecError: the loop is unstable; see the builders of the parts.
+    """
+    experiment = replace(build_experiment(spec), samples=samples)
+    requirements = [make(experiment) for make in build_requirements(spec, experiment)]
+
+    def topped_up(information: Array) -> Results:
+        prior = {
+            "parameters": list(experiment.model.names),
+            "information": (0.5 * (information + information.T)).tolist(),
+        }
+        return build_convex(
+            parse_spec(
+                spec.to_yaml(),
+                file="top-up",
+                overrides=[f"experiment.prior={json.dumps(prior)}"],
+                folder=spec.resolve_path("."),
+            )
+        ).solve()
+
+    return ModelQuestion(
+        experiment=experiment,
+        alpha=model_error_alpha(spec, experiment.model),
+        requirements=requirements,
+        entries=unstated_errors(spec, experiment),
+        top_up=topped_up if spec.designs else None,
+    )

@@ -1,0 +1,288 @@
+"""Spec -> the question of `accuracy.closed_loop_error`, checked before anything is computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from inputdesign_cli.design.loop_error import (
+    ControlLaw,
+    InternalModel,
+    LoopErrorProblem,
+    MatrixPlant,
+    MinimumVariance,
+    ModelReference,
+    PowerLimit,
+)
+from inputdesign_cli.design.loop_error.checks import check_invertible
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.identification.least_squares import is_arx
+from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix, hold_entries, zero_order_hold
+from inputdesign_cli.specification import (
+    ClosedLoopError,
+    ContinuousMatrixTransfer,
+    ContinuousPlant,
+    ContinuousTransfer,
+    DiscreteMatrix,
+    DiscreteTransfer,
+    FreeSpectrum,
+    Noise,
+    PointwiseSpectrum,
+    PolynomialPlant,
+    RegressionPlant,
+    Simulation,
+    SimulationNoise,
+    Spec,
+    TrueParameters,
+)
+from inputdesign_cli.specification.models.experiment import covariance_of
+from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.refusals import refuse, stated
+from inputdesign_cli.tasks.build.system import polynomial_model, rows_of
+from inputdesign_cli.tasks.loop_error import LoopErrorTask, LossTrial
+from inputdesign_cli.tasks.loop_error_signal import LoopErrorSignalSettings
+from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms
+
+KEY = "accuracy.closed_loop_error"
+_GRID = 512
+_CANDIDATES = 20
+
+_refuse = partial(refuse, who="this version")
+
+
+def build_loop_error_task(spec: Spec) -> LoopErrorTask:
+    """The task, with all that can be wrong with its design already complained of.
+
+    What speaks against its simulation alone is kept for whoever asks for that.
+
+    Raises:
+        SpecError: what this version does not design, and the diagnostics of `ControlLaw.check`.
+    """
+    error = spec.accuracy.closed_loop_error
+    assert error is not None
+    _check_supported(spec)
+    plant = _plant(spec, spec.plant, spec.noise, "plant")
+    name, law = _law(spec, error, plant)
+    check_invertible(plant, key="plant.B")
+    law.check(plant, key=f"{KEY}.control.{name}")
+    coloured = error.reference.filter
+    lo, hi = spec.clip_band(spec.limits.band)
+    problem = LoopErrorProblem(
+        plant=plant,
+        law=law,
+        limits=_limits(spec),
+        reference_variance=np.asarray(error.reference.variance) * np.ones(plant.outputs),
+        reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
+        band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
+    )
+    trial, refusal = None, None
+    try:
+        trial = _trial(spec, problem)
+    except SpecError as found:
+        refusal = found
+    cost = spec.cost
+    terms = LoopErrorTerms(
+        header=build_header(spec),
+        law=name,
+        covariance=error.covariance,
+        samples=spec.experiment.samples,
+        tolerance=spec.solver.tolerance,
+        cost={
+            "input": np.asarray(cost.input_power),
+            "output": np.asarray(cost.output_power),
+            "excitation": np.asarray(cost.excitation_power),
+        },
+        grid=spec.spectrum.grid if isinstance(spec.spectrum, PointwiseSpectrum) else _GRID,
+    )
+    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), trial, refusal)
+
+
+def _plant(
+    spec: Spec,
+    plant: PolynomialPlant | ContinuousPlant | RegressionPlant | TrueParameters,
+    noise: Noise | SimulationNoise,
+    key: str,
+) -> MatrixPlant:
+    """The matrix of polynomials of `plant` or of the true system `simulation.plant`."""
+    if noise.variance is None:
+        raise bad_spec(
+            "not-supported",
+            "this version takes the noise of this simulation as a variance",
+            hint="write variance in place of relative_std",
+            key="simulation.noise",
+        )
+    if isinstance(plant, PolynomialPlant):
+        covariance = covariance_of(noise.variance, plant.outputs)
+        return MatrixPlant.of(polynomial_model(plant, noise, covariance))
+    if not isinstance(plant, ContinuousPlant) or not plant.sampled:
+        raise bad_spec(
+            "not-supported",
+            "this version designs for the closed-loop error of sampled plants only",
+            hint="add sample: zoh to a continuous-time plant",
+            key=key,
+        )
+    matrix = plant.continuous
+    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, spec.sample_time)
+    sampled = PolynomialModel(
+        B=tuple(tuple(entry.numerator for entry in row) for row in held),
+        A=(np.ones(1),),
+        F=tuple(tuple(entry.denominator_polynomial for entry in row) for row in held),
+        C=rows_of(noise.C),
+        D=rows_of(noise.D),
+        covariance=covariance_of(noise.variance, plant.outputs),
+    )
+    return MatrixPlant.of(sampled)
+
+
+def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, ControlLaw]:
+    """The key of the control law, and the law."""
+    control = error.control
+    if control.minimum_variance:
+        return "minimum_variance", MinimumVariance(plant)
+    if control.internal_model is not None:
+        # The delay and the zeros to be kept are read off the inverse, so it must exist first.
+        check_invertible(plant, key="plant.B")
+        return "internal_model", InternalModel.build(plant, _transfer(spec, control.internal_model))
+    target = control.model_reference
+    assert target is not None
+    if isinstance(target, DiscreteMatrix):
+        T = TransferMatrix.build(target.numerator_matrix, target.denominator_matrix)
+    elif isinstance(target, ContinuousMatrixTransfer):
+        inside = target.continuous
+        held = hold_entries(inside.numerator_matrix, inside.denominator_matrix, spec.sample_time)
+        above = [[entry.numerator for entry in row] for row in held]
+        T = TransferMatrix.build(above, [[entry.denominator_polynomial for entry in row] for row in held])
+    else:
+        T = TransferMatrix.diagonal(_transfer(spec, target), plant.outputs)
+    return "model_reference", ModelReference(T)
+
+
+def _transfer(spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer) -> Rational:
+    """A transfer function of the spec, sampled by a zero-order hold where it is given in s."""
+    if isinstance(transfer, ContinuousTransfer):
+        ratio = transfer.continuous
+        return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, spec.sample_time)
+    return Rational.build(transfer.numerator, transfer.denominator_factors)
+
+
+def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
+    found: list[PowerLimit] = []
+    limits = spec.limits
+    for key, limit, kind in (
+        ("input_power", limits.input_power, PowerLimit.of_input),
+        ("excitation_power", limits.excitation_power, PowerLimit.of_input),
+        ("output_power", limits.output_power, PowerLimit.of_output),
+    ):
+        if limit is None:
+            continue
+        if limit.min is not None:
+            raise _refuse(f"limits.{key}.min", what="enforce least powers here", hint="remove min")
+        if isinstance(limit.max, tuple):
+            found += [kind(most, channel) for channel, most in enumerate(limit.max)]
+        elif limit.max is not None:
+            found.append(kind(limit.max))
+    return tuple(found)
+
+
+def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalSettings:
+    signal, samples = spec.signal, spec.signal_samples
+    filtered = signal.type == "filtered_noise"
+    if filtered and error.covariance == "parametric":
+        raise bad_spec(
+            "not-supported",
+            "this version makes multisines of a parametric design, which consists of lines",
+            hint="write type: multisine, or covariance: asymptotic",
+            key="signal.type",
+        )
+    if not filtered and signal.periods is not None and samples % signal.periods:
+        raise bad_spec(
+            "conflicting-keys",
+            f"{samples} samples do not make {signal.periods} equal periods",
+            hint="choose a divisor of the number of samples",
+            key="signal.periods",
+        )
+    return LoopErrorSignalSettings(
+        samples=samples,
+        filtered=filtered,
+        # As many periods as inputs, where the record can be split so, make the designed matrix exact.
+        periods=signal.periods or (inputs if samples % inputs == 0 else 1),
+        order=signal.order,
+        candidates=signal.candidates or _CANDIDATES,
+        seed=signal.seed or 0,
+    )
+
+
+def _trial(spec: Spec, problem: LoopErrorProblem) -> LossTrial:
+    simulation = spec.simulation or Simulation()
+    for name in simulation.compare:
+        if name != "white":
+            raise bad_spec(
+                "not-supported",
+                f"this version compares the design with white noise, not with {name}",
+                hint="write compare: [white]",
+                key="simulation.compare",
+            )
+    if problem.law.target is None:
+        raise bad_spec(
+            "not-supported",
+            "this version simulates model-reference and internal-model control only",
+            hint="run idesign solve, which computes what theory expects",
+            key=f"{KEY}.control.minimum_variance",
+        )
+    true = problem.plant
+    if simulation.plant is not None or simulation.noise is not None:
+        true = _plant(
+            spec, simulation.plant or spec.plant, simulation.noise or spec.noise, "simulation.plant"
+        )
+    if not is_arx(true):
+        raise bad_spec(
+            "not-supported",
+            "this version identifies by least squares, so the true system must be of the form A y = B u + e",
+            hint="write A and B only, and simulation.noise: {variance: ..}",
+            key="simulation.noise" if simulation.noise else "plant",
+        )
+    return LossTrial(
+        replace(problem, plant=true), simulation.runs, simulation.seed, "white" in simulation.compare
+    )
+
+
+_LIMITS = ("amplitude", "rate", "energy", "spectrum")
+_SIGNAL_KEYS = ("hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation", "scale", "also")
+
+
+def _check_supported(spec: Spec) -> None:
+    for name in spec.accuracy.requirements:
+        what = f"handle {name} beside closed_loop_error"
+        raise _refuse(f"accuracy.{name}", what=what, hint="keep one of them")
+    for name in stated(spec.limits):
+        if name in _LIMITS:
+            what, hint = (
+                f"enforce limits.{name} for closed_loop_error",
+                "limit input_power, output_power or band",
+            )
+            raise _refuse(f"limits.{name}", what=what, hint=hint)
+    spectrum, signal = spec.spectrum, spec.signal
+    if spectrum is not None and not isinstance(spectrum, PointwiseSpectrum | FreeSpectrum):
+        kind = spectrum.phrase.replace(":", "")
+        what = f"design spectra of {kind} for closed_loop_error"
+        raise _refuse("spectrum", what=what, hint="use type: pointwise, which is best at every frequency")
+    if spec.closed_loop:
+        what, hint = "design closed-loop experiments here", "remove the controller"
+        raise _refuse("experiment.controller", what=what, hint=hint)
+    if spec.report.ellipses is not None:
+        raise _refuse("report.ellipses", what="draw ellipses for closed_loop_error", hint="remove report")
+    if spec.experiment.prior is not None:
+        raise _refuse("experiment.prior", what="use prior information here", hint="remove it")
+    if spec.solver.method != "exchange":
+        what = f"use the method {spec.solver.method} here"
+        raise _refuse("solver.method", what=what, hint="remove method")
+    if signal.type not in (None, "multisine", "filtered_noise"):
+        what = f"make {signal.type} signals here"
+        raise _refuse("signal.type", what=what, hint="use multisine or filtered_noise")
+    for name in stated(signal):
+        if name in _SIGNAL_KEYS:
+            raise _refuse(f"signal.{name}", what=f"apply signal.{name} here", hint="remove it")
+    if signal.phases not in (None, "random"):
+        raise _refuse("signal.phases", what=f"choose {signal.phases} phases here", hint="use random")

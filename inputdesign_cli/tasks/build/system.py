@@ -1,0 +1,255 @@
+"""Spec -> plant, loop and experiment: what is excited, for how long, in which loop, at what price."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.plant import (
+    ContinuousModel,
+    Loop,
+    Model,
+    PolynomialModel,
+    SampledModel,
+    TransferMatrix,
+    close_loop,
+)
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.controller import ControllerMatrix
+from inputdesign_cli.specification.models.experiment import NoiseShape
+from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
+from inputdesign_cli.specification.models.spectrum import (
+    GivenMultisine,
+    GivenSignal,
+    GivenSpectrum,
+    MultisineSpectrum,
+    PolynomialSpectrum,
+)
+from inputdesign_cli.specification.models.transfer import DiscreteTransfer
+from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.tasks.build.weights import rational
+
+_PRIOR = "experiment.prior.information"
+
+
+def build_model(spec: Spec) -> Model:
+    """The model of `plant` and `noise`.
+
+    Raises:
+        SpecError: `not-supported` for a regression, and for a plant in s whose noise is not white.
+    """
+    covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
+    match spec.plant:
+        case PolynomialPlant() as plant:
+            return polynomial_model(plant, spec.noise, covariance)
+        case ContinuousPlant() as plant:
+            for name in spec.noise.filters:
+                raise spec.complain(
+                    "not-supported",
+                    "this version takes the noise of a plant in s as white",
+                    hint=f"remove {name}, or write the plant as polynomials A, B, F in q^-1",
+                    key=f"noise.{name}",
+                )
+            matrix = plant.continuous
+            continuous = ContinuousModel.monic(
+                _reversed(matrix.numerator_matrix),
+                _reversed(matrix.denominator_matrix),
+                covariance,
+                common=depth(matrix.denominator) != 3,
+            )
+            return SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
+    raise spec.complain(
+        "not-supported",
+        "a regression has no dynamics to be estimated here",
+        hint="ask for accuracy.mean_squared_error, or write the plant as polynomials A, B, F in q^-1",
+        key="plant",
+    )
+
+
+def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Array) -> PolynomialModel:
+    """A plant in q^-1; A, C and D that the spec states once are common to the outputs."""
+    return PolynomialModel(
+        B=_arrays(plant.B_matrix),
+        A=rows_of(plant.A),
+        F=_arrays(plant.F_matrix),
+        C=rows_of(noise.C),
+        D=rows_of(noise.D),
+        covariance=covariance,
+    )
+
+
+def build_experiment(spec: Spec) -> Experiment:
+    """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
+
+    Raises:
+        SpecError: `needs-band`; an unstable or algebraic loop; a prior that does not fit the parameters.
+        DataError: the record of a prior cannot be used.
+    """
+    model, controller = build_model(spec), spec.experiment.controller
+    loop = None if controller is None else build_loop(model, controller)
+    if loop is not None:
+        loop.check_delay()
+    experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+    return replace(experiment, prior=_prior(spec, experiment))
+
+
+def build_loop(model: Model, controller: DiscreteTransfer | ControllerMatrix) -> Loop:
+    """The loop of a model that is sampled; a single transfer function is a controller of one entry.
+
+    Raises:
+        SpecError: the loop is unstable or algebraic.
+    """
+    match controller:
+        case ControllerMatrix():
+            C = TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
+        case _:
+            C = TransferMatrix.diagonal(rational(controller), 1)
+    loop = close_loop(model, C)
+    loop.check_stability()
+    return loop
+
+
+def excitation_band(spec: Spec) -> tuple[float, float]:
+    """Where the excitation may have power, in rad/sample, or rad per time unit in continuous time.
+
+    Raises:
+        SpecError: `needs-band` when continuous time leaves it open.
+    """
+    band = _stated_band(spec)
+    if spec.plant.sampled:
+        lo, hi = spec.clip_band(band)
+        return lo * spec.sample_time, min(hi * spec.sample_time, np.pi)
+    if band is None or not np.isfinite(band[1]):
+        raise spec.complain(
+            "needs-band",
+            "in continuous time frequencies have no end: the band of the excitation is missing",
+            hint="add limits: {band: [0, 2]}, or a polynomial spectrum with its band",
+            key="spectrum" if spec.spectrum is not None else "limits",
+        )
+    return band
+
+
+def _stated_band(spec: Spec) -> tuple[float, float] | None:
+    """The band of the spectrum or of the limits; in continuous time also what a given excitation covers."""
+    match spec.spectrum:
+        case PolynomialSpectrum(band=band):
+            return band
+        case MultisineSpectrum(frequencies=given) if given and not spec.plant.sampled:
+            return _around(given)
+        case GivenSpectrum(given=GivenSignal()) if spec.limits.band is None and not spec.plant.sampled:
+            return 0.0, np.pi / spec.sample_time
+        case GivenSpectrum(given=GivenMultisine(frequencies=given)) if (
+            spec.limits.band is None and not spec.plant.sampled and given[-1] > 0
+        ):
+            return _around(given)
+    return spec.limits.band
+
+
+def _around(frequencies: Sequence[float]) -> tuple[float, float]:
+    lo, hi = frequencies[0], frequencies[-1]
+    return (lo, hi) if hi > lo else (0.5 * lo, 1.5 * hi)
+
+
+def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
+    """Weights of the powers: of the sum over the channels, or one a channel."""
+    weights: dict[PowerKind, Weight] = {
+        "input": spec.cost.input_power,
+        "output": spec.cost.output_power,
+        "excitation": spec.cost.excitation_power,
+    }
+    return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
+
+
+def _prior(spec: Spec, experiment: Experiment) -> Array | None:
+    """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment."""
+    prior = spec.experiment.prior
+    if prior is None:
+        return None
+    if isinstance(prior.information, str):
+        record = read_excitation_record(spec, prior.information, _PRIOR)
+        earlier = replace(experiment, samples=len(record))
+        return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
+    matrix = np.array(prior.information, dtype=float)
+    return embedded(spec, experiment.model.names, matrix, prior.parameters, _PRIOR)
+
+
+def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
+    """(n, r): the samples of an excitation from a CSV file, its columns u1, u2, .. (in closed loop r1, ..).
+
+    Of one input the column is u or u1.
+
+    Raises:
+        DataError: the file cannot be used.
+    """
+    units = build_units(spec)
+    names = [units.excitation] if units.inputs == 1 else list(units.excitations)
+    columns = read_columns(spec.resolve_path(name), {column: column for column in names}, key=key)
+    return np.stack([columns[column] for column in names], axis=1)
+
+
+def record_step(spec: Spec) -> float:
+    """The time between samples in the unit of the experiment's frequencies: 1, or sample_time.
+
+    Raises:
+        SpecError: `beyond-nyquist` when samples are too far apart for the band of a continuous design.
+    """
+    if spec.plant.sampled:
+        return 1.0
+    _, hi = excitation_band(spec)
+    if hi * spec.sample_time > np.pi * (1 + 1e-9):
+        raise spec.complain(
+            "beyond-nyquist",
+            f"samples {spec.sample_time:g} {spec.time_unit} apart cannot carry the band up to {hi:g} "
+            f"rad/{spec.time_unit}",
+            hint=f"set sample_time to {0.5 * np.pi / hi:.3g} or less (at most {np.pi / hi:.3g})",
+            key="sample_time",
+        )
+    return spec.sample_time
+
+
+def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
+    """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
+
+    Raises:
+        SpecError: `unknown-parameter` or `wrong-shape`.
+    """
+    for name in names or ():
+        if name not in known:
+            raise spec.complain(
+                "unknown-parameter",
+                f'the model has no parameter "{name}"',
+                hint=f"its parameters are {', '.join(known)}",
+                key=key,
+            )
+    listed = tuple(names or known)
+    if len(matrix) != len(listed):
+        raise spec.complain(
+            "wrong-shape",
+            f"the matrix is {len(matrix)} x {len(matrix)}, but there are {len(listed)} parameters",
+            hint=f"order its rows as {', '.join(known)}, or name its parameters",
+            key=key,
+        )
+    full = np.zeros((len(known), len(known)))
+    index = [list(known).index(name) for name in listed]
+    full[np.ix_(index, index)] = matrix
+    return full
+
+
+def _arrays(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:
+    return tuple(tuple(np.array(entry, dtype=float) for entry in row) for row in rows)
+
+
+def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:
+    return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
+
+
+def rows_of(value: tuple) -> tuple[Array, ...]:
+    """One polynomial, common to all outputs, or a list of one an output."""
+    return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))

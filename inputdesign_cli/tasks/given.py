@@ -1,0 +1,273 @@
+"""A given excitation: what accuracy it buys. Nothing is optimised."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, Requirement, worst
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weights_of
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Curves, Results, Table
+from inputdesign_cli.runs.units import Header
+from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
+from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
+from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, worst_ratio
+from inputdesign_cli.tasks.result.bound import bound_curves
+from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
+from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
+from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
+from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
+from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
+from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
+
+_TOO_FAINT = 1e-13
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class GivenExcitation:
+    """What it is called, its powers by kind and channel, and the information matrix that it gives.
+
+    `information` maps an experiment to M (k, k) in its coordinates. A recorded signal has `samples` (n, r),
+    the others a `basis` and the coefficients `x` on it; `sinusoids` are the frequencies (L,) and amplitudes
+    (L, r) of a multisine, in phase over the channels.
+    """
+
+    kind: str
+    power: dict[PowerKind, list[float]]
+    information: Callable[[Experiment], Array]
+    basis: TabulatedSpectrum | LinesBasis | None = None
+    x: Array | None = None
+    sinusoids: tuple[Array, Array] | None = None
+    samples: Array | None = None
+
+    @classmethod
+    def spectral(
+        cls,
+        kind: str,
+        basis: TabulatedSpectrum | LinesBasis,
+        x: Array,
+        experiment: Experiment,
+        *,
+        sinusoids: tuple[Array, Array] | None = None,
+    ) -> GivenExcitation:
+        """An excitation that is known by its spectrum."""
+
+        def information(coordinates: Experiment) -> Array:
+            maps = basis.integrals(coordinates.information_density, coordinates.singularities)
+            return coordinates.baseline_information + np.tensordot(x, maps, axes=1)
+
+        def power(of: PowerKind, channel: int) -> float:
+            unit = basis.integrals(
+                lambda w: experiment.power_density(of, w, channel), experiment.singularities
+            )
+            return float(x @ unit)
+
+        model = experiment.model
+        found = {
+            of: [power(of, i) for i in range(model.outputs if of == "output" else model.inputs)]
+            for of in POWER_KINDS
+        }
+        return cls(kind, found, information, basis, x, sinusoids)
+
+    @classmethod
+    def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
+        """White excitation of this total power, flat over the band and even over the channels."""
+        share = np.full(experiment.inputs, power / experiment.inputs)
+        return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
+
+    def cost(self, weights: dict[PowerKind, Weight]) -> float:
+        """The weighted sum of the powers."""
+        return sum(
+            weight * (sum(self.power[kind]) if channel is None else self.power[kind][channel])
+            for kind, channel, weight in weights_of(weights)
+        )
+
+
+@dataclass(frozen=True)
+class GivenTask:
+    """The analysis of an excitation.
+
+    `unstated` are errors of the entries of G that have r_u where no requirement bounds it.
+    """
+
+    header: Header
+    experiment: Experiment
+    requirements: Sequence[RequirementFactory]
+    unstated: Sequence[ModelError]
+    excitation: GivenExcitation
+    cost: dict[PowerKind, Weight]
+    alpha: float
+    limits: StatedLimits
+    record: RecordRequest
+    ellipses: Pairs | None
+    simulation: Simulation
+
+    def check(self) -> None:
+        """Nothing: building has checked all."""
+
+    def solve(self) -> Results:
+        """r_u, information, predicted standard deviations and powers of the excitation.
+
+        Raises:
+            SpecError: `not-exciting` when the excitation leaves parameters undetermined.
+        """
+        return self._delivered().results
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """The same, with the excitation tried many times on the true system; see `tasks.simulation`.
+
+        Raises:
+            SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with; see `solve`.
+        """
+        return simulate(self.simulation, self._delivered(), executor)
+
+    def _delivered(self) -> Delivered:
+        started = time.perf_counter()
+        raw, excitation, units = self.experiment, self.excitation, self.header.units
+        experiment = raw.whitened(max(sum(excitation.power["excitation"]), 1e-300))
+        if excitation.samples is not None:
+            experiment = replace(experiment, samples=len(excitation.samples))
+        information = excitation.information(experiment)
+        _check_excites(experiment, information)
+        requirements = [make(experiment) for make in self.requirements]
+        cost = excitation.cost(self.cost)
+        level = cost / GivenExcitation.even(raw, 1.0).cost(self.cost)
+        white = GivenExcitation.even(raw, level).information(experiment)
+        result = self._result(experiment, requirements, information)
+        result |= {"cost": cost, "power": excitation.power, "spectrum": self._spectrum_entry()}
+        result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
+        tables: dict[str, Table] = {}
+        curves: dict[str, Curves] = {}
+        stated = [error for error in (r.bounded_error for r in requirements) if error is not None]
+        unstated = [replace(error, experiment=experiment) for error in self.unstated]
+        tables["bound"], curves["bound"] = bound_curves(
+            units, stated or unstated, information, white=white, stated=bool(stated)
+        )
+        if excitation.basis is not None and excitation.x is not None:
+            tables["spectrum"], curves["spectrum"] = spectrum_curves(
+                units,
+                excitation.basis,
+                excitation.x,
+                experiment.band,
+                white=level if units.inputs == 1 else None,
+            )
+        ellipses = experiment_ellipses(experiment, information, white, self.ellipses)
+        if ellipses is not None:
+            curves["ellipses"] = ellipses
+        record, files = self._record(experiment, worst_ratio(requirements)), {}
+        if record is not None:
+            result["signal"] = signal_entry(self.record, units, experiment, record, requirements)
+            tables["signal"], curves["signal"] = signal_curves(self.record, units, record)
+            files = other_files(self.record, units, record)
+        signal = result.get("signal", {})
+        notes = broken_limits(self.limits, experiment.samples, excitation.power, signal)
+        if notes:
+            result["notes"] = notes
+        result["timing_s"] = {"analysis": time.perf_counter() - started}
+        results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
+        if record is None:
+            return Delivered(results, None, None)
+        return Delivered(results, record.samples, self._renewed(len(record.samples)))
+
+    def _result(
+        self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
+    ) -> dict[str, Any]:
+        met = all(worst(r.violations(information)).ratio <= 1.0 + _ROUNDING for r in requirements)
+        result: dict[str, Any] = {
+            "format": 1,
+            "title": self.header.title,
+            "status": "given" if not requirements else "met" if met else "missed",
+            "samples": experiment.samples,
+            "information": information_entry(experiment, information),
+        }
+        nowhere = np.zeros(0)
+        return result | requirements_entry(self.header.units, self.alpha, requirements, information, nowhere)
+
+    def _spectrum_entry(self) -> dict[str, Any]:
+        excitation, units = self.excitation, self.header.units
+        entry: dict[str, Any] = {"type": "given", "given": excitation.kind}
+        if excitation.sinusoids is not None and excitation.basis is not None and excitation.x is not None:
+            frequencies, powers = excitation.basis.lines(excitation.x)
+            entry["frequencies"] = frequencies / units.frequency
+            entry["powers"] = powers[:, 0, 0].real if units.inputs == 1 else plain_complex(powers)
+        elif excitation.kind == "white":
+            entry["power"] = excitation.power["excitation"]
+            if units.inputs == 1:
+                entry["coefficients"] = excitation.power["excitation"]
+        return entry
+
+    def _record(self, experiment: Experiment, ratio: Callable[[Array], float]) -> Record | None:
+        """The signal as given, or one record of the given spectrum; None for one too short."""
+        excitation, request = self.excitation, self.record
+        if excitation.samples is not None:
+            return Record(excitation.samples, "given", ratio(excitation.information(experiment)))
+        basis, x = excitation.basis, excitation.x
+        if basis is None or x is None:
+            return None
+        several = experiment.inputs > 1
+        if excitation.sinusoids is not None and several:
+            return self._in_phase(*excitation.sinusoids, experiment, ratio)
+        spectrum = DesignedSpectrum.of(basis, x, inputs=experiment.inputs, step=request.step)
+        return given_record(request, experiment, spectrum, ratio)
+
+    def _renewed(self, samples: int) -> Excitation | None:
+        """What realises the spectrum anew; None for a record that was given."""
+        excitation, request = self.excitation, self.record
+        basis, x = excitation.basis, excitation.x
+        if basis is None or x is None:
+            return None
+        inputs = self.experiment.inputs
+        if excitation.sinusoids is not None and isinstance(basis, LinesBasis) and inputs > 1:
+            frequencies, amplitudes = excitation.sinusoids
+            return InPhase("design", frequencies * request.step, amplitudes, basis, x)
+        spectrum = DesignedSpectrum.of(basis, x, inputs=inputs, step=request.step)
+        return Redrawn("design", SignalGenerator(spectrum, request.settings, samples, request.band), basis, x)
+
+    def _in_phase(
+        self,
+        frequencies: Array,
+        amplitudes: Array,
+        experiment: Experiment,
+        ratio: Callable[[Array], float],
+    ) -> Record | None:
+        """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
+        request = self.record
+        samples = request.length(experiment.samples)
+        if samples < least_period(1):
+            return None
+        rng = np.random.default_rng(request.settings.seed)
+        record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)
+        return Record(record, "multisine", _ratio_of(request, experiment, record, ratio))
+
+
+def _ratio_of(
+    request: RecordRequest, experiment: Experiment, record: Array, ratio: Callable[[Array], float]
+) -> float:
+    """The worst ratio of a record; infinite when it is too short to excite every parameter."""
+    try:
+        return ratio(FiniteRecord(experiment, len(record), request.step).information(record))
+    except np.linalg.LinAlgError:
+        return np.inf
+
+
+def _check_excites(experiment: Experiment, information: Array) -> None:
+    """Raise `SpecError` (`not-exciting`) when the information matrix is singular to working precision."""
+    eigenvalues, vectors = np.linalg.eigh(information)
+    if eigenvalues[0] > _TOO_FAINT * eigenvalues[-1]:
+        return
+    raise bad_spec(
+        "not-exciting",
+        f"this excitation tells nothing about {experiment.unexcited(vectors[:, 0])}: infinite variance",
+        hint="each sinusoid determines at most two parameters: add frequencies, or drop parameters",
+        key="spectrum.given",
+    )

@@ -1,0 +1,84 @@
+"""A model in the words of a spec: its `plant` and `noise`; a new kind of model registers its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import singledispatch
+
+from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel, SampledModel
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial_model import Rows
+from inputdesign_cli.runs.results import Json
+
+Blocks = dict[str, dict[str, Json]]
+
+
+@singledispatch
+def blocks_of(model: Model) -> Blocks:
+    """`plant` and `noise` of a model; polynomials that are 1 are left out.
+
+    Raises:
+        TypeError: models of this kind have no words.
+    """
+    raise TypeError(f"{type(model).__name__} has no words in a spec")
+
+
+@blocks_of.register
+def _(model: PolynomialModel) -> Blocks:
+    single = model.outputs == model.inputs == 1
+    everything: dict[str, tuple[Json, bool]] = {
+        "A": (_rows(model.A), _matter(model.A)),
+        "B": (model.B[0][0].tolist() if single else _matrix(model.B), True),
+        "F": (model.F[0][0].tolist() if single else _matrix(model.F), any(map(_matter, model.F))),
+    }
+    noise = {"C": (_rows(model.C), _matter(model.C)), "D": (_rows(model.D), _matter(model.D))}
+    return {
+        "plant": {name: value for name, (value, stated) in everything.items() if stated},
+        "noise": {name: value for name, (value, stated) in noise.items() if stated} | _variance(model),
+    }
+
+
+@blocks_of.register
+def _(model: ContinuousModel) -> Blocks:
+    below = _matrix(model.denominator, descending=True)
+    i, j = model.active[0]
+    matrix = {
+        "numerator": _matrix(model.numerator, descending=True),
+        "denominator": below[i][j] if model.common else below,
+    }
+    return {"plant": {"continuous": matrix}, "noise": _variance(model)}
+
+
+@blocks_of.register
+def _(model: SampledModel) -> Blocks:
+    blocks = blocks_of(model.continuous_plant)
+    return {**blocks, "plant": {**blocks["plant"], "sample": "zoh"}}
+
+
+@singledispatch
+def predictor_of(model: Model) -> dict[str, list[Array]]:
+    """The polynomials of a model that must be stable, by letter: C, D and F; none of a plant in s."""
+    return {}
+
+
+@predictor_of.register
+def _(model: PolynomialModel) -> dict[str, list[Array]]:
+    return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
+
+
+def _variance(model: Model) -> dict[str, Json]:
+    covariance = model.covariance
+    return {"variance": float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()}
+
+
+def _matter(polynomials: Sequence[Array]) -> bool:
+    return any(p.size > 1 for p in polynomials)
+
+
+def _rows(polynomials: Sequence[Array]) -> list[Json]:
+    """One polynomial common to all outputs as it is; a list of those of each output."""
+    return polynomials[0].tolist() if len(polynomials) == 1 else [p.tolist() for p in polynomials]
+
+
+def _matrix(rows: Rows, *, descending: bool = False) -> list[list[list[float]]]:
+    return [[(p[::-1] if descending else p).tolist() for p in row] for row in rows]

@@ -1,0 +1,75 @@
+"""bound.csv and its plot: r_u against r_adm over frequency, entry by entry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.accuracy import BoundedError
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import BoundCurves, BoundPanel, Table
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.result.spectrum import axis, distinct
+
+_GRID_POINTS = 400
+_NEARLY = 0.5
+
+
+def bound_curves(
+    units: Units,
+    errors: Sequence[BoundedError],
+    information: Array,
+    *,
+    white: Array | None = None,
+    record: Array | None = None,
+    stated: bool = True,
+    active: Array | None = None,
+    label: str = "design",
+) -> tuple[Table, BoundCurves]:
+    """r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement.
+
+    Args:
+        information: M (k, k) in the coordinates of the errors; `white` and `record`: that of the baseline
+            and of the record to be applied.
+        stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
+        active: frequencies of the experiment at which a requirement binds.
+        label: what gave r_u.
+    """
+    binding = np.zeros(0) if active is None else active
+    w = _axis(errors, information, binding)
+    frequency = w / units.frequency
+    columns: dict[str, Array] = {units.frequency_header: frequency}
+    panels = []
+    for error in errors:
+        panel = BoundPanel(
+            frequency=frequency,
+            r_u=error.error_bound(information, w),
+            G_abs=error.nominal_size(w),
+            r_adm=error.admissible.at(w) if stated else None,
+            r_u_white=None if white is None else error.error_bound(white, w),
+            active=distinct(np.maximum(binding, w[0])) / units.frequency if stated else np.zeros(0),
+            r_u_record=None if record is None else error.error_bound(record, w),
+            label=label,
+            entry=None if units.single else error.entry,
+        )
+        suffix = "" if error.entry is None else units.suffix(*error.entry)
+        listed = {
+            "r_u": panel.r_u,
+            "r_adm": panel.r_adm,
+            "G_abs": panel.G_abs,
+            "r_u_white": panel.r_u_white,
+            "r_u_record": panel.r_u_record,
+        }
+        columns |= {f"{name}{suffix}": values for name, values in listed.items() if values is not None}
+        panels.append(panel)
+    return Table(columns), BoundCurves(tuple(panels))
+
+
+def _axis(errors: Sequence[BoundedError], information: Array, active: Array) -> Array:
+    """Frequencies of the band with all peaks of the ratios, and what shows the shape of resonances."""
+    peaks = [v.frequency for error in errors for v in error.violations(information, above=_NEARLY)]
+    grid = np.unique(np.concatenate([error.grid for error in errors]))
+    shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]
+    extra = np.concatenate([active, shape, np.array([w for w in peaks if w is not None])])
+    return axis(*errors[0].band, extra)

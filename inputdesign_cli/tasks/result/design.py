@@ -1,0 +1,265 @@
+"""Design -> `result.json`: every number recomputed from the spectrum, bounds from the certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.design.convex.candidate import candidate_at
+from inputdesign_cli.design.convex.designs import Design, Question
+from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
+from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.units import Header, Units
+from inputdesign_cli.spectrum import Basis, flat_basis
+from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
+
+# A limit binds when the design uses all but this share of it.
+_BINDS = 1e-6
+# Below this share of its largest price, power at a frequency is called free of charge.
+_FREE = 1e-3
+_SUPPORT = 1e-3
+_KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "accuracy_factor"}
+
+
+@dataclass(frozen=True)
+class Designed:
+    """A design with what it answers and the experiment of the delivered length."""
+
+    header: Header
+    question: Question
+    design: Design
+    experiment: Experiment
+    cost: dict[PowerKind, Weight]
+    alpha: float
+
+    @property
+    def units(self) -> Units:
+        return self.header.units
+
+    @property
+    def problem(self) -> Problem:
+        """The problem on the basis of the answer, which may have grown."""
+        return self.design.problem.on(self.design.result.basis)
+
+
+def design_result(done: Designed, how: dict[str, Any], tolerance: float) -> dict[str, Any]:
+    """The content of `result.json` but for signal and timing.
+
+    Args:
+        how: the status, and what the solver did.
+    """
+    found, problem = done.design.result, done.design.problem
+    status = how.pop("status")
+    cost = _cost(done, found.basis, found.x)
+    result: dict[str, Any] = {
+        "format": 1,
+        "title": done.header.title,
+        "status": status,
+        "objective": _objective(done.design),
+        "cost": cost,
+        "samples": done.experiment.samples,
+        "power": powers(problem, found.basis, found.x),
+        "information": information_entry(done.experiment, _information(done)),
+        "spectrum": spectrum_entry(done.units, found.basis, found.x),
+        "baseline": {"white": _white(done, cost)},
+        "solver": {**how, "tolerance": tolerance},
+    }
+    if status != "nothing_needed":
+        asked = (*problem.requirements, *problem.side)
+        active = found.active_frequencies
+        result |= requirements_entry(done.units, done.alpha, asked, found.information, active)
+    for name, entry in (("limits", _limits(done)), ("notes", _notes(done))):
+        if entry:
+            result[name] = entry
+    return result
+
+
+def information_entry(experiment: Experiment, information: Array) -> dict[str, Any]:
+    """The information matrix in raw parameters, its inverse and the predicted standard deviations."""
+    entry: dict[str, Any] = {
+        "parameters": list(experiment.model.names),
+        "matrix": experiment.to_raw(information),
+    }
+    try:
+        covariance = experiment.raw_covariance(information)
+    except np.linalg.LinAlgError:  # some parameter is not excited at all
+        return entry
+    entry["covariance"] = covariance
+    entry["standard_deviation"] = dict(
+        zip(entry["parameters"], np.sqrt(np.diag(covariance)).tolist(), strict=True)
+    )
+    return entry
+
+
+def requirements_entry(
+    units: Units, alpha: float, requirements: Sequence[Requirement], information: Array, active: Array
+) -> dict[str, Any]:
+    """`model_error` of the contract, and the worst ratio of each requirement."""
+    listed: list[dict[str, Any]] = []
+    entry: dict[str, Any] = {"alpha": alpha}
+    for requirement in requirements:
+        if requirement.criterion is not None:
+            continue
+        item = requirement_entry(units, requirement, information)
+        listed.append(item)
+        if requirement.bounded_error is not None and item["worst_ratio"] > entry.get("worst_ratio", 0.0):
+            entry["worst_ratio"] = item["worst_ratio"]
+            if "frequency" in item:
+                entry["worst_frequency"] = item["frequency"]
+                entry["active_frequencies"] = distinct(active) / units.frequency
+    return {"model_error": entry, "requirements": listed} if listed else {"model_error": entry}
+
+
+def requirement_entry(units: Units, requirement: Requirement, information: Array) -> dict[str, Any]:
+    """A requirement with its worst ratio, and where that is."""
+    violation = requirement.worst(information)
+    item: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
+    if violation.frequency is not None:
+        item["frequency"] = violation.frequency / units.frequency
+    if requirement.entry is not None and not units.single:
+        item["entry"] = units.entry(*requirement.entry)
+    elif requirement.of_the_norm:
+        item["norm"] = "frobenius"
+    return item
+
+
+def powers(problem: Problem, basis: Basis, x: Array) -> dict[str, list[float]]:
+    """The powers of input, output and excitation, one entry a channel."""
+    at, model = problem.on(basis), problem.experiment.model
+    channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
+    return {kind: [at.power(kind, c).at(x) for c in range(channels[kind])] for kind in POWER_KINDS}
+
+
+def _cost(done: Designed, basis: Basis, x: Array) -> float:
+    spent = powers(done.design.problem, basis, x)
+    total = 0.0
+    for kind, channel, weight in weights_of(done.cost):
+        total += weight * (sum(spent[kind]) if channel is None else spent[kind][channel])
+    return total
+
+
+def _objective(design: Design) -> dict[str, Any]:
+    found, anything = design.result, design.any_spectrum
+    value, bound, any_bound = found.objective, found.certificate.bound, anything.certificate.bound
+    criterion, goal = design.problem.stated_criterion, design.problem.goal
+    if goal == "factor" and criterion is not None:
+        # s is the inverse of the level, so that its lower bound is an upper bound of the criterion.
+        reached, best = criterion.value(1.0 / value), criterion.value(1.0 / max(bound, 1e-300))
+        size = design.problem.experiment.size if criterion.letter == "D" else abs(reached)
+        return {
+            "kind": criterion.letter,
+            "value": reached,
+            "upper_bound": best,
+            "relative_gap": abs(best - reached) / size,
+            "any_spectrum_bound": criterion.value(1.0 / max(any_bound, 1e-300)),
+        }
+    if goal == "factor":
+        value, bound, any_bound = (float(np.sqrt(v)) for v in (value, bound, any_bound))
+    return {
+        "kind": _KINDS[goal],
+        "value": value,
+        "lower_bound": bound,
+        "relative_gap": abs(value - bound) / value if value > 0 else 0.0,
+        "any_spectrum_bound": any_bound,
+    }
+
+
+def _information(done: Designed) -> Array:
+    """M of the delivered spectrum over the delivered number of samples."""
+    if done.design.problem.goal != "samples":
+        return done.design.result.information
+    samples = float(done.experiment.samples)
+    return candidate_at(done.problem, samples * done.design.result.x, samples).information
+
+
+def _white(done: Designed, cost: float) -> dict[str, Any]:
+    """Flat excitation that meets the same requirements, or exhausts the same limits."""
+    design, problem = done.design, done.design.problem
+    basis, x = flat_basis(problem.experiment), np.array([design.white_power])
+    white_cost = _cost(done, basis, x)
+    entry: dict[str, Any] = {
+        "cost": white_cost,
+        "power": powers(problem, basis, x),
+        "ratio": white_cost / cost if cost > 0 else 1.0,
+    }
+    if problem.goal == "samples":
+        entry["samples"] = int(np.ceil(design.white.s * (1 - 1e-9)))
+    elif problem.stated_criterion is not None:
+        entry["value"] = problem.stated_criterion.value(1.0 / design.white.objective)
+    elif problem.goal == "factor":
+        entry["value"] = float(np.sqrt(design.white.objective))
+    if done.question.limits or done.question.densities:
+        entry["within_limits"] = design.white_within
+    return entry
+
+
+def _limits(done: Designed) -> list[dict[str, Any]]:
+    """Each power limit with what the design uses of it, and the tightest place of density limits."""
+    x, at = done.design.result.x, done.problem
+    entries: list[dict[str, Any]] = []
+    for limit in done.question.limits:
+        value = at.power(limit.kind, limit.channel).at(x)
+        slack = (limit.bound - value) if limit.upper else (value - limit.bound)
+        entry: dict[str, Any] = {"name": f"{limit.kind}_power"}
+        if limit.channel is not None:
+            entry["channel"] = limit.channel + 1
+        entry |= {
+            "max" if limit.upper else "min": limit.bound,
+            "value": value,
+            "binding": slack <= _BINDS * limit.bound,
+        }
+        entries.append(entry)
+    for index, density in enumerate(done.question.densities):
+        breaches = [b for b in at.density_breaches(x, 1.0, above=-np.inf) if b.place.limit == index]
+        tightest = max(breaches, key=lambda b: b.ratio)
+        entries.append(
+            {
+                "name": "spectrum",
+                "kind": "max" if density.upper else "min",
+                "worst_ratio": tightest.ratio,
+                "frequency": tightest.place.frequency / done.units.frequency,
+                "binding": tightest.ratio >= 1.0 - _BINDS,
+            }
+        )
+    return entries
+
+
+def _notes(done: Designed) -> list[str]:
+    """What a user should know before trusting a number."""
+    found, units, experiment = done.design.result, done.units, done.experiment
+    if not found.x.any():
+        sources = ["the noise in normal operation"] if units.closed_loop else []
+        sources += ["experiment.prior"] if experiment.prior is not None else []
+        known = " and ".join(sources) or "the noise"
+        return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
+    if units.closed_loop and not found.basis.has_density:
+        return _free_of_charge(done)
+    return []
+
+
+def _free_of_charge(done: Designed) -> list[str]:
+    """Whether sinusoids of the design lie where power costs next to nothing."""
+    units, problem = done.units, done.problem
+    lines, matrices = done.design.result.basis.lines(done.design.result.x)
+    power = np.einsum("naa->n", matrices).real
+    costs, all_costs = (_unit_price(problem.price.density(w)) for w in (lines, problem.grid))
+    cheap = (costs < _FREE * all_costs.max()) & (power > _SUPPORT * power.sum())
+    if not np.any(cheap):
+        return []
+    at = float(lines[cheap].max()) / units.frequency
+    near_zero = at < 1e-6 * np.pi / units.frequency
+    where = "near frequency zero" if near_zero else f"below {at:.3g} {units.per_time}"
+    return [
+        f"power {where} is almost free of charge in this loop (integral action), so that the excitation "
+        "power of the optimum is ill defined: give cost.excitation_power a small weight, or limit it"
+    ]
+
+
+def _unit_price(density: Array) -> Array:
+    """The price (n,) of power one, even over the channels."""
+    return density if density.ndim == 1 else np.einsum("naa->n", density).real / density.shape[1]

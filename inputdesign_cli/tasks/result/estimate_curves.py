@@ -1,0 +1,92 @@
+"""Tables and curves of an estimate: how it fits, what it leaves unexplained, and what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.accuracy import ModelError, Requirement, worst
+from inputdesign_cli.identification import Estimate
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, Json, ResidualCurves, Table
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.result.bound import bound_curves
+
+
+def data_curves(
+    units: Units, u: Array, y: Array, model: Model, estimate: Estimate
+) -> tuple[dict[str, Table], dict[str, Curves]]:
+    """fit.csv and residuals.csv with their figures.
+
+    Args:
+        u, y: the record, (samples, r) and (samples, p).
+        model: the estimate as a model.
+    """
+    instants = units.sample_time * np.arange(len(y), dtype=np.float64)
+    predicted = y - estimate.errors
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        simulated, _ = model.simulate(u, np.zeros(y.shape), units.step)
+    columns = {units.time_header: instants, **_columns(units, "u", u), **_columns(units, "y", y)}
+    columns |= _columns(units, "y", predicted, "_predicted")
+    panels = []
+    for i, fit in enumerate(estimate.fit):
+        curve = None if fit is None else simulated[:, i]
+        if curve is not None:
+            columns[f"y{_number(units, i)}_simulated"] = curve
+        panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i))
+    columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
+    white, cross = estimate.whiteness, estimate.independence
+    shared = min(white.lags.size, cross.lags.size)
+    residuals = {"autocorrelation_lag": white.lags[:shared]}
+    residuals |= _pairs(units, "autocorrelation", white.correlation[:shared])
+    residuals |= {"cross_correlation_lag": cross.lags[:shared]}
+    residuals |= _pairs(units, "cross_correlation", cross.correlation[:shared])
+    curves: dict[str, Curves] = {
+        "fit": FitCurves(instants, tuple(panels)),
+        "residuals": ResidualCurves(
+            white.lags,
+            white.correlation,
+            cross.lags,
+            cross.correlation,
+            white.limit,
+            white.probability,
+            cross.probability,
+        ),
+    }
+    return {"fit": Table(columns), "residuals": Table(residuals)}, curves
+
+
+def bound_of_data(
+    units: Units, requirements: Sequence[Requirement], entries: Sequence[ModelError], information: Array
+) -> tuple[Table, BoundCurves, dict[str, Json]]:
+    """bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
+
+    Args:
+        entries: what has r_u of every entry of G where no requirement bounds it.
+        information: (k, k) of the data.
+    """
+    entry: dict[str, Json] = {}
+    bounding = [r for r in requirements if r.bounded_error is not None]
+    if bounding:
+        violation = worst([r.worst(information) for r in bounding])
+        entry["worst_ratio"] = violation.ratio
+        if violation.frequency is not None:
+            entry["worst_frequency"] = violation.frequency / units.frequency
+    errors = [error for error in (r.bounded_error for r in bounding) if error is not None]
+    table, curves = bound_curves(units, errors or entries, information, stated=bool(errors), label="data")
+    return table, curves, entry
+
+
+def _number(units: Units, channel: int) -> str:
+    return "" if units.single else f"{channel + 1}"
+
+
+def _columns(units: Units, name: str, values: Array, of: str = "") -> dict[str, Array]:
+    return {f"{name}{_number(units, i)}{of}": column for i, column in enumerate(values.T)}
+
+
+def _pairs(units: Units, name: str, values: Array) -> dict[str, Array]:
+    _, rows, columns = values.shape
+    return {f"{name}{units.suffix(i, j)}": values[:, i, j] for i in range(rows) for j in range(columns)}

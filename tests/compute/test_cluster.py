@@ -1,0 +1,171 @@
+"""A real scheduler and two worker processes on loopback: the same results, whatever happens to a worker."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import jobs
+import pytest
+from sweep_files import SPEC, timeless_files, timeless_rows
+
+from inputdesign_cli import load_spec, simulate
+from inputdesign_cli.compute.cluster import Cluster
+from inputdesign_cli.compute.processes import Processes
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.runs.text_formats import json_text
+from inputdesign_cli.sweep.running import sweep
+
+pytest.importorskip("distributed")
+# Dask's own warnings are not ours to mend.
+pytestmark = pytest.mark.filterwarnings("default")
+
+SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+PATHS = os.pathsep.join(str(Path(__file__).parents[up]) for up in (0, 2))
+
+
+class Loopback:
+    """A scheduler and its workers, each a process of its own (no nanny: a killed worker stays dead)."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = folder / "scheduler.json"
+        self.environment = {**os.environ, "PYTHONPATH": PATHS, "OPENBLAS_NUM_THREADS": "1"}
+        options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show", "--no-jupyter"]
+        self.processes = [self.start("scheduler", *options, "--scheduler-file", str(self.file))]
+        deadline = time.monotonic() + 30
+        while not self.file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        self.folder = folder
+
+    def start(self, *arguments: str) -> subprocess.Popen:
+        command = [sys.executable, "-m", "dask", *arguments]
+        return subprocess.Popen(command, env=self.environment, **SILENT)
+
+    def add_worker(self) -> subprocess.Popen:
+        options = ["--no-nanny", "--no-dashboard", "--nthreads", "1", "--host", "127.0.0.1"]
+        place = ["--local-directory", str(self.folder / "scratch")]
+        worker = self.start("worker", "--scheduler-file", str(self.file), *options, *place)
+        self.processes.append(worker)
+        return worker
+
+    @property
+    def address(self) -> str:
+        import json
+
+        return json.loads(self.file.read_text())["address"]
+
+    def end(self) -> None:
+        for process in reversed(self.processes):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture(scope="module")
+def loopback(tmp_path_factory):
+    cluster = Loopback(tmp_path_factory.mktemp("cluster"))
+    cluster.add_worker()
+    cluster.add_worker()
+    yield cluster
+    cluster.end()
+
+
+def test_two_workers_share_the_work(loopback):
+    done = list(Cluster(loopback.address).run(jobs.slow_identity, range(8)))
+    assert sorted(f.answer[0] for f in done) == list(range(8))
+    assert len({f.answer[1] for f in done}) == 2
+
+
+def test_errors_come_back(loopback):
+    done = {f.job: f for f in Cluster(loopback.address).run(jobs.fail_on_three, range(5))}
+    assert str(done[3].error) == "three"
+    assert done[4].answer == 4
+
+
+def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_path):
+    spec = tmp_path / "small.yaml"
+    spec.write_text(SPEC)
+    settings = ["experiment.samples=60:71:1", "spectrum.order=1,-1"]
+    here = tmp_path / "here"
+    sweep(spec, settings, directory=here)
+    victim = loopback.add_worker()
+    killed = []
+
+    def kill_one(progress):
+        if progress.passed == 5 and not killed:
+            victim.send_signal(signal.SIGKILL)
+            killed.append(victim)
+
+    there = tmp_path / "there"
+    done = sweep(spec, settings, directory=there, executor=Cluster(loopback.address), watch=kill_one)
+    assert killed
+    assert done.statuses == {"invalid": 12, "optimal": 12}
+    assert timeless_rows(there) == timeless_rows(here)
+    assert timeless_files(there) == timeless_files(here)
+
+
+def test_data_files_travel_with_the_points(loopback, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "r.csv").write_text("frequency,r_adm\n0,1\n3.2,1\n")
+    spec = tmp_path / "a" / "t.yaml"
+    spec.write_text(SPEC.replace("relative: 0.1", "table: ../r.csv"))
+    settings = ["experiment.samples=60,70"]
+    sweep(spec, settings, directory=tmp_path / "here")
+    sweep(spec, settings, directory=tmp_path / "there", executor=Cluster(loopback.address))
+    assert timeless_files(tmp_path / "there") == timeless_files(tmp_path / "here")
+    assert {row["status"] for row in timeless_rows(tmp_path / "there")} == {"optimal"}
+
+
+@pytest.mark.slow
+def test_a_sweep_whose_scheduler_ends_is_finished_later(spec, tmp_path):
+    cluster = Loopback(tmp_path)
+    cluster.add_worker()
+    setting = ["experiment.samples=60:66:1"]
+
+    def end(progress):
+        if progress.passed == 2:
+            cluster.end()
+
+    try:
+        executor = Cluster(cluster.address, patience=2.0)
+        with pytest.raises(DataError) as caught:
+            sweep(spec, setting, directory=tmp_path / "o", executor=executor, watch=end)
+    finally:
+        cluster.end()
+    assert caught.value.diagnostics[0].code == "cluster-unreachable"
+    assert sweep(spec, setting, directory=tmp_path / "o").computed <= 5
+
+
+def test_no_cluster_is_a_complaint():
+    with pytest.raises(DataError) as caught:
+        list(Cluster("tcp://127.0.0.1:9", patience=0.5).run(jobs.square, [1]))
+    assert caught.value.diagnostics[0].code == "cluster-unreachable"
+    with pytest.raises(DataError) as caught:
+        list(Cluster("nonsense://x").run(jobs.square, [1]))
+    assert caught.value.diagnostics[0].code == "cluster-unreachable"
+
+
+SPECS = Path(__file__).parents[2] / "specs"
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("regression", ["simulation.runs=500", "simulation.compare=[binary]"]),
+        ("distillation_column", ["experiment.samples=1000", "simulation.runs=450", "signal.candidates=1"]),
+    ],
+)
+def test_simulated_runs_are_the_same_wherever_they_are_computed(loopback, name, overrides):
+    spec = load_spec(SPECS / f"{name}.yaml", overrides)
+    here, there, beyond = (
+        timeless(simulate(spec, executor=executor))
+        for executor in (None, Processes(2), Cluster(loopback.address))
+    )
+    assert here == there
+    assert here == beyond
+
+
+def timeless(outcome):
+    return json_text({key: value for key, value in outcome.result.items() if key != "timing_s"})

@@ -1,0 +1,246 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from channel_plants import arrays, arx, box_jenkins
+from channel_records import shifted, simulated
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import fit_batch, identify, identify_polynomials
+from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.spectrum import MatrixFirBasis
+
+
+def theory(model, samples):
+    """M of unit white inputs, from the frequency domain."""
+    experiment = Experiment(model, samples)
+    basis = MatrixFirBasis(model.inputs, 0)
+    maps = basis.integrals(experiment.information_density, experiment.singularities)
+    densities = np.array([basis.density(unit, np.zeros(1))[0].real.ravel() for unit in np.eye(len(maps))])
+    x = np.linalg.lstsq(densities.T, np.eye(model.inputs).ravel(), rcond=None)[0]
+    return experiment.baseline_information + np.tensordot(x, maps, axes=1)
+
+
+def stacked(model, u, y):
+    """Regressors (samples, p, k) of the 2 x 2 ARX plant with a common A of two coefficients, by hand."""
+    n = len(y)
+    phi = np.zeros((n, 2, 10))
+    for i in range(2):
+        for lag in (1, 2):
+            phi[:, i, lag - 1] = shifted(-y[:, i], lag)
+            for j in range(2):
+                phi[:, i, 2 + 4 * i + 2 * j + lag - 1] = shifted(u[:, j], lag)
+    return phi
+
+
+def test_names_and_places_are_those_of_the_model():
+    for model in (arx(), arx(per_output=False), box_jenkins()):
+        structure = Structure.of(model)
+        assert structure.names == model.names
+        assert structure.in_plant + structure.in_noise == len(model.names)
+        for i, (row, place) in enumerate(zip(structure.rows, structure.places, strict=True)):
+            acting = {k for k, p in enumerate(model.parameters) if any(o == i for o, _ in p.places)}
+            assert set(place.tolist()) == acting
+            p = row.polynomials(model.theta[None, place])
+            np.testing.assert_allclose(p.A[0], model.A[0 if len(model.A) == 1 else i])
+            for entry, B, F in zip(row.entries, p.B, p.F, strict=True):
+                np.testing.assert_allclose(B[0], model.B[i][entry.input])
+                np.testing.assert_allclose(F[0], model.F[i][entry.input])
+
+
+def test_a_model_takes_other_parameters():
+    model = box_jenkins()
+    theta = model.theta + np.linspace(-0.1, 0.1, model.theta.size)
+    moved = model.at(theta, np.eye(2))
+    np.testing.assert_allclose(moved.theta, theta)
+    assert moved.names == model.names
+    np.testing.assert_array_equal(moved.covariance, np.eye(2))
+
+
+@pytest.mark.parametrize("runs", [3, 30])
+@pytest.mark.parametrize("known", [True, False])
+def test_cost_and_gradient_are_those_of_finite_differences(runs, known):
+    model, rng = box_jenkins(), np.random.default_rng(1)
+    structure = Structure.of(model)
+    u, y = simulated(model, 80, rng, runs)
+    problem = structure.problem(u, y, model.covariance if known else None)
+    theta = model.theta * (1 + 0.03 * rng.standard_normal((runs, structure.size)))
+    _, hessian, slope = problem.at(theta)
+    for k in range(structure.size):
+        step = np.zeros(structure.size)
+        step[k] = 1e-6
+        ahead, behind = (problem.at(theta + sign * step)[0] for sign in (1, -1))
+        expected = -(ahead - behind) / 4e-6
+        scale = np.sqrt(hessian[:, k, k] * problem.at(theta)[0])
+        np.testing.assert_allclose(slope[:, k] / scale, expected / scale, atol=1e-6)
+
+
+def test_prediction_errors_at_the_truth_are_the_noise():
+    model, rng = box_jenkins(), np.random.default_rng(2)
+    u, y = simulated(model, 3000, rng)
+    structure = Structure.of(model)
+    S = structure.problem(u, y).sums(model.theta[None]).errors[0] / 3000
+    np.testing.assert_allclose(S, model.covariance, atol=6 * np.max(model.covariance) / np.sqrt(3000))
+
+
+def test_arx_with_a_common_a_is_stacked_least_squares():
+    model = arx(per_output=False)
+    u, y = (x[0] for x in simulated(model, 300, np.random.default_rng(3)))
+    phi = stacked(model, u, y).reshape(600, 10)
+    found = identify_polynomials(model, u, y, noise=np.eye(2))
+    expected = np.linalg.lstsq(phi, y.reshape(600), rcond=None)[0]
+    np.testing.assert_allclose(found.theta, expected, atol=1e-9)
+    np.testing.assert_allclose(found.information, phi.T @ phi, rtol=1e-9, atol=1e-6)
+
+
+def test_with_a_known_covariance_it_is_generalised_least_squares():
+    model = arx(per_output=False)
+    u, y = (x[0] for x in simulated(model, 300, np.random.default_rng(4)))
+    root = np.linalg.inv(np.linalg.cholesky(model.covariance))
+    phi = np.einsum("pq,nqk->npk", root, stacked(model, u, y)).reshape(600, 10)
+    expected = np.linalg.lstsq(phi, (y @ root.T).reshape(600), rcond=None)[0]
+    found = identify_polynomials(model, u, y, noise=model.covariance)
+    np.testing.assert_allclose(found.theta, expected, atol=1e-9)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(phi.T @ phi), rtol=1e-7, atol=1e-12)
+
+
+def test_an_unknown_covariance_is_that_of_the_residuals():
+    """Iterated generalised least squares (Zellner) ends where the determinant is least."""
+    model = arx(per_output=False)
+    u, y = (x[0] for x in simulated(model, 300, np.random.default_rng(5)))
+    phi = stacked(model, u, y)
+    covariance = np.eye(2)
+    for _ in range(50):
+        root = np.linalg.inv(np.linalg.cholesky(covariance))
+        whitened = np.einsum("pq,nqk->npk", root, phi).reshape(600, 10)
+        theta = np.linalg.lstsq(whitened, (y @ root.T).reshape(600), rcond=None)[0]
+        left = y - phi @ theta
+        covariance = left.T @ left / 300
+    found = identify(model, u, y)
+    assert found.converged
+    np.testing.assert_allclose(found.theta, theta, atol=1e-8)
+    np.testing.assert_allclose(found.errors, left, atol=1e-7)
+    # Unbiased to first order: each output has four parameters of its own and half of the common two.
+    np.testing.assert_allclose(found.noise, covariance * 300 / (300 - 5), rtol=1e-6)
+
+
+def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone():
+    model = replace(box_jenkins(), A=(np.ones(1),), D=(np.ones(1),), covariance=np.diag([1.0, 4.0]))
+    u, y = (x[0] for x in simulated(model, 600, np.random.default_rng(7)))
+    both = identify_polynomials(model, u, y, noise=model.covariance)
+    for i in range(2):
+        own = PolynomialModel(
+            model.B[i : i + 1], model.A, model.F[i : i + 1], (model.C[i],), model.D, np.eye(1)
+        )
+        alone = identify(own, u, y[:, i : i + 1])
+        mine = [k for k, p in enumerate(model.parameters) if p.places[0][0] == i]
+        np.testing.assert_allclose(both.theta[mine], alone.theta, atol=1e-5)
+
+
+@pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
+def test_known_parameters_are_recovered_without_a_start(model):
+    u, y = (x[0] for x in simulated(model, 3000, np.random.default_rng(8)))
+    found = identify(model, u, y)
+    assert found.converged
+    off, k = found.theta - model.theta, len(found.names)
+    # Mahalanobis distance: chi-squared with k degrees of freedom.
+    assert off @ np.linalg.solve(found.covariance, off) < k + 6 * np.sqrt(2 * k)
+    np.testing.assert_allclose(found.noise, model.covariance, atol=0.15 * model.covariance.max())
+    assert found.whiteness.probability > 1e-3
+    assert found.independence.probability > 1e-3
+    np.testing.assert_allclose(found.information, theory(model, 3000), atol=0.1 * theory(model, 3000).max())
+
+
+def test_units_of_the_channels_do_not_matter():
+    model = arx(per_output=False)
+    u, y = (x[0] for x in simulated(model, 400, np.random.default_rng(9)))
+    plain = identify(model, u, y)
+    scaled = identify(model, u * [1e4, 1e-3], y * [1e-5, 1e6])
+    assert scaled.converged
+    np.testing.assert_allclose(scaled.theta[:2], plain.theta[:2], atol=1e-7)
+    assert scaled.whiteness.statistic == pytest.approx(plain.whiteness.statistic, rel=1e-5)
+
+
+def test_a_batch_reaches_the_covariance_of_theory():
+    model, runs = arx(), 200
+    u, y = simulated(model, 1000, np.random.default_rng(10), runs)
+    found = fit_batch(model, u, y, start=model.theta)
+    assert np.all(found.converged)
+    information = theory(model, 1000)
+    eigenvalues = whitened_eigenvalues(found.theta, information)
+    low, high = wishart_range(10, runs, np.random.default_rng(11))
+    assert low < eigenvalues.min() <= eigenvalues.max() < high
+    np.testing.assert_allclose(found.noise.mean(axis=0), model.covariance, atol=0.02)
+    alone = identify(model, u[3], y[3], start=model.theta)
+    np.testing.assert_allclose(found.theta[3], alone.theta, atol=1e-7)
+    np.testing.assert_allclose(found.information[3], alone.information, rtol=1e-6, atol=1e-6)
+
+
+def test_residual_tests_are_as_often_significant_as_they_should():
+    model = arx()
+    u, y = simulated(model, 400, np.random.default_rng(12), 40)
+    tests = [identify(model, u[i], y[i], start=model.theta) for i in range(40)]
+    for probabilities in (
+        [t.whiteness.probability for t in tests],
+        [t.independence.probability for t in tests],
+    ):
+        assert 0.3 < np.mean(probabilities) < 0.7
+        assert np.mean(np.array(probabilities) < 0.05) < 0.2
+
+
+def test_a_model_that_is_too_small_fails_the_residual_tests():
+    u, y = (x[0] for x in simulated(box_jenkins(), 2000, np.random.default_rng(13)))
+    one = (np.ones(1),)
+    small = PolynomialModel(arrays([[[0, 1.0]] * 3] * 2), one, arrays([[[1.0]] * 3] * 2), one, one, np.eye(2))
+    found = identify(small, u, y)
+    assert found.whiteness.probability < 1e-6
+    assert found.independence.probability < 1e-6
+
+
+def _channel(x, index, values):
+    x = x.copy()
+    x[:, index] = values
+    return x
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "named"),
+    [
+        (lambda u, y: (u[:10], y[:10]), "too-few-samples", "10 samples"),
+        (lambda u, y: (_channel(u, 1, 2.0), y), "constant-input", "u2"),
+        (lambda u, y: (u, _channel(y, 1, 0.0)), "constant-output", "y2"),
+        (lambda u, y: (_channel(u, 1, u[:, 0]), y), "not-exciting", "b1[1,1]"),
+        (lambda u, y: (u, _channel(y, 1, shifted(u[:, 0], 1))), "noise-free-data", "y2"),
+    ],
+)  # fmt: skip
+def test_bad_data_is_refused_and_the_channel_named(change, code, named):
+    u, y = (x[0] for x in simulated(arx(), 300, np.random.default_rng(14)))
+    with pytest.raises(SpecError) as caught:
+        identify(arx(), *change(u, y))
+    assert caught.value.diagnostics[0].code == code
+    assert named in caught.value.diagnostics[0].message
+
+
+def test_outputs_of_the_same_noise_are_refused():
+    same = replace(arx(per_output=False), B=(arx().B[0],) * 2)
+    u, y = (x[0] for x in simulated(same, 300, np.random.default_rng(15)))
+    with pytest.raises(SpecError, match="y1 and y2"):
+        identify(same, u, np.stack([y[:, 0], 2.0 * y[:, 0]], axis=1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", [arx(), arx(per_output=False), box_jenkins()], ids=["arx", "common", "bj"])
+def test_estimates_reach_the_cramer_rao_bound(model):
+    u, y = simulated(model, 3000, np.random.default_rng(16), 500)
+    found = fit_batch(model, u, y, start=model.theta)
+    assert np.all(found.converged)
+    information = theory(model, 3000)
+    # The mean square in units of the bound, over all directions: its own error is sqrt(2 / (500 k)).
+    whitened = (found.theta - model.theta) @ np.linalg.cholesky(information)
+    assert np.sqrt(np.mean(whitened**2)) == pytest.approx(1.0, abs=0.05)
+    eigenvalues = whitened_eigenvalues(found.theta, information)
+    low, high = wishart_range(len(model.names), 500, np.random.default_rng(17))
+    assert low < eigenvalues.min() <= eigenvalues.max() < high

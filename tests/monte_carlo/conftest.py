@@ -1,3 +1,0 @@
-from conftest_study import spec, stub
-
-__all__ = ["spec", "stub"]

@@ -1,0 +1,162 @@
+"""Whatever the text, a spec is read or complained about; nothing else ever happens."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from inputdesign_cli.diagnostics import as_json, render
+from inputdesign_cli.error_codes import explanations
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification import parse_spec
+
+HERE = Path(__file__).parent
+SPECS = sorted([*(HERE / "data").glob("*.yaml"), *(HERE.parents[1] / "specs").glob("*.yaml")])
+TEXTS = [path.read_text() for path in SPECS]
+DATA = [yaml.safe_load(text) for text in TEXTS]
+
+RAW = (
+    "Input should", "valid dictionary", "Field required", "Extra inputs", "pydantic", "Traceback", "{key}",
+    "\x00", "Value error", "unable to",
+)  # fmt: skip
+
+quick = settings(
+    max_examples=150, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
+)
+
+
+def read_or_complain(text, overrides=()):
+    error = None
+    try:
+        spec = parse_spec(text, "f.yaml", overrides)
+    except SpecError as caught:
+        error = caught
+    if error is None:
+        again = parse_spec(spec.to_yaml())
+        assert again.sha256 == spec.sha256
+        assert again.model_dump() == spec.model_dump()
+        return
+    assert error.diagnostics
+    for diagnostic in error.diagnostics:
+        assert diagnostic.code in explanations(), diagnostic
+        assert diagnostic.message
+        assert diagnostic.location is not None, diagnostic
+        assert diagnostic.location.line >= 1
+        assert 1 <= diagnostic.location.column <= len(diagnostic.location.text) + 1, diagnostic
+        assert not any(phrase in diagnostic.message + diagnostic.hint for phrase in RAW), diagnostic
+    assert render(error)
+    assert json.dumps(as_json(error))
+
+
+WORDS = (
+    "plant noise variance B F A C accuracy model_error relative sensitivity spectrum type fir given limits "
+    "max continuous numerator denominator regression signal simulation criterion D true null ~ 1 -1 0 1e-3 "
+    ".inf .nan 010 0x1 1e999 [ ] { } , : - ? & * &a *a ! | > % @ ` ' # << <<: --- ..."
+)
+words = st.sampled_from(
+    [*WORDS.split(), '"', "\n", "\n  ", ": ", ": [", "]\n", " ", "\t", "\u2028", "é", "\x85"]
+)
+
+
+@quick
+@given(st.lists(words, max_size=60).map(" ".join))
+def test_words_of_the_language_in_any_order(text):
+    read_or_complain(text)
+
+
+@quick
+@given(st.text(max_size=80))
+def test_any_text(text):
+    read_or_complain(text)
+
+
+@quick
+@given(
+    st.sampled_from(TEXTS),
+    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 4), st.text(max_size=3)), max_size=4),
+)
+def test_examples_with_characters_cut_out_and_put_in(text, edits):
+    for where, cut, insert in edits:
+        at = int(where * len(text))
+        text = text[:at] + insert + text[at + cut :]
+    read_or_complain(text)
+
+
+def paths(node, path=()):
+    yield path
+    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, value in items:
+        yield from paths(value, (*path, key))
+
+
+scalars = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 3),
+    st.sampled_from([0, 1, -1, 10**400, 1e308, -1e308, 1e-308, 5e-324, float("inf"), float("nan")]),
+    st.floats(),
+    st.sampled_from(["", "fir", "white", "D", "1e-3", "zoh", "x", "moments", "least_cost", "best_accuracy"]),
+    st.text(max_size=5),
+)
+KEYS = {str(k) for d in DATA for p in paths(d) for k in p} | {"", "x", "1", "table", "max", "min"}
+keys = st.sampled_from(sorted(KEYS))
+values = st.recursive(
+    scalars,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(keys, inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@st.composite
+def mutated(draw):
+    data = copy.deepcopy(draw(st.sampled_from(DATA)))
+    for _ in range(draw(st.integers(1, 3))):
+        path = draw(st.sampled_from(list(paths(data))))
+        if not path:
+            continue
+        holder = data
+        for step in path[:-1]:
+            holder = holder[step]
+        action = draw(st.sampled_from(["replace", "graft", "delete", "add"]))
+        if action == "replace":
+            holder[path[-1]] = draw(values)
+        elif action == "graft":
+            donor = draw(st.sampled_from(DATA))
+            part = donor
+            for step in draw(st.sampled_from(list(paths(donor)))):
+                part = part[step]
+            holder[path[-1]] = copy.deepcopy(part)
+        elif action == "delete":
+            del holder[path[-1]]
+        elif isinstance(holder, dict):
+            holder[draw(keys)] = draw(values)
+        else:
+            holder.append(draw(values))
+    return data
+
+
+@settings(quick, max_examples=500)
+@given(mutated())
+def test_examples_with_parts_replaced(data):
+    read_or_complain(yaml.safe_dump(data, allow_unicode=True, default_flow_style=None))
+
+
+@settings(quick, max_examples=50)
+@given(
+    st.sampled_from(TEXTS),
+    st.lists(st.sampled_from(sorted({".".join(map(str, p)) for d in DATA for p in paths(d)})), max_size=3),
+    st.data(),
+)
+def test_random_overrides(text, targets, data):
+    overrides = [
+        f"{t}={data.draw(values | st.text(max_size=4))!r}"
+        if data.draw(st.booleans())
+        else f"{t}={data.draw(words)}"
+        for t in targets
+    ]
+    read_or_complain(text, overrides)

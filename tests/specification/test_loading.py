@@ -1,0 +1,334 @@
+"""Good specs: what each says, its defaults, and what the other rooms ask of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pydantic
+import pytest
+
+import inputdesign_cli.specification as room
+from inputdesign_cli.errors import Diagnostic, InfeasibleError, SpecError
+from inputdesign_cli.specification import load_spec, parse_spec
+from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenWhite
+
+HERE = Path(__file__).parent
+SPECS = sorted([*(HERE / "data").glob("*.yaml"), *(HERE.parents[1] / "specs").glob("*.yaml")])
+
+GOOD = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
+REST = "noise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
+
+
+def by_name(name):
+    return load_spec(next(p for p in SPECS if p.stem == name))
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda p: p.stem)
+def test_every_example_loads_and_survives_writing_and_pickling(path):
+    spec = load_spec(path)
+    again = parse_spec(spec.to_yaml())
+    assert again.sha256 == spec.sha256
+    assert again.model_dump() == spec.model_dump()
+    assert again.to_yaml() == spec.to_yaml()
+    copy = pickle.loads(pickle.dumps(spec))
+    assert copy.model_dump() == spec.model_dump()
+    assert copy.locate("plant") == spec.locate("plant")
+
+
+def test_the_first_order_example():
+    spec = by_name("first_order")
+    assert spec.plant.B == (0.0, 3.6)
+    assert spec.plant.A == (1.0,)
+    assert spec.plant.B_matrix == (((0.0, 3.6),),)
+    assert spec.plant.F_matrix == (((1.0, -0.7),),)
+    assert (spec.plant.inputs, spec.plant.outputs, spec.plant.sampled) == (1, 1, True)
+    assert spec.noise.C == (1.0, -0.9)
+    assert spec.noise.variance == 1.0
+    assert spec.experiment.samples == 500
+    assert isinstance(spec.experiment.samples, int)
+    assert (spec.cost.input_power, spec.cost.output_power) == (1.0, 0.0)
+    assert (spec.accuracy.model_error.relative, spec.accuracy.model_error.alpha) == (0.01, 2.45)
+    assert spec.accuracy.model_error.probability is None
+    assert spec.accuracy.model_error.region == "first_order"
+    assert spec.spectrum == FirSpectrum(type="fir", order=20)
+    assert spec.goal == "least_cost"
+    assert spec.signal_samples == 500
+    assert spec.nyquist == math.pi
+    assert spec.accuracy.requirements == ("model_error",)
+
+
+def test_the_closed_loop_example():
+    spec = by_name("flexible_transmission")
+    assert spec.closed_loop
+    controller = spec.experiment.controller
+    assert len(controller.denominator_factors) == 2
+    # (1 - p z) times a polynomial, multiplied out by hand
+    p, factor = 0.999455, controller.denominator_factors[1]
+    expected = [a - p * b for a, b in zip((*factor, 0.0), (0.0, *factor), strict=True)]
+    assert controller.denominator_polynomial == pytest.approx(expected)
+    assert spec.accuracy.model_error.sensitivity.weight.denominator_polynomial == (1.0, -0.999455)
+    assert spec.clip_band(spec.accuracy.model_error.band) == (0.001, math.pi)
+    assert spec.simulation.compare == ("white",)
+    assert spec.simulation.noise.variance == 0.5
+
+
+def test_the_mimo_example():
+    spec = by_name("distillation_column")
+    assert (spec.plant.inputs, spec.plant.outputs) == (2, 2)
+    assert spec.plant.A_per_output == ((1.0, -0.9736857494),) * 2
+    assert spec.noise.covariance(2).tolist() == [[1e-10, 0.0], [0.0, 1e-10]]
+    assert spec.nyquist == math.pi / 2
+    control = spec.accuracy.closed_loop_error.control
+    assert control.model_reference.kind == "continuous"
+    assert control.model_reference.continuous.denominator == (75.0, 1.0)
+    assert spec.goal == "best_accuracy"
+    assert spec.limits.input_power.max == 2.0
+
+
+def test_the_continuous_time_example():
+    spec = by_name("two_by_two")
+    assert spec.plant.kind == "continuous"
+    assert not spec.plant.sampled
+    assert spec.nyquist == math.inf
+    assert spec.plant.continuous.denominator_matrix[1][0] == (1.0, 0.5, 1.063)
+    assert np.array_equal(spec.noise.covariance(2), np.eye(2))
+    assert spec.simulation.noise.relative_std == 0.1
+    assert spec.experiment.samples == 1
+    assert spec.signal_samples == 8192
+
+
+def test_the_regression_example():
+    spec = by_name("regression")
+    assert spec.plant.regression.neglected == 1
+    assert spec.simulation.plant.parameters == (2.0, -1.0)
+    assert spec.accuracy.requirements == ("mean_squared_error",)
+    assert spec.goal == "least_cost"
+
+
+def test_common_factors_of_a_transfer_matrix_are_multiplied():
+    spec = parse_spec(
+        "plant: {continuous: {numerator: [[[1], [2]]], denominator: [[1, 2], [1, 3]]}, sample: zoh}\n" + REST
+    )
+    assert spec.plant.continuous.denominator_matrix == (((1.0, 5.0, 6.0), (1.0, 5.0, 6.0)),)
+    assert spec.plant.sampled
+
+
+def test_defaults_that_depend_on_the_rest():
+    open_loop = parse_spec(GOOD)
+    assert (open_loop.cost.input_power, open_loop.cost.output_power) == (1.0, 0.0)
+    assert open_loop.spectrum.type == "fir"
+    assert open_loop.accuracy.model_error.probability == 0.95
+    assert (open_loop.solver.method, open_loop.solver.tolerance, open_loop.solver.grid) == (
+        "exchange",
+        1e-7,
+        1000,
+    )
+    closed = parse_spec(GOOD + "experiment: {controller: {numerator: [0.1]}}\n")
+    assert (closed.cost.input_power, closed.cost.output_power) == (1.0, 1.0)
+    best = parse_spec(
+        GOOD.replace("model_error: {relative: 0.01}", "criterion: D") + "limits: {input_power: 1}\n"
+    )
+    assert best.spectrum is None
+    assert best.goal == "best_accuracy"
+    analysis = parse_spec(
+        "plant: {B: [0, 1]}\nnoise: {variance: 1}\nspectrum: {given: {type: white, power: 1.7}}\n"
+    )
+    assert not analysis.designs
+    assert analysis.spectrum.given == GivenWhite(type="white", power=1.7)
+
+
+def test_an_unstable_plant_is_allowed_in_closed_loop():
+    spec = parse_spec(
+        "plant: {B: [0, 1], A: [1, -2]}\n" + REST + "experiment: {controller: {numerator: [1.5]}}\n"
+    )
+    assert spec.plant.A == (1.0, -2.0)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        "limits: {input_power: {min: 1, max: [2]}, output_power: [1], rate: 1, amplitude: [2], energy: 3}",
+        "limits: {spectrum: 40}",
+        "limits: {spectrum: {max: {numerator: [1], denominator: [1, -0.5]}, min: 0}}",
+        "limits: {spectrum: {max: {table: cap.csv}, min: {continuous: {numerator: [1]}}}}",
+        "limits: {samples: 2000, band: [0, 3.1416]}",
+        "spectrum: {type: multisine, lines: 200}",
+        "spectrum: {type: multisine, frequencies: [0, 1, 3.14159265358979]}",
+        "spectrum: {type: free}",
+        "spectrum: {type: polynomial, basis: legendre, order: 3, band: [0, 2], factor_columns: 1}",
+        "spectrum: {type: pointwise}",
+        "spectrum: {given: {type: multisine, frequencies: [0.1, 1], amplitudes: [1, -1]}}",
+        "spectrum: {given: {type: multisine, frequencies: [0.1, 1], amplitudes: [[1, 2]]}}",
+        "spectrum: {given: {type: table, file: phi.csv}}",
+        "spectrum: {given: {signal: u.csv}}",
+        "signal: {type: multisine, phases: optimised, periods: 4, lines: 30, offset: 5, ramp: 9}",
+        "signal: {type: prbs, bits: 10, hold: 3, amplitudes: [1], candidates: 2}",
+        "solver: {method: lmi, grid: 500, positivity: kyp, tolerance: 1e-5}",
+        "objective: least_cost",
+        "objective: shortest_experiment\nlimits: {output_power: 1}",
+        "simulation: {plant: {continuous: {numerator: [1], denominator: [1, 1]}, sample: zoh}, compare: []}",
+        "experiment: {samples: 500.0, prior: {information: [[1, 0], [0, 2]], parameters: [b1, f1]}}",
+        "experiment: {prior: {information: old.csv}}",
+        "title: 2024",
+        "time_unit: min",
+    ],
+)
+def test_what_the_contract_allows(extra):
+    spec = parse_spec(GOOD + extra + "\n")
+    assert parse_spec(spec.to_yaml()).model_dump() == spec.model_dump()
+
+
+@pytest.mark.parametrize(
+    "accuracy",
+    [
+        "{model_error: {absolute: 0.1, weight: {numerator: [1], denominator: [[1, -0.5], [1, -0.2]]}}}",
+        "{model_error: {table: r.csv, band: [0.1, 3], region: ellipsoid}}",
+        "{model_error: {sensitivity: {max_db: 6, controller: {numerator: [1]}}}}",
+        "{information: [[1, 0], [0, 1]]}",
+        "{information: {parameters: [b1, f1], matrix: [[1, 0], [0, -1]]}}",
+        "{application: {parameters: [b1, f1], hessian: [[1, 1], [1, 1]], gamma: 100}}",
+        "{weighted_variance: {weight: {continuous: {numerator: [1]}, sample: zoh}, max: 0.01}}",
+        "{weighted_variance: {max: 1, band: [0, 1]}}",
+        "{standard_deviation: {b1: 0.01, 'b3[1,2]': 1e-3}}",
+    ],
+)
+def test_requirements_of_the_contract(accuracy):
+    spec = parse_spec(f"plant: {{B: [0, 1], F: [1, -0.5]}}\nnoise: {{variance: 1}}\naccuracy: {accuracy}\n")
+    assert spec.goal == "least_cost"
+    assert len(spec.accuracy.requirements) == 1
+
+
+@pytest.mark.parametrize(
+    "accuracy",
+    [
+        "{criterion: E, scale: relative}",
+        "{criterion: A, model_error: {relative: 0.1}}",
+        "{closed_loop_error: {control: {internal_model: {numerator: [0.5], denominator: [1, -0.5]}}}}",
+        "{closed_loop_error: {control: {model_reference: {numerator: [[[0, 1]]]}}}}",
+        "{closed_loop_error: {control: {minimum_variance: true}, reference: {variance: 2}}}",
+    ],
+)
+def test_criteria_of_the_contract(accuracy):
+    spec = parse_spec(
+        f"plant: {{B: [0, 1]}}\nnoise: {{variance: 1}}\nlimits: {{input_power: 1}}\naccuracy: {accuracy}\n"
+    )
+    assert spec.goal == "best_accuracy"
+
+
+def test_the_spec_is_frozen():
+    spec = parse_spec(GOOD)
+    with pytest.raises(pydantic.ValidationError):
+        spec.plant = spec.plant
+    with pytest.raises(pydantic.ValidationError):
+        spec.plant.B = (1.0,)
+
+
+def test_places_of_keys():
+    text = (
+        "plant:\n"
+        "  B: [0, 1]\n"
+        "  F:\n"
+        "    - 1\n"
+        "    - -0.5\n"
+        "noise: {variance: 1}\n"
+        "accuracy:\n"
+        "  standard_deviation:\n"
+        "    b3[1,2]: 0.5\n"
+    )
+    spec = parse_spec(text, "my.yaml")
+
+    def place(key):
+        at = spec.locate(key)
+        return at.line, at.column
+
+    assert place("plant") == (1, 1)
+    assert place("plant.B") == (2, 6)
+    assert place("plant.B[1]") == (2, 10)
+    assert place("plant.B.1") == (2, 10)
+    assert place("plant.F") == (4, 5)
+    assert place("plant.F[1]") == (5, 7)
+    assert place("noise.variance") == (6, 19)
+    assert place("accuracy.standard_deviation.b3[1,2]") == (9, 14)
+    # What is absent is located at what would hold it.
+    assert place("plant.A") == (1, 1)
+    assert place("plant.B[7]") == (2, 6)
+    assert place("noise.C[0]") == (6, 1)
+    assert spec.locate("plant.B").file == "my.yaml"
+    assert spec.locate("plant.B").text == "  B: [0, 1]"
+
+
+def test_complaints_of_other_rooms_are_placed():
+    spec = parse_spec(GOOD, "my.yaml")
+    error = spec.complain("unstable-polynomial", "no good", hint="mend", key="plant.F")
+    assert isinstance(error, SpecError)
+    (diagnostic,) = error.diagnostics
+    assert diagnostic == Diagnostic(
+        "unstable-polynomial", "no good", "mend", "plant.F", spec.locate("plant.F")
+    )
+
+    bare = InfeasibleError([Diagnostic("a-b", "one", key="noise.variance"), Diagnostic("c-d", "two")])
+    placed = spec.place(bare)
+    assert type(placed) is InfeasibleError
+    assert placed.diagnostics[0] == dataclasses.replace(
+        bare.diagnostics[0], location=spec.locate("noise.variance")
+    )
+    assert placed.diagnostics[1] == bare.diagnostics[1]
+
+
+def test_files_are_relative_to_the_spec(tmp_path):
+    file = tmp_path / "sub" / "s.yaml"
+    file.parent.mkdir()
+    file.write_text(GOOD)
+    assert load_spec(file).resolve_path("table.csv") == file.parent / "table.csv"
+    assert load_spec(file).resolve_path(str(tmp_path / "x.csv")) == tmp_path / "x.csv"
+
+
+def test_the_fingerprint_sees_content_only():
+    spec = parse_spec(GOOD)
+    reordered = "# comment\n" + "\n".join(
+        reversed(GOOD.replace("variance: 1}", "variance: 1.0}").splitlines())
+    )
+    assert parse_spec(reordered).sha256 == spec.sha256
+    assert parse_spec(GOOD.replace("0.01", "0.02")).sha256 != spec.sha256
+    assert len(spec.sha256) == 64
+
+
+def test_texts_that_look_like_other_things_stay_texts():
+    for title in ("1e-3", "yes", "null", "010", "2001-01-01", "", "a: b", "# x", "ü\u2028", "1.5"):
+        spec = parse_spec(GOOD).to_yaml()
+        spec = parse_spec(spec, overrides=["title='" + title.replace("'", "''") + "'"])
+        assert parse_spec(spec.to_yaml()).title == spec.title
+
+
+def test_importing_the_room_is_light():
+    code = (
+        "import sys, inputdesign_cli.specification;"
+        "print([m for m in ('scipy', 'control', 'cvxpy', 'matplotlib', 'typer') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_everything_exported_exists_and_is_documented():
+    for name in room.__all__:
+        assert getattr(room, name).__doc__, name
+
+
+def test_every_key_is_described():
+    def sections(model):
+        yield model
+        for child in model.__subclasses__():
+            yield from sections(child)
+
+    from inputdesign_cli.specification.models.section import Section
+
+    for model in sections(Section):
+        if model.__module__.startswith("inputdesign_cli.specification"):
+            for name, field in model.model_fields.items():
+                assert field.description, f"{model.__name__}.{name}"

@@ -1,0 +1,95 @@
+"""Every code that a diagnostic carries anywhere in the package is explained."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import inputdesign_cli
+from inputdesign_cli.error_codes import explanation, explanations
+from inputdesign_cli.errors import SpecError
+
+PACKAGE = Path(inputdesign_cli.__file__).parent
+MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "PathDiagnostic", "stop", "_error"}
+CODE = re.compile(r"[a-z]+(-[a-z]+)*")
+
+
+def codes_in(source: str) -> set[str]:
+    """The string literals that stand for a code: in calls that make diagnostics, and first of the three
+    texts that a function returns as code, message and hint."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and len(node.value.elts) == 3:
+            first = node.value.elts[0]
+            found |= {first.value} if isinstance(first, ast.Constant) and "-" in str(first.value) else set()
+        if not isinstance(node, ast.Call):
+            continue
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        if called not in MAKERS:
+            continue
+        arguments = [*node.args, *(k.value for k in node.keywords if k.arg == "code")]
+        candidates = arguments[:1] if called != "_complain" else arguments[:2]
+        for argument in candidates:
+            parts = [argument.body, argument.orelse] if isinstance(argument, ast.IfExp) else [argument]
+            found |= {p.value for p in parts if isinstance(p, ast.Constant) and isinstance(p.value, str)}
+    return {code for code in found if CODE.fullmatch(code)}
+
+
+def test_the_scan_finds_codes():
+    assert codes_in(
+        "raise bad_spec('a-b', 'm')\nx.complain('c', 'm')\nDiagnostic(code='d-e', message='')"
+    ) == {
+        "a-b",
+        "c",
+        "d-e",
+    }
+    everything = set().union(*(codes_in(p.read_text()) for p in (PACKAGE / "specification").rglob("*.py")))
+    assert {
+        "unknown-key",
+        "unstable-polynomial",
+        "duplicate-key",
+        "file-missing",
+        "needs-limits",
+    } <= everything
+
+
+def test_every_code_is_explained():
+    missing = {
+        (code, path.relative_to(PACKAGE).as_posix())
+        for path in PACKAGE.rglob("*.py")
+        for code in codes_in(path.read_text(encoding="utf-8"))
+        if code not in explanations()
+    }
+    assert not missing
+
+
+def test_no_code_is_explained_in_vain():
+    source = "\n".join(p.read_text() for p in PACKAGE.rglob("*.py"))
+    source += 'unknown-code"'
+    assert [code for code in explanations() if f'{code}"' not in source] == []
+
+
+def test_explanations_are_complete():
+    for code, entry in explanations().items():
+        assert CODE.fullmatch(code), code
+        assert entry.title
+        assert not entry.title.endswith("."), code
+        assert entry.text.endswith("."), code
+        assert entry.remedy.endswith("."), code
+
+
+def test_no_code_is_explained_twice():
+    # A YAML reader keeps the last of two equal keys and says nothing.
+    lines = (PACKAGE / "error_codes.yaml").read_text(encoding="utf-8").splitlines()
+    stated = [line.removesuffix(":") for line in lines if CODE.match(line)]
+    assert stated == list(explanations())
+
+
+def test_explaining():
+    assert explanation("not-monic").startswith("not-monic: ")
+    with pytest.raises(SpecError) as caught:
+        explanation("not-monik")
+    assert caught.value.diagnostics[0].hint == 'did you mean "not-monic"?'
