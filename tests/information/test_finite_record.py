@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.signal
 from channel_plants import arrays, arx, paper_experiment
-from inputdesign_cli.signal.single import as_channels
 from plants import random_case
 
 from inputdesign_cli.information import Experiment, FiniteRecord
@@ -19,7 +18,7 @@ from inputdesign_cli.signal import grid_lines, multisine_record
 def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
     """Finite differences of epsilon = (D/C)(A y - (B/F) u) on noise-free data, open and closed loop."""
     case = random_case(seed)
-    experiment = as_channels(Experiment(case.loop, 50))
+    experiment = Experiment(case.loop, 50)
     model = case.loop.model
     r = np.random.default_rng(seed).normal(size=50)
     controller = case.loop.controller
@@ -59,7 +58,7 @@ def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
 def test_record_information_tends_to_that_of_the_spectrum(first_order):
     """A long white record of power two has the information of the spectrum to a few per cent."""
     N = 100_000
-    experiment = as_channels(dataclasses.replace(first_order, samples=N)).whitened(2.0)
+    experiment = dataclasses.replace(first_order, samples=N).whitened(2.0)
     record = np.sqrt(2.0) * np.random.default_rng(0).standard_normal(N)
     np.testing.assert_allclose(FiniteRecord(experiment, N).information(record[:, None]), np.eye(3), atol=0.03)
 
@@ -159,7 +158,7 @@ def test_the_adjoint_of_an_output():
 @pytest.mark.parametrize("seed", range(8))
 def test_difference_equations_and_transforms_agree(seed):
     """Open and closed loops of one channel: signals, their adjoints and gradients, two ways."""
-    experiment = as_channels(Experiment(random_case(seed).loop, 200))
+    experiment = Experiment(random_case(seed).loop, 200)
     fast, general = FiniteRecord(experiment, 200), RecordTransforms(experiment, 200, 1.0)
     record, weights = np.random.default_rng(seed).normal(size=(2, 200, 1))
     for kind in ("input", "output"):
