@@ -42,10 +42,11 @@ def check_length(samples: int, parameters: int, memory: int, *, outputs: int = 1
 
 
 def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
-    """No channel of u (samples, r) and y (samples, p) keeps one value throughout.
+    """No channel keeps one value throughout.
 
     Args:
         names: of the parameters, for the diagnostic.
+        u, y: (samples, r), (samples, p).
 
     Raises:
         SpecError: `constant-input`, `constant-output`.

@@ -80,11 +80,14 @@ def concluded(
     """The estimate with its covariance and the tests of its residuals.
 
     Args:
+        names, theta: (k,).
         information: (k, k) sum over the samples of psi(t) noise^-1 psi(t)^T.
+        noise: (p, p) covariance of e.
         errors, u: (samples, p), (samples, r).
         feedback: whether u(t) answers y(t).
         in_noise: number of parameters that make residuals look whiter: those of A, C and D.
         in_plant: number of parameters that take directions of past inputs away: those of B and F.
+        fit, converged, steps, starts: see `Estimate`.
 
     Raises:
         SpecError: `not-exciting`.

@@ -32,8 +32,12 @@ def stream(
     The arrays are views that hold until the next block.
 
     Args:
+        row: the orders of the output.
+        theta: (runs, k), of this output alone.
         u: all inputs of the model, (samples, runs) each.
+        y: the output (samples, runs).
         length: samples of a block, see `block_length`.
+        gradient: whether psi is wanted.
     """
     p = row.polynomials(theta)
     samples, runs = y.shape

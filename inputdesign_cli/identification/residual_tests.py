@@ -45,6 +45,8 @@ def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest
     weights of Ljung and Box, to which it reduces for one output.
 
     Args:
+        errors: (samples, p).
+        lags: how many.
         fitted: number of estimated parameters of the noise model, which make residuals look whiter.
     """
     n, p = errors.shape

@@ -74,7 +74,7 @@ def evaluate(record: TransferRecord, theta: Array) -> Point:
 
 @dataclass(frozen=True)
 class TransferProblem:
-    """The problem of fitting records of one structure, one a run; see `search.Problem`."""
+    """The problem of fitting records of one structure, one a run; see `gauss_newton.Problem`."""
 
     records: tuple[TransferRecord, ...]
 

@@ -29,10 +29,12 @@ class TransferRecord:
 
     @property
     def samples(self) -> int:
+        """Number of samples N."""
         return len(self.y)
 
     @property
     def size(self) -> int:
+        """Number of parameters k."""
         return len(self.structure.parameters)
 
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -21,12 +21,12 @@ Seed = int | np.random.SeedSequence
 
 
 @dataclass(frozen=True)
-class _Batch:
+class _Batch(Generic[Job, Answer]):
     """What a worker needs to know of a batch: the same function and job for all, a stream of its own."""
 
     index: int
-    function: Callable[[Any, int, np.random.Generator], Any]
-    job: Any
+    function: Callable[[Job, int, np.random.Generator], Answer]
+    job: Job
     runs: int
     seed: np.random.SeedSequence
 
@@ -45,12 +45,14 @@ def run_batches(
     Args:
         function: importable by name; it draws all that is random from `rng`, and does not change `job`.
         job: what all batches share; it can be pickled.
+        runs: how many in all; `size` of them are one batch.
+        seed: of the streams of all batches.
         executor: where the batches are computed (default: in this process).
 
     Raises:
         IdesignError: `worker-lost`; otherwise what `function` and the executor raise.
     """
-    answers: dict[int, Any] = {}
+    answers: dict[int, Answer] = {}
     batches = _batches(function, job, runs=runs, size=size, seed=seed)
     for done in (executor or InProcess()).run(_compute, batches):
         if isinstance(done.error, WorkerLostError):
@@ -59,18 +61,19 @@ def run_batches(
             raise IdesignError(Diagnostic("worker-lost", message, hint)) from done.error
         if done.error is not None:
             raise done.error
+        assert done.answer is not None  # there is an answer or an error
         answers[done.job.index] = done.answer
     return [answers[index] for index in range(len(answers))]
 
 
 def _batches(
-    function: Callable[[Job, int, np.random.Generator], Any], job: Job, *, runs: int, size: int, seed: Seed
-) -> Iterator[_Batch]:
+    function: Callable[[Job, int, np.random.Generator], Answer], job: Job, *, runs: int, size: int, seed: Seed
+) -> Iterator[_Batch[Job, Answer]]:
     root = np.random.SeedSequence(seed) if isinstance(seed, int) else seed
     for index, start in enumerate(range(0, runs, size)):
         stream = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, index))
         yield _Batch(index, function, job, min(size, runs - start), stream)
 
 
-def _compute(batch: _Batch) -> Any:
+def _compute(batch: _Batch[Job, Answer]) -> Answer:
     return batch.function(batch.job, batch.runs, np.random.default_rng(batch.seed))

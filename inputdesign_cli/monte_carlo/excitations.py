@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.information import ChannelExperiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
@@ -48,7 +50,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Redrawn:
-    """Records of a spectrum, generated anew in each run and scaled to its power exactly.
+    """Records of a spectrum, generated anew in each run, each channel scaled to its power exactly.
 
     `basis` and `x` are the spectrum that the generator realises.
     """
@@ -79,8 +81,20 @@ class Redrawn:
         """Records of the generator's kind of signal."""
         values = np.stack([self.generator.values(rng) for _ in range(runs)])
         records = np.repeat(values, self.generator.settings.hold, axis=1)
-        found = np.mean(records**2, axis=1, keepdims=True).sum(axis=2, keepdims=True)
-        return np.asarray(records * np.sqrt(self.generator.spectrum.power / found))
+        found = np.mean(records**2, axis=1, keepdims=True)
+        return np.asarray(records * np.sqrt(self.powers / np.maximum(found, 1e-300)))
+
+    @cached_property
+    def powers(self) -> Array:
+        """(r,): the power of each channel."""
+        inputs = self.generator.spectrum.inputs
+
+        def of(channel: int) -> float:
+            unit = np.diag(np.arange(inputs) == channel).astype(float)
+            density = partial(_constant, unit)
+            return float(self.x @ self.basis.integrals(density, np.zeros(0, dtype=complex)))
+
+        return np.array([of(channel) for channel in range(inputs)])
 
     def information(self, experiment: ChannelExperiment) -> Array:
         """Of the spectrum."""
@@ -109,6 +123,11 @@ class InPhase:
     def information(self, experiment: ChannelExperiment) -> Array:
         """Of the sinusoids."""
         return _information(experiment, self.basis, self.x)
+
+
+def _constant(density: Array, w: Array) -> NDArray[np.float64]:
+    """A density (r, r) at frequencies (n,): (n,) for one input, else (n, r, r)."""
+    return np.full(w.shape, density[0, 0]) if density.size == 1 else np.ones(w.shape)[:, None, None] * density
 
 
 def _information(experiment: ChannelExperiment, basis: Basis | TabulatedSpectrum, x: Array) -> Array:

@@ -12,8 +12,8 @@ from inputdesign_cli.monte_carlo.simulated_runs import TrialJob, run_job
 from inputdesign_cli.monte_carlo.trials import Trials
 from inputdesign_cli.plant.polynomial import Array
 
-# Runs that are simulated and identified in one pass.
-_BATCH = 50
+# Records of outputs that are simulated and identified in one pass.
+_OUTPUTS_AT_ONCE = 100
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ def _tried(
     model = study.nominal.model
     job = TrialJob(experiment, model, excitation, study.step)
     # The same seed for every excitation: they meet the same noise.
-    parts = run_batches(run_job, job, runs=study.runs, size=_BATCH, seed=study.seed, executor=executor)
+    size = max(1, _OUTPUTS_AT_ONCE // model.outputs)
+    parts = run_batches(run_job, job, runs=study.runs, size=size, seed=study.seed, executor=executor)
     same = experiment.model.names == model.names
     return Tried(excitation.name, Trials.joined(parts), excitation.information(experiment) if same else None)

@@ -6,11 +6,11 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Results, Table
+from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.identification import (
     Identification,
@@ -57,7 +57,7 @@ def assess(task: Identification, path: Path, *, remove_means: bool = False) -> A
     question = found.question
     information = found.estimate.information + question.experiment.prior_information
     met, listed = _evaluated(task.header.units, question, information)
-    assessment: dict[str, Any] = {"met": met, "requirements": listed}
+    assessment: dict[str, Json] = {"met": met, "requirements": listed}
     identification = identification_results(task, found, started)
     if met or question.top_up is None:
         status = {"status": "met" if met else "missed", "assessment": assessment}
@@ -90,7 +90,7 @@ def _of_data(parts: Mapping[str, Part]) -> dict[str, Part]:
 
 def _evaluated(
     units: Units, question: ModelQuestion, information: Array
-) -> tuple[bool, list[dict[str, Any]]]:
+) -> tuple[bool, list[dict[str, Json]]]:
     """Whether the information of the data meets what is asked, and each requirement with its worst ratio."""
     listed = [requirement_entry(units, r, information) for r in question.requirements]
     return all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed), listed

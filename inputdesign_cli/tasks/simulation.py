@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_tr
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.plant import ChannelLoop, ChannelModel
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, Curves, Results, Table
+from inputdesign_cli.runs.results import BoundCurves, Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal.settings import LEVELLED, Method
 from inputdesign_cli.tasks.result.bound import bound_curves
@@ -117,7 +116,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     true = nominal if plan.truth is None else plan.truth.experiment(nominal, result["power"]["output"])
     study = Study(nominal, true, plan.runs, plan.seed, units.step)
     predicted = _predicted(plan, results, excitations[0].information(nominal))
-    inputs: dict[str, Any] = {}
+    inputs: dict[str, Json] = {}
     curves: dict[str, Curves] = {}
     tables: dict[str, Table] = {}
     for excitation in excitations:

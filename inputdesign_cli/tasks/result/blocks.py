@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import singledispatch
-from typing import Any
 
 from inputdesign_cli.plant import ChannelModel, ContinuousChannels, PolynomialChannels, SampledChannels
 from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
 
-Blocks = dict[str, dict[str, Any]]
+Blocks = dict[str, dict[str, Json]]
 
 
 @singledispatch
@@ -26,7 +26,7 @@ def blocks_of(model: ChannelModel) -> Blocks:
 @blocks_of.register
 def _(model: PolynomialChannels) -> Blocks:
     single = model.outputs == model.inputs == 1
-    everything: dict[str, tuple[Any, bool]] = {
+    everything: dict[str, tuple[Json, bool]] = {
         "A": (_rows(model.A), _matter(model.A)),
         "B": (model.B[0][0].tolist() if single else _matrix(model.B), True),
         "F": (model.F[0][0].tolist() if single else _matrix(model.F), any(map(_matter, model.F))),
@@ -66,7 +66,7 @@ def _(model: PolynomialChannels) -> dict[str, list[Array]]:
     return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
 
 
-def _variance(model: ChannelModel) -> dict[str, Any]:
+def _variance(model: ChannelModel) -> dict[str, Json]:
     covariance = model.covariance
     return {"variance": float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()}
 
@@ -75,7 +75,7 @@ def _matter(polynomials: Sequence[Array]) -> bool:
     return any(p.size > 1 for p in polynomials)
 
 
-def _rows(polynomials: Sequence[Array]) -> list[Any]:
+def _rows(polynomials: Sequence[Array]) -> list[Json]:
     """One polynomial common to all outputs as it is; a list of those of each output."""
     return polynomials[0].tolist() if len(polynomials) == 1 else [p.tolist() for p in polynomials]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from inputdesign_cli.accuracy import ModelError, Requirement, worst
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves, Table
+from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, Json, ResidualCurves, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.bound import bound_curves
 
@@ -61,14 +60,14 @@ def data_curves(
 
 def bound_of_data(
     units: Units, requirements: Sequence[Requirement], entries: Sequence[ModelError], information: Array
-) -> tuple[Table, BoundCurves, dict[str, Any]]:
+) -> tuple[Table, BoundCurves, dict[str, Json]]:
     """bound.csv with its figure, and the worst ratio of r_u and r_adm if a requirement bounds it.
 
     Args:
         entries: what has r_u of every entry of G where no requirement bounds it.
         information: (k, k) of the data.
     """
-    entry: dict[str, Any] = {}
+    entry: dict[str, Json] = {}
     bounding = [r for r in requirements if r.bounded_error is not None]
     if bounding:
         violation = worst([r.worst(information) for r in bounding])

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.identification import Estimate, ResidualTest
 from inputdesign_cli.plant import ChannelModel
 from inputdesign_cli.plant.polynomial import roots_in_z
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 
 # A residual test below this probability speaks against the model.
 _REFUTED = 0.01
 
 
-def identification_entry(estimate: Estimate) -> dict[str, Any]:
+def identification_entry(estimate: Estimate) -> dict[str, Json]:
     """`identification` of `result.json`."""
     single = estimate.noise.size == 1
-    entry: dict[str, Any] = {
+    entry: dict[str, Json] = {
         "theta": dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
         "standard_deviation": _deviations(estimate),
         "variance": float(estimate.noise[0, 0]) if single else estimate.noise.tolist(),
@@ -37,7 +37,7 @@ def identification_entry(estimate: Estimate) -> dict[str, Any]:
     return entry
 
 
-def estimate_result(title: str, estimate: Estimate) -> dict[str, Any]:
+def estimate_result(title: str, estimate: Estimate) -> dict[str, Json]:
     """The head of `result.json`."""
     return {
         "format": 1,
@@ -59,7 +59,7 @@ def _deviations(estimate: Estimate) -> dict[str, float]:
     return dict(zip(estimate.names, deviations.tolist(), strict=True))
 
 
-def _test(test: ResidualTest) -> dict[str, Any]:
+def _test(test: ResidualTest) -> dict[str, Json]:
     return {
         "statistic": test.statistic,
         "degrees_of_freedom": test.freedom,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eig
 from inputdesign_cli.monte_carlo.study import Study, Tried
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.simulation_curves import QUANTILES
 
@@ -20,7 +20,7 @@ from inputdesign_cli.tasks.result.simulation_curves import QUANTILES
 _GAP = 0.03
 
 
-def study_entry(study: Study, inputs: Mapping[str, Any], *, excitation: str) -> dict[str, Any]:
+def study_entry(study: Study, inputs: Mapping[str, Json], *, excitation: str) -> dict[str, Json]:
     """`simulation` of `result.json`.
 
     Args:
@@ -43,7 +43,7 @@ def study_entry(study: Study, inputs: Mapping[str, Any], *, excitation: str) -> 
 
 def input_entry(
     units: Units, tried: Tried, predicted: PredictedError, errors: Array, cost: Mapping[PowerKind, Weight]
-) -> dict[str, Any]:
+) -> dict[str, Json]:
     """What one excitation gave on the true system.
 
     Args:
@@ -84,14 +84,14 @@ def input_entry(
     return entry
 
 
-def fractions(tried: Tried, predicted: PredictedError, errors: Array) -> dict[str, Any]:
+def fractions(tried: Tried, predicted: PredictedError, errors: Array) -> dict[str, Json]:
     """Fractions of the runs whose error stays within bounds at all frequencies, with 95 % limits."""
     bounds = {} if predicted.r_adm is None else {"r_adm": predicted.r_adm}
     if tried.name == "design":
         bounds["promised_r_u"] = predicted.r_u
     if tried.information is not None:
         bounds["r_u"] = tried.trials.bound(predicted, tried.information)
-    entry: dict[str, Any] = {}
+    entry: dict[str, Json] = {}
     for kind, bound in bounds.items():
         inside = int(np.sum(np.all(errors <= bound, axis=1)))
         entry[f"within_{kind}"] = inside / len(errors)
@@ -112,7 +112,7 @@ def _cost(power: Mapping[str, list[float]], weights: Mapping[PowerKind, Weight])
     )
 
 
-def gap_notes(units: Units, inputs: Mapping[str, Any]) -> list[str]:
+def gap_notes(units: Units, inputs: Mapping[str, Json]) -> list[str]:
     """The gap between what the design predicts on its own model and what the true system gives."""
     for name, entry in inputs.items():
         modelled = entry.get("on_design_model", {}).get("within_r_adm")
