@@ -42,7 +42,7 @@ _PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
 def _result_path(path: str) -> str:
     if not _PATH.fullmatch(path):
         hint = "write objective.value or power.input[0]"
-        raise fail(PathDiagnostic("golden-path", f"{path!r} is no path into a result", hint))
+        raise fail("golden-path", f"{path!r} is no path into a result", hint)
     return path
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from inputdesign_cli.signal.channels import Lines, grid_lines
 
+from inputdesign_cli.signal.lines import Lines, grid_lines
 from inputdesign_cli.signal.matrix_factor import matrix_factor
 from inputdesign_cli.signal.periodic import (
     dense_roots,

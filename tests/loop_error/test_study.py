@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.signal
-from inputdesign_cli.signal.channels import grid_lines
 
 from inputdesign_cli.design.loop_error import LoopErrorProblem, ModelReference, PowerLimit
 from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
@@ -13,6 +12,7 @@ from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.plant import Rational, TransferMatrix
 from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
+from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.periodic import harmonics
 from loop_error.column import column, random_plant
 

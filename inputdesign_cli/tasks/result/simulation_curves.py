@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
-from inputdesign_cli.plant import ChannelLoop
+from inputdesign_cli.plant import Loop
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import (
     CloudCurves,
@@ -61,7 +61,7 @@ def cloud(trials: Trials, covariance: Array | None) -> CloudCurves | None:
     )
 
 
-def disturbance(units: Units, loop: ChannelLoop, excitation: Array) -> tuple[Table, SignalCurves]:
+def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, SignalCurves]:
     """r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
     slowest = float(np.abs(loop.closed_poles).max(initial=0.0))
     tail = min(int(np.ceil(_FADED / (1.0 - slowest))), len(excitation))
