@@ -63,10 +63,8 @@ class Processes:
                         if attempts < _ATTEMPTS:
                             again.append((job, attempts))
                             continue
-                        answer, error = (
-                            None,
-                            WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"),
-                        )
+                        lost = f"{_ATTEMPTS} processes ended in the middle of it"
+                        answer, error = None, WorkerLostError(lost)
                     yield Finished(job, answer, error)
         finally:
             for worker in workers:
