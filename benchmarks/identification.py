@@ -19,11 +19,11 @@ import scipy.optimize
 import scipy.signal
 
 from inputdesign_cli.identification import fit_batch
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 ROOT = Path(__file__).parent.parent
-MODEL = PolynomialChannels(
+MODEL = PolynomialModel(
     B=((np.array([0.0, 1.0, 0.5]),),),
     A=(np.ones(1),),
     F=((np.array([1.0, -1.5, 0.7]),),),

@@ -16,10 +16,12 @@ _BOLD, _RED, _BLUE, _CYAN, _RESET = "\x1b[1m", "\x1b[1;31m", "\x1b[1;34m", "\x1b
 def render(error: IdesignError, color: bool = False) -> str:
     """All diagnostics of an error, each with its place, the line with a caret, and the help.
 
-    Parameters
-    ----------
-    error : any error of this package.
-    color : whether to use ANSI colours (the caller knows the terminal and `NO_COLOR`).
+    Args:
+        error: Any error of this package.
+        color: Whether to use ANSI colours (the caller knows the terminal and `NO_COLOR`).
+
+    Returns:
+        One block of lines a diagnostic, and a line that says how to learn more.
     """
     blocks = [_block(diagnostic, color) for diagnostic in error.diagnostics]
     codes = {diagnostic.code for diagnostic in error.diagnostics if diagnostic.code}

@@ -1,7 +1,7 @@
 """The few error types of the house.
 
 Every error that a user can cause is a `Diagnostic`: a stable code (which `idesign explain CODE`
-documents, see `codes.py`), one sentence that says what is wrong, and a hint that says how to mend it.
+documents, see `error_codes.yaml`), one sentence that says what is wrong, and a hint that says how to mend it.
 The mathematics knows nothing of files: it names the key (`plant.F`), and the spec adds file, line and
 column where it is at hand.
 """

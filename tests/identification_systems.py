@@ -5,13 +5,13 @@ import scipy.signal
 from channel_plants import arrays
 
 from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 
 
 def one_channel(B, A=(1,), C=(1,), D=(1,), F=(1,), variance=0.5):
     """A model with one input and one output."""
     (A, C, D), covariance = arrays([[A, C, D]])[0], np.array([[variance]])
-    return PolynomialChannels(arrays([[B]]), (A,), arrays([[F]]), (C,), (D,), covariance)
+    return PolynomialModel(arrays([[B]]), (A,), arrays([[F]]), (C,), (D,), covariance)
 
 
 SYSTEMS = {

@@ -43,7 +43,7 @@ def random_model(rng: np.random.Generator, structure: str, order: int) -> Polyno
         "fir": (one, one, one, one),
         "general": (extra, noise, monic(rng, 1, radius=(0.1, 0.9)), plant_poles),
     }[structure]
-    return PolynomialModel(A=A, B=B, C=C, D=D, F=F, variance=float(rng.uniform(0.1, 2.0)))
+    return PolynomialModel.single(A=A, B=B, C=C, D=D, F=F, variance=float(rng.uniform(0.1, 2.0)))
 
 
 def random_loop(rng: np.random.Generator, model: PolynomialModel, *, closed: bool) -> Loop:

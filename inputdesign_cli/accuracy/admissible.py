@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant import ChannelLoop, ChannelModel, ScalarTransfer
+from inputdesign_cli.plant import Loop, Model, ScalarTransfer
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _NOWHERE = np.zeros(0)
@@ -40,7 +40,7 @@ class AdmissibleError(Protocol):
 class Relative:
     """r_adm = fraction |G| of one entry (output, input), or of the Frobenius norm of all (None)."""
 
-    model: ChannelModel
+    model: Model
     fraction: float
     entry: tuple[int, int] | None = None
     knots = _NOWHERE
@@ -100,7 +100,7 @@ class Sensitivity:
     ([bombois-least-costly], Illustration 2, by the reverse triangle inequality).
     """
 
-    loop: ChannelLoop
+    loop: Loop
     weight: ScalarTransfer
     knots = _NOWHERE
 

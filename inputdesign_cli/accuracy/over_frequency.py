@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.requirement import Entry, Requirement, Violation, inverse_factor, worst
-from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ChannelModel, graded_grid, local_maxima
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model, graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
@@ -28,7 +28,7 @@ class OverFrequency(Requirement):
     fast (`own_singularities`) or have a kink (`knots`).
     """
 
-    experiment: ChannelExperiment
+    experiment: Experiment
     band: tuple[float, float]
     entry: Entry | None = None
 
@@ -119,7 +119,7 @@ def largest_singular(half: NDArray[np.float64]) -> Array:
     return np.sqrt(0.5 * (a + d) + np.hypot(0.5 * (a - d), b))
 
 
-def active_entries(model: ChannelModel, highest: float) -> list[Entry]:
+def active_entries(model: Model, highest: float) -> list[Entry]:
     """The entries of G that are not zero, probed below the frequency `highest`."""
     probe = np.abs(model.plant_at(np.array([0.12, 0.39]) * highest)).max(axis=0)
     return [(i, j) for i in range(model.outputs) for j in range(model.inputs) if probe[i, j] > 0.0]

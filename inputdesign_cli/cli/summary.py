@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.runs.objectives import OBJECTIVES, objective
-
-Result = Mapping[str, Any]
+from inputdesign_cli.runs.results import Json, Result
 
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
 
@@ -52,14 +50,14 @@ def _identified(result: Result) -> list[tuple[str, str]]:
     return lines
 
 
-def _variance(value: Any) -> str:
+def _variance(value: Json) -> str:
     """A variance, or a covariance matrix row by row."""
     if not isinstance(value, list):
         return f"variance {value:.5g}"
     return f"covariance [{'; '.join(_numbers(row) for row in value)}]"
 
 
-def _explained(value: Any) -> str:
+def _explained(value: Json) -> str:
     """The fit of the output, or of each output; a dash where the model cannot be simulated."""
     if not isinstance(value, list):
         return f"{value:.1f} % of the output"
@@ -254,6 +252,6 @@ def _within(entry: Result) -> str:
     return ", ".join([*parts, f"cost {entry['cost']:.4g}"])
 
 
-def _numbers(values: Any) -> str:
+def _numbers(values: Json) -> str:
     listed = values if isinstance(values, list | tuple) else [values]
     return " ".join(f"{value:.4g}" for value in listed)

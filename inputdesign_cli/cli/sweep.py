@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,7 @@ from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
 
 if TYPE_CHECKING:
-    from inputdesign_cli.sweep.running import SweepSummary
+    from inputdesign_cli.sweep.running import Listing, SweepSummary
 
 
 class SweepVerb(StrEnum):
@@ -116,7 +117,7 @@ def sweep(
         raise done.first_failure
 
 
-def _list(points: Any, *, json_output: bool) -> None:
+def _list(points: Iterable[Listing], *, json_output: bool) -> None:
     if json_output:
         content = [point._asdict() for point in points]
         typer.echo(json.dumps(content, indent=1, ensure_ascii=False))

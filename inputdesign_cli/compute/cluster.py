@@ -10,47 +10,44 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from inputdesign_cli import __version__
-from inputdesign_cli.compute.executor import Answer, Finished, Task, WorkerLostError
+from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
 from inputdesign_cli.errors import DataError, Diagnostic
 
-_AHEAD = 2  # tasks on their way for each thread of the cluster
+_AHEAD = 2  # jobs on their way for each thread of the cluster
 
 
 @dataclass(frozen=True)
 class Cluster:
     """The workers behind the scheduler at `address`.
 
-    A task whose worker is lost is given to another one (the scheduler sees to it, three times at most).
-    Workers that join while tasks are running are used.
+    A job whose worker is lost is given to another one (the scheduler sees to it, three times at most).
+    Workers that join while jobs are running are used.
     """
 
     address: str
     patience: float = 10.0  # seconds to find the scheduler, and a first worker
     shares_files: bool = field(default=False, init=False)
 
-    def run(
-        self, function: Callable[[Task], Answer], tasks: Iterable[Task]
-    ) -> Iterator[Finished[Task, Answer]]:
-        """Yield every task with its answer, in the order in which they are finished.
+    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
+        """Yield every job with its answer, in the order in which they are finished.
 
-        Raises
-        ------
-        DataError : `cluster-extra`, `cluster-unreachable`, `cluster-version`.
+        Raises:
+            DataError: `cluster-extra`, `cluster-unreachable`, `cluster-version`.
         """
         with self._client() as client:
             from distributed import as_completed
             from distributed.scheduler import KilledWorker
 
-            source = iter(tasks)
-            known: dict[str, Task] = {}
+            source = iter(jobs)
+            known: dict[str, Job] = {}
             running = as_completed(loop=client.loop)
             while True:
                 with _reaching(self.address):
-                    room = _AHEAD * _threads(client) - len(known)
-                for task in _take(source, room):
+                    free = _AHEAD * _threads(client) - len(known)
+                for job in _take(source, free):
                     with _reaching(self.address):
-                        future = client.submit(function, task, pure=False)
-                        known[future.key] = task
+                        future = client.submit(function, job, pure=False)
+                        known[future.key] = job
                         running.add(future)
                 if not known:
                     return
@@ -59,12 +56,12 @@ class Cluster:
                     if future.cancelled():
                         raise CancelledError
                     error = future.exception()
-                task = known.pop(future.key)
+                job = known.pop(future.key)
                 if isinstance(error, KilledWorker):
                     error = WorkerLostError(
                         f"the workers that were given it ended in the middle of it: {error}"
                     )
-                yield Finished(task, None if error else future.result(), error)
+                yield Finished(job, None if error else future.result(), error)
                 future.release()
 
     @contextmanager
@@ -117,7 +114,7 @@ def _threads(client: Any) -> int:
     return max(1, sum(client.nthreads().values()))
 
 
-def _take(source: Iterator[Task], count: int) -> Iterator[Task]:
+def _take(source: Iterator[Job], count: int) -> Iterator[Job]:
     for _ in range(count):
         try:
             yield next(source)

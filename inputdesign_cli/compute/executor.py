@@ -6,24 +6,24 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-Task = TypeVar("Task")
+Job = TypeVar("Job")
 Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
-class Finished(Generic[Task, Answer]):
-    """One task with its answer, or with the error that stands in its place."""
+class Finished(Generic[Job, Answer]):
+    """One job with its answer, or with the error that stands in its place."""
 
-    task: Task
+    job: Job
     answer: Answer | None
     error: Exception | None = None
 
 
 class Executor(Protocol):
-    """Computes a function of many tasks.
+    """Computes a function of many jobs.
 
-    Tasks are drawn from the iterable as workers become free, never all at once; answers come in the order
-    in which they are finished. What a task answers must depend on nothing but the task (a random stream
+    Jobs are drawn from the iterable as workers become free, never all at once; answers come in the order
+    in which they are finished. What a job answers must depend on nothing but the job (a random stream
     travels as its seed), so that every executor gives the same answers to the last digit.
     """
 
@@ -32,30 +32,26 @@ class Executor(Protocol):
         """Whether the function sees the file system of the caller."""
         ...
 
-    def run(
-        self, function: Callable[[Task], Answer], tasks: Iterable[Task]
-    ) -> Iterator[Finished[Task, Answer]]:
-        """Yield every task with its answer. `function` is importable by name; everything can be pickled."""
+    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
+        """Yield every job with its answer. `function` is importable by name; everything can be pickled."""
         ...
 
 
 class WorkerLostError(Exception):
-    """A worker ended in the middle of a task, and so did the second one that was given it."""
+    """A worker ended in the middle of a job, and so did the second one that was given it."""
 
 
 class InProcess:
-    """The calling process itself, one task after the other."""
+    """The calling process itself, one job after the other."""
 
     shares_files = True
 
-    def run(
-        self, function: Callable[[Task], Answer], tasks: Iterable[Task]
-    ) -> Iterator[Finished[Task, Answer]]:
-        """Yield every task with its answer, in order."""
-        for task in tasks:
+    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
+        """Yield every job with its answer, in order."""
+        for job in jobs:
             try:
-                answer = function(task)
+                answer = function(job)
             except Exception as error:
-                yield Finished(task, None, error)
+                yield Finished(job, None, error)
             else:
-                yield Finished(task, answer)
+                yield Finished(job, answer)

@@ -1,7 +1,7 @@
 """Processes of this machine: each imports the libraries once and computes on one thread.
 
 The standard pools end when one of their processes is killed, and leave processes behind when they are
-killed themselves. Here each process has a pipe of its own: when the process ends, its task is given to
+killed themselves. Here each process has a pipe of its own: when the process ends, its job is given to
 another one; when the caller ends, the pipe closes and the process ends too.
 """
 
@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from inputdesign_cli.compute.executor import Answer, Finished, Task, WorkerLostError
+from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
 from inputdesign_cli.compute.threads import ONE_THREAD
 
 _ATTEMPTS = 2
@@ -28,23 +28,21 @@ _ATTEMPTS = 2
 class _Worker:
     process: Any
     pipe: Connection
-    work: Any = None  # (task, attempts so far) while it is at work
+    work: Any = None  # (job, attempts so far) while it is at work
 
 
 @dataclass(frozen=True)
 class Processes:
-    """`jobs` processes; a task whose process is killed is tried once more, then it has failed."""
+    """`count` processes; a job whose process is killed is tried once more, then it has failed."""
 
-    jobs: int
+    count: int
     shares_files: bool = field(default=True, init=False)
 
-    def run(
-        self, function: Callable[[Task], Answer], tasks: Iterable[Task]
-    ) -> Iterator[Finished[Task, Answer]]:
-        """Yield every task with its answer, in the order in which they are finished."""
+    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
+        """Yield every job with its answer, in the order in which they are finished."""
         workers: list[_Worker] = []
-        again: list[tuple[Task, int]] = []
-        source = iter(tasks)
+        again: list[tuple[Job, int]] = []
+        source = iter(jobs)
         try:
             while True:
                 self._feed(workers, function, again, source)
@@ -53,7 +51,7 @@ class Processes:
                     return
                 ready = wait([worker.pipe for worker in busy])
                 for worker in [w for w in busy if w.pipe in ready]:
-                    task, attempts = worker.work
+                    job, attempts = worker.work
                     worker.work = None
                     try:
                         answer, error = worker.pipe.recv()
@@ -61,13 +59,13 @@ class Processes:
                         workers.remove(worker)
                         _end(worker)
                         if attempts < _ATTEMPTS:
-                            again.append((task, attempts))
+                            again.append((job, attempts))
                             continue
                         answer, error = (
                             None,
                             WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"),
                         )
-                    yield Finished(task, answer, error)
+                    yield Finished(job, answer, error)
         finally:
             for worker in workers:
                 _end(worker)
@@ -75,25 +73,25 @@ class Processes:
     def _feed(
         self, workers: list[_Worker], function: Any, again: list[tuple[Any, int]], source: Iterator[Any]
     ) -> None:
-        """Give every free process a task, and start processes while there are tasks for them."""
+        """Give every free process a job, and start processes while there are jobs for them."""
         while True:
             free = next((worker for worker in workers if worker.work is None), None)
-            if free is None and len(workers) >= self.jobs:
+            if free is None and len(workers) >= self.count:
                 return
             if again:
-                task, attempts = again.pop()
+                job, attempts = again.pop()
             else:
                 try:
-                    task, attempts = next(source), 0
+                    job, attempts = next(source), 0
                 except StopIteration:
                     return
             if free is None:
                 free = _start()
                 workers.append(free)
-            free.work = (task, attempts + 1)
+            free.work = (job, attempts + 1)
             # A process that has just ended tells so by its pipe, where its answer is awaited.
             with suppress(BrokenPipeError, ConnectionResetError):
-                free.pipe.send((function, task))
+                free.pipe.send((function, job))
 
 
 def _start() -> _Worker:
@@ -140,15 +138,15 @@ def _end(worker: _Worker) -> None:
 
 
 def _serve(pipe: Connection) -> None:
-    """The life of a process: a task after the other until the caller has gone."""
+    """The life of a process: a job after the other until the caller has gone."""
     threading.Thread(target=_end_with_the_caller, daemon=True).start()
     while True:
         try:
-            function, task = pipe.recv()
+            function, job = pipe.recv()
         except (EOFError, OSError):
             return
         try:
-            reply: tuple[Any, Exception | None] = (function(task), None)
+            reply: tuple[Any, Exception | None] = (function(job), None)
         except Exception as error:
             reply = (None, _portable(error))
         try:

@@ -7,14 +7,14 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.entries import draw_entries
+from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE
 from inputdesign_cli.runs.results import Array, BoundCurves, BoundPanel
 
 
 def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
     """|G|, r_u, r_adm and white excitation's r_u over frequency, with the active frequencies marked."""
-    draw_entries(page, curves.panels, _plot, time_unit, magnitude="magnitude")
+    draw_panels(page, curves.panels, _plot, time_unit, magnitude="magnitude")
 
 
 def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:

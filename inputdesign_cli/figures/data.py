@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -59,7 +57,6 @@ def draw_residuals(page: Figure, curves: ResidualCurves, time_unit: str) -> None
     """
     _, p, r = curves.cross_correlation.shape
     single = p == r == 1
-    grid: Any
     if single:
         grid = page.subplots(2, 1, squeeze=False).T
     else:

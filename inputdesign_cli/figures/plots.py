@@ -16,7 +16,7 @@ from inputdesign_cli.figures.loss import draw_loss
 from inputdesign_cli.figures.moments import draw_moments
 from inputdesign_cli.figures.optimality import draw_optimality
 from inputdesign_cli.figures.signal import draw_signal
-from inputdesign_cli.figures.spectrum import draw_input_spectrum, draw_spectrum
+from inputdesign_cli.figures.spectrum import draw_spectrum
 from inputdesign_cli.figures.style import FileType, rendered
 from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands
 from inputdesign_cli.runs.results import (
@@ -29,7 +29,6 @@ from inputdesign_cli.runs.results import (
     ErrorCurves,
     FitCurves,
     LossCurves,
-    MatrixSpectrumCurves,
     MomentsCurves,
     OptimalityCurves,
     ResidualCurves,
@@ -48,12 +47,11 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     ErrorCurves: draw_error,
     FitCurves: draw_fit,
     LossCurves: draw_loss,
-    MatrixSpectrumCurves: draw_spectrum,
     MomentsCurves: draw_moments,
     OptimalityCurves: draw_optimality,
     ResidualCurves: draw_residuals,
     SignalCurves: draw_signal,
-    SpectrumCurves: draw_input_spectrum,
+    SpectrumCurves: draw_spectrum,
 }
 
 

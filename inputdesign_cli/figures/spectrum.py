@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.typing import LineStyleType
 
 from inputdesign_cli.figures.style import (
     BLUE,
@@ -19,18 +18,18 @@ from inputdesign_cli.figures.style import (
     frequency_axis,
     legend_above,
 )
-from inputdesign_cli.runs.results import Array, MatrixSpectrumCurves, SpectrumCurves
+from inputdesign_cli.runs.results import Array, SpectrumCurves
 
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
 # Entries of a nearly singular spectrum lie on each other: the dashes let the lower ones show through.
-DASHES: tuple[Any, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
+DASHES: tuple[LineStyleType, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
 MARGIN = 0.02  # beside the outermost lines, of the width between them
 MOST = 6  # curves that stay apart in one panel
 FEW = 60  # lines that are drawn bold
 
 
-def draw_spectrum(page: Figure, curves: MatrixSpectrumCurves, time_unit: str) -> None:
+def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     """The density, or the powers of sinusoids, of one input; of several the matrix and its eigenvalues."""
     if curves.spectrum.shape[1] > 1:
         _draw_matrix(page, curves, time_unit)
@@ -38,17 +37,20 @@ def draw_spectrum(page: Figure, curves: MatrixSpectrumCurves, time_unit: str) ->
     axes = page.add_subplot()
     shown = curves.frequency > 0
     w, power = curves.frequency[shown], curves.spectrum[shown, 0, 0].real
+    axis = w
     if curves.lines:
         handles = _plot_lines(axes, w, power, curves)
+        if curves.band is not None and w.size:
+            axis = np.append(w, [w.min() / 3, curves.band[1]])
     else:
         record = None if curves.record is None else curves.record[shown, 0]
         handles = _plot_density(axes, w, power, record, curves)
-    frequency_axis(axes, w if curves.band is None else np.append(w, curves.band), time_unit)
+    frequency_axis(axes, axis, time_unit)
     legend_above(axes, handles)
 
 
 def _plot_density(
-    axes: Axes, w: Array, density: Array, record: Array | None, curves: MatrixSpectrumCurves
+    axes: Axes, w: Array, density: Array, record: Array | None, curves: SpectrumCurves
 ) -> list[Artist]:
     phi = rf"\Phi_{{{curves.symbol}}}"
     handles: list[Artist] = []
@@ -68,19 +70,19 @@ def _plot_density(
     return handles
 
 
-def _plot_lines(axes: Axes, w: Array, power: Array, curves: MatrixSpectrumCurves) -> list[Artist]:
+def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> list[Artist]:
     few = w.size <= FEW
     total = f"sinusoids, total power {power.sum():.4g}"
     if curves.white is not None:
         total += f" (white: {curves.white:.4g})"
     stems = axes.vlines(w, 0.0, power, color=ORANGE, linewidth=1.8 if few else 0.8, label=total)
     axes.plot(w, power, linestyle="none", marker="o", markersize=5 if few else 2.5, color=ORANGE)
-    axes.set_ylim(0.0, 1.08 * float(power.max()))
+    axes.set_ylim(0.0, 1.08 * float(power.max(initial=0.0)) or 1.0)
     axes.set_ylabel(rf"power of each sinusoid of ${curves.symbol}$ (mean square)")
     return [stems]
 
 
-def _draw_matrix(page: Figure, curves: MatrixSpectrumCurves, time_unit: str) -> None:
+def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     """Moduli of the entries above, eigenvalues below: where the power is, and in how many directions."""
     w, r = curves.frequency, curves.spectrum.shape[1]
     entries = np.asarray(np.abs(curves.spectrum), dtype=float)
@@ -143,22 +145,3 @@ def logarithmic(axes: Axes, values: Array) -> None:
         axes.set_yscale("log", nonpositive="mask")
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, peak * 10.0**-DECADES), max(high, 2.0 * peak))
-
-
-def draw_input_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
-    """The spectrum of one input from separate arrays of its density or its lines."""
-    if curves.density is not None:
-        record = None if curves.record is None else curves.record[:, None]
-        spectrum = curves.density[:, None, None].astype(np.complex128)
-        new = MatrixSpectrumCurves(
-            curves.frequency, spectrum, curves.white, symbol=curves.symbol, record=record
-        )
-    else:
-        assert curves.line_frequency is not None
-        assert curves.line_power is not None
-        spectrum = curves.line_power[:, None, None].astype(np.complex128)
-        band = (float(curves.frequency[0]), float(curves.frequency[-1])) if curves.frequency.size else None
-        new = MatrixSpectrumCurves(
-            curves.line_frequency, spectrum, curves.white, lines=True, symbol=curves.symbol, band=band
-        )
-    draw_spectrum(page, new, time_unit)

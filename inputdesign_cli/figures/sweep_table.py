@@ -7,19 +7,18 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.runs.results import Array
+from inputdesign_cli.runs.results import Array, Json
 
 
 @dataclass(frozen=True)
 class SweepTable:
     """The content of `sweep.json` and the columns of `sweep.csv` as text."""
 
-    summary: Mapping[str, Any]
+    summary: Mapping[str, Json]
     columns: Mapping[str, list[str]]
 
     @property
@@ -45,9 +44,8 @@ class SweepTable:
 def read_sweep(root: Path) -> SweepTable:
     """Read the table of a sweep.
 
-    Raises
-    ------
-    DataError : `run-missing` or `run-unreadable`.
+    Raises:
+        DataError: `run-missing` or `run-unreadable`.
     """
     try:
         summary = json.loads((root / "sweep.json").read_text(encoding="utf-8"))

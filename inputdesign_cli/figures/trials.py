@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from inputdesign_cli.figures.ellipses import boundary
-from inputdesign_cli.figures.entries import draw_entries
+from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, ORANGE, legend_over_all
 from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel
 
@@ -46,7 +46,7 @@ def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
 def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
     """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
     plot = partial(_bands, runs=curves.runs)
-    draw_entries(page, curves.panels, plot, time_unit, magnitude=r"$|\hat{G} - G_0|$", title=curves.name)
+    draw_panels(page, curves.panels, plot, time_unit, magnitude=r"$|\hat{G} - G_0|$", title=curves.name)
 
 
 def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:

@@ -10,11 +10,11 @@ from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.polynomials import fit_polynomials, identify_polynomials
 from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices, identify_transfer_matrix
 from inputdesign_cli.plant import (
-    ChannelModel,
-    ContinuousChannels,
+    ContinuousModel,
     Intersample,
-    PolynomialChannels,
-    SampledChannels,
+    Model,
+    PolynomialModel,
+    SampledModel,
 )
 from inputdesign_cli.plant.polynomial import Array
 
@@ -33,7 +33,7 @@ class Estimator(Protocol):
 
 @dataclass(frozen=True)
 class _Polynomials:
-    model: PolynomialChannels
+    model: PolynomialModel
 
     def identify(self, u: Array, y: Array, start: Array | None, *, feedback: bool) -> Estimate:
         return identify_polynomials(self.model, u, y, start=start, feedback=feedback)
@@ -44,7 +44,7 @@ class _Polynomials:
 
 @dataclass(frozen=True)
 class _TransferMatrix:
-    model: ContinuousChannels
+    model: ContinuousModel
     between: Intersample
 
     def identify(self, u: Array, y: Array, start: Array | None, *, feedback: bool) -> Estimate:
@@ -55,7 +55,7 @@ class _TransferMatrix:
 
 
 @singledispatch
-def estimator(model: ChannelModel, step: float) -> Estimator:
+def estimator(model: Model, step: float) -> Estimator:
     """What estimates models of this kind from samples `step` apart; those in discrete time know theirs.
 
     Raises:
@@ -65,22 +65,22 @@ def estimator(model: ChannelModel, step: float) -> Estimator:
 
 
 @estimator.register
-def _(model: PolynomialChannels, step: float) -> Estimator:
+def _(model: PolynomialModel, step: float) -> Estimator:
     return _Polynomials(model)
 
 
 @estimator.register
-def _(model: ContinuousChannels, step: float) -> Estimator:
+def _(model: ContinuousModel, step: float) -> Estimator:
     return _TransferMatrix(model, Intersample(step, hold=False))
 
 
 @estimator.register
-def _(model: SampledChannels, step: float) -> Estimator:
+def _(model: SampledModel, step: float) -> Estimator:
     return _TransferMatrix(model.continuous_plant, Intersample(model.sample_time, hold=True))
 
 
 def identify(
-    model: ChannelModel,
+    model: Model,
     u: Array,
     y: Array,
     step: float = 1.0,
@@ -105,7 +105,7 @@ def identify(
     return estimator(model, step).identify(u, y, start, feedback=feedback)
 
 
-def fit_batch(model: ChannelModel, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:
+def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:
     """The same of many records in one pass, each from its one start, without checks.
 
     Args:

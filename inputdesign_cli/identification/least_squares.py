@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 
-def is_arx(model: PolynomialChannels) -> bool:
+def is_arx(model: PolynomialModel) -> bool:
     """Whether least squares is the prediction-error estimate: C, D and F are 1."""
     each = [*model.C, *model.D, *(f for row in model.F for f in row)]
     return not any(np.any(p[1:]) for p in each)
 
 
-def least_squares(model: PolynomialChannels, u: Array, y: Array) -> Array:
+def least_squares(model: PolynomialModel, u: Array, y: Array) -> Array:
     """theta (runs, k), outputs weighted with the inverse covariance of e.
 
     Args:
@@ -51,7 +51,7 @@ def least_squares(model: PolynomialChannels, u: Array, y: Array) -> Array:
     return np.asarray(np.linalg.solve(normal, right[:, :, None])[:, :, 0], dtype=float)
 
 
-def estimated_polynomials(model: PolynomialChannels, theta: Array) -> tuple[Array, Array]:
+def estimated_polynomials(model: PolynomialModel, theta: Array) -> tuple[Array, Array]:
     """A (runs, p, l) and B (runs, p, r, m) of estimates (runs, k), ascending in q^-1."""
     A = np.zeros((len(theta), model.outputs, max(a.size for a in model.A)))
     A[:, :, 0] = 1.0

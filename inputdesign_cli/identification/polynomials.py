@@ -24,7 +24,7 @@ from inputdesign_cli.identification.predictor import prediction_errors
 from inputdesign_cli.identification.problem import PredictionErrors, inverses
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 # Many runs share the cost of a pass over time; with more outputs at once the blocks no longer fit the cache.
@@ -32,7 +32,7 @@ _OUTPUTS_AT_ONCE = 512
 
 
 def identify_polynomials(
-    model: PolynomialChannels,
+    model: PolynomialModel,
     u: ArrayLike,
     y: ArrayLike,
     *,
@@ -98,9 +98,7 @@ def identify_polynomials(
     )
 
 
-def fit_polynomials(
-    model: PolynomialChannels, u: ArrayLike, y: ArrayLike, *, start: ArrayLike
-) -> BatchEstimate:
+def fit_polynomials(model: PolynomialModel, u: ArrayLike, y: ArrayLike, *, start: ArrayLike) -> BatchEstimate:
     """Prediction-error estimates of many records in one pass.
 
     Args:
@@ -184,7 +182,7 @@ def _covariances(structure: Structure, squares: NDArray[np.float64], samples: in
     return squares / np.outer(left, left)
 
 
-def _fits(model: PolynomialChannels, u: Array, y: Array) -> tuple[float | None, ...]:
+def _fits(model: PolynomialModel, u: Array, y: Array) -> tuple[float | None, ...]:
     """Per cent of the rms of each output that the simulation explains; None where it is unstable."""
     simulated, _ = model.simulate(u, np.zeros(y.shape), 1.0)
     return tuple(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.orders import InputOrders, OutputOrders
 from inputdesign_cli.identification.problem import PredictionErrors
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -18,7 +18,7 @@ class Structure:
     """Orders of A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i.
 
     Attributes:
-        names: (k,) parameters, in the order of `PolynomialChannels`.
+        names: (k,) parameters, in the order of `PolynomialModel`.
         in_plant, in_noise: numbers of parameters of B and F, and of A, C and D.
         rows: one an output; `places` of each row, where its parameters stand in theta.
     """
@@ -30,7 +30,7 @@ class Structure:
     places: tuple[NDArray[np.int64], ...]
 
     @classmethod
-    def of(cls, model: PolynomialChannels) -> Structure:
+    def of(cls, model: PolynomialModel) -> Structure:
         """The structure of a model: its orders and delays, its zero entries, and what outputs share."""
         where = {
             (parameter.letter, parameter.power, place): index

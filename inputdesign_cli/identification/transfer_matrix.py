@@ -21,7 +21,7 @@ from inputdesign_cli.identification.refined_iv import refine
 from inputdesign_cli.identification.transfer_problem import Point, TransferProblem, evaluate, rounding
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
-from inputdesign_cli.plant import ContinuousChannels, Intersample
+from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.polynomial import Array
 
 # Of the starts made from the data, as many are followed to the end: the likeliest after the instruments.
@@ -29,7 +29,7 @@ _FOLLOWED = 3
 
 
 def identify_transfer_matrix(
-    model: ContinuousChannels,
+    model: ContinuousModel,
     u: ArrayLike,
     y: ArrayLike,
     between: Intersample,
@@ -89,7 +89,7 @@ def identify_transfer_matrix(
 
 
 def fit_transfer_matrices(
-    model: ContinuousChannels,
+    model: ContinuousModel,
     u: ArrayLike,
     y: ArrayLike,
     between: Intersample,

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant import ContinuousChannels, Intersample
+from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.polynomial import Array
 
@@ -22,7 +22,7 @@ _FASTEST = 1e4
 class TransferRecord:
     """Samples u (N, r), y (N, p), and the `structure` that is to explain them by parameters theta (k,)."""
 
-    structure: ContinuousChannels
+    structure: ContinuousModel
     u: Array
     y: Array
     intersample: Intersample
@@ -85,7 +85,7 @@ class TransferRecord:
             out[columns] = np.poly(poles).real[:0:-1]
         return out
 
-    def _entry(self, model: ContinuousChannels, i: int, j: int) -> HeldEntry:
+    def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
         return self.intersample.entry(model.numerator[i][j], model.denominator[i][j])
 
     @cached_property

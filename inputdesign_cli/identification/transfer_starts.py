@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.identification.transfer_record import TransferRecord
-from inputdesign_cli.plant import ContinuousChannels
+from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -84,7 +84,7 @@ def _reduced(record: TransferRecord, responses: dict[Place, ComplexArray], w: Ar
 
 
 def _fit_group(
-    model: ContinuousChannels,
+    model: ContinuousModel,
     theta: Array,
     places: tuple[Place, ...],
     responses: dict[Place, ComplexArray],

@@ -2,7 +2,7 @@
 
 from inputdesign_cli.information.coordinates import Coordinates as Coordinates
 from inputdesign_cli.information.experiment import POWER_KINDS as POWER_KINDS
-from inputdesign_cli.information.experiment import ChannelExperiment as ChannelExperiment
+from inputdesign_cli.information.experiment import Experiment as Experiment
 from inputdesign_cli.information.experiment import PowerKind as PowerKind
 from inputdesign_cli.information.finite_record import FiniteRecord as FiniteRecord
 from inputdesign_cli.information.quadrature import Quadrature as Quadrature

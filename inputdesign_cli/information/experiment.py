@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
 from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, integrate
-from inputdesign_cli.plant import ChannelLoop, ChannelModel
+from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 PowerKind = Literal["input", "output", "excitation"]
@@ -26,7 +26,7 @@ _NODES_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
-class ChannelExperiment(Coordinates):
+class Experiment(Coordinates):
     """N samples of a model with r inputs and p outputs, excited within `band`.
 
     The excitation x is u in open loop (`loop` None) and r in closed loop, u = r - C y.
@@ -37,12 +37,12 @@ class ChannelExperiment(Coordinates):
     `prior` (k, k) is information already at hand, in raw parameters; `factor` sets the `Coordinates`.
     """
 
-    model: ChannelModel
+    model: Model
     samples: int
     band: tuple[float, float] = (0.0, np.pi)
     prior: Array | None = None
     factor: Array | None = None
-    loop: ChannelLoop | None = None
+    loop: Loop | None = None
 
     @property
     def inputs(self) -> int:
@@ -54,7 +54,7 @@ class ChannelExperiment(Coordinates):
         return self._source.singularities
 
     @property
-    def _source(self) -> ChannelModel | ChannelLoop:
+    def _source(self) -> Model | Loop:
         return self.model if self.loop is None else self.loop
 
     @cached_property
@@ -156,7 +156,7 @@ class ChannelExperiment(Coordinates):
         probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
         return ~np.any(probe > 0, axis=(0, 2, 3))
 
-    def whitened(self, power: float | Array) -> ChannelExperiment:
+    def whitened(self, power: float | Array) -> Experiment:
         """The same experiment in coordinates where M = I by this power, flat over the band.
 
         Args:

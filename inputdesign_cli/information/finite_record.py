@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.information.experiment import ChannelExperiment, PowerKind
+from inputdesign_cli.information.experiment import Experiment, PowerKind
 from inputdesign_cli.information.record_filters import RecordFilters
 from inputdesign_cli.information.record_transforms import RecordTransforms
 from inputdesign_cli.plant.polynomial import Array
@@ -33,7 +33,7 @@ class FiniteRecord:
         step: time between samples in the unit of time of the experiment's frequencies (1 for rad/sample).
     """
 
-    experiment: ChannelExperiment
+    experiment: Experiment
     samples: int
     step: float = 1.0
 

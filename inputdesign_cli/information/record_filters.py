@@ -12,8 +12,8 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from inputdesign_cli.information.experiment import ChannelExperiment, PowerKind
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.information.experiment import Experiment, PowerKind
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
@@ -23,14 +23,14 @@ Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
 class RecordFilters:
     """Filters records of one channel; `model` is that of the experiment."""
 
-    experiment: ChannelExperiment
-    model: PolynomialChannels
+    experiment: Experiment
+    model: PolynomialModel
 
     @classmethod
-    def of(cls, experiment: ChannelExperiment) -> RecordFilters | None:
+    def of(cls, experiment: Experiment) -> RecordFilters | None:
         """The filters of an experiment, None where it is not of this kind."""
         model = experiment.model
-        if not isinstance(model, PolynomialChannels) or model.inputs > 1 or model.outputs > 1:
+        if not isinstance(model, PolynomialModel) or model.inputs > 1 or model.outputs > 1:
             return None
         return cls(experiment, model)
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.information.experiment import ChannelExperiment, PowerKind
+from inputdesign_cli.information.experiment import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # e^-32 is below rounding; a plant that remembers longer than this many samples is cut there.
@@ -30,7 +30,7 @@ class RecordTransforms:
     interpolation of the samples, `step` apart, and its outputs are read at the same instants.
     """
 
-    experiment: ChannelExperiment
+    experiment: Experiment
     samples: int
     step: float
 

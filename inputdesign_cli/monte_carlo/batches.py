@@ -56,13 +56,13 @@ def run_batches(
     batches = _batches(function, job, runs=runs, size=size, seed=seed)
     for done in (executor or InProcess()).run(_compute, batches):
         if isinstance(done.error, WorkerLostError):
-            message = f"a batch of {done.task.runs} simulated runs has no result: {done.error}"
+            message = f"a batch of {done.job.runs} simulated runs has no result: {done.error}"
             hint = "the system may have run out of memory; try fewer processes"
             raise IdesignError(Diagnostic("worker-lost", message, hint)) from done.error
         if done.error is not None:
             raise done.error
         assert done.answer is not None  # there is an answer or an error
-        answers[done.task.index] = done.answer
+        answers[done.job.index] = done.answer
     return [answers[index] for index in range(len(answers))]
 
 

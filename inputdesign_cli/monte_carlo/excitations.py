@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, in_phase_record
 from inputdesign_cli.signal.settings import Method
@@ -26,7 +26,7 @@ class Excitation(Protocol):
         """Records (runs, samples, r), each a realisation of its own."""
         ...
 
-    def information(self, experiment: ChannelExperiment) -> Array:
+    def information(self, experiment: Experiment) -> Array:
         """What it tells in theory, (k, k) in raw parameters, prior information included."""
         ...
 
@@ -43,7 +43,7 @@ class Recorded:
         """The same record for each run."""
         return np.broadcast_to(self.record, (runs, *self.record.shape))
 
-    def information(self, experiment: ChannelExperiment) -> Array:
+    def information(self, experiment: Experiment) -> Array:
         """Of the samples themselves."""
         return FiniteRecord(experiment, len(self.record), self.step).information(self.record)
 
@@ -96,7 +96,7 @@ class Redrawn:
 
         return np.array([of(channel) for channel in range(inputs)])
 
-    def information(self, experiment: ChannelExperiment) -> Array:
+    def information(self, experiment: Experiment) -> Array:
         """Of the spectrum."""
         return _information(experiment, self.basis, self.x)
 
@@ -120,7 +120,7 @@ class InPhase:
             [in_phase_record(self.frequencies, self.amplitudes, samples, rng) for _ in range(runs)]
         )
 
-    def information(self, experiment: ChannelExperiment) -> Array:
+    def information(self, experiment: Experiment) -> Array:
         """Of the sinusoids."""
         return _information(experiment, self.basis, self.x)
 
@@ -130,7 +130,7 @@ def _constant(density: Array, w: Array) -> NDArray[np.float64]:
     return np.full(w.shape, density[0, 0]) if density.size == 1 else np.ones(w.shape)[:, None, None] * density
 
 
-def _information(experiment: ChannelExperiment, basis: Basis | TabulatedSpectrum, x: Array) -> Array:
+def _information(experiment: Experiment, basis: Basis | TabulatedSpectrum, x: Array) -> Array:
     """(k, k): M of a spectrum."""
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     return np.asarray(experiment.baseline_information + np.tensordot(x, maps, axes=1))

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, fit_batch, identify
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.monte_carlo.trials import Trials
-from inputdesign_cli.plant import ChannelModel
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -26,8 +26,8 @@ class TrialJob:
         step: time between samples in the unit of the experiment's frequencies.
     """
 
-    true: ChannelExperiment
-    model: ChannelModel
+    true: Experiment
+    model: Model
     excitation: Excitation
     step: float
 

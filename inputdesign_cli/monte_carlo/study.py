@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.batches import run_batches
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.monte_carlo.simulated_runs import TrialJob, run_job
@@ -26,8 +26,8 @@ class Study:
         step: time between samples in the unit of the experiment's frequencies.
     """
 
-    nominal: ChannelExperiment
-    true: ChannelExperiment
+    nominal: Experiment
+    true: Experiment
     runs: int
     seed: int
     step: float
@@ -61,9 +61,7 @@ def tried_on_model(study: Study, excitation: Excitation, executor: Executor | No
     return None if study.true is study.nominal else _tried(study, study.nominal, excitation, executor)
 
 
-def _tried(
-    study: Study, experiment: ChannelExperiment, excitation: Excitation, executor: Executor | None
-) -> Tried:
+def _tried(study: Study, experiment: Experiment, excitation: Excitation, executor: Executor | None) -> Tried:
     model = study.nominal.model
     job = TrialJob(experiment, model, excitation, study.step)
     # The same seed for every excitation: they meet the same noise.

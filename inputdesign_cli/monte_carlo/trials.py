@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Absolute, Entry, ModelError
-from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ChannelModel
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -43,8 +43,8 @@ class Trials:
         first: (samples, r), the excitation of the first run.
     """
 
-    true: ChannelExperiment
-    model: ChannelModel
+    true: Experiment
+    model: Model
     theta: Array
     converged: NDArray[np.bool_]
     power: dict[str, list[float]]

@@ -1,24 +1,21 @@
-"""The loop around the plant: u = r - C y, or no loop at all."""
+"""The loop around a plant with several channels: u = r - C y, C a matrix of transfer functions in q^-1."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, singledispatch
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant.model import PolynomialModel
-from inputdesign_cli.plant.polynomial import (
-    Array,
-    ComplexArray,
-    evaluate,
-    join_roots,
-    roots_in_z,
-    unit_circle,
-)
-from inputdesign_cli.plant.transfer import Rational
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.model import Model
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.transfer import TransferMatrix
+
+_WELL_POSED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -33,85 +30,137 @@ class LoopResponse:
 
 
 @dataclass(frozen=True)
-class Loop:
-    """A SISO model in open loop (`controller` None) or under u = r - C y.
+class Loop(ABC):
+    """A model under u = r - C y, with e acting on u through the loop.
 
-    Everything is written over the characteristic polynomial A F D_c + B N_c, so that unstable or
-    integrating poles of plant and controller never appear: S and G S stay finite where C or G is not.
+    With G = R^-1 N and C = Q^-1 P, R and Q diagonal, everything solves
+
+        [R  -N] [y]   [R H e]
+        [P   Q] [u] = [Q r  ]
+
+    in which R, N, R H, P and Q have no poles on or outside the unit circle: unstable and integrating poles of
+    plant and controller are zeros of R and Q, so that what they cause in the loop stays finite.
     """
 
-    model: PolynomialModel
-    controller: Rational | None = None
+    model: Model
+    controller: TransferMatrix
+
+    @property
+    @abstractmethod
+    def closed_poles(self) -> ComplexArray:
+        """All poles of the loop in z; it is internally stable when they lie inside the unit circle."""
+
+    @property
+    @abstractmethod
+    def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction of y, u and e."""
+
+    @property
+    @abstractmethod
+    def instantaneous(self) -> Array:
+        """(p + r, p + r): the matrix on the left at infinite frequency, what acts without delay."""
+
+    @abstractmethod
+    def left_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p + r, p + r): the matrix on the left at normalised frequencies `w`."""
+
+    @abstractmethod
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """R H (n, p, p) at normalised frequencies `w`."""
+
+    @abstractmethod
+    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        """y (.., n, p) and u (.., n, r) for samples r (.., n, r) and e (.., n, p), from rest."""
 
     @cached_property
-    def characteristic(self) -> Array:
-        """Closed-loop characteristic polynomial in q^-1 (open loop: A F)."""
-        m = self.model
-        open_loop = np.convolve(m.A, m.F)
-        if self.controller is None:
-            return open_loop
-        left = np.convolve(open_loop, self.controller.denominator_polynomial)
-        right = np.convolve(m.B, self.controller.numerator)
-        total = np.zeros(max(left.size, right.size))
-        total[: left.size] += left
-        total[: right.size] += right
-        return total
-
-    @cached_property
-    def poles(self) -> ComplexArray:
-        """Poles in z of everything that the excitation and the noise cause, predictor included."""
-        return join_roots([roots_in_z(self.characteristic), self.model.predictor_poles])
+    def singularities(self) -> ComplexArray:
+        """Poles of all that the excitation and the noise cause, as points of the frequency plane."""
+        return logarithmic_distance(np.concatenate([self.closed_poles, self.predictor_poles]))
 
     def check_stability(self) -> None:
-        """Raise `SpecError` unless the loop is well posed and stable.
+        """Raise `SpecError` unless the loop is well posed and internally stable.
 
         Raises:
             SpecError: `unstable-loop` or `algebraic-loop`.
         """
-        if self.controller is None:
-            return
-        leading = self.characteristic[0]
-        if abs(leading) < 1e-9 * np.abs(self.characteristic).max():
+        p, leading = self.model.outputs, self.instantaneous
+        # det(I + C G) is the product of 1 + these eigenvalues, which do not depend on the units of u and y.
+        gains = np.linalg.eigvals(-leading[:p, p:] @ np.linalg.solve(leading[p:, p:], leading[p:, :p]))
+        if np.min(np.abs(1.0 + gains) / (1.0 + np.abs(gains))) < _WELL_POSED:
             raise bad_spec(
                 "algebraic-loop",
-                "plant and controller both act without delay and 1 + C G vanishes at infinite frequency",
-                hint="put the delay of the plant into B (a leading 0) or into the controller's numerator",
+                "plant and controller both act without delay and det(I + C G) vanishes at infinite frequency",
+                hint="give the plant its delay (a leading 0 in B; in s a numerator of lower order than the "
+                "denominator) or the controller one (a leading 0 in its numerator)",
                 key="experiment.controller",
             )
-        refuse_unstable(
-            roots_in_z(self.characteristic),
-            hint="check the signs (feedback is negative: u = r - C y), the delay in B, and that "
-            "numerator and denominator of the controller are in q^-1, ascending",
+        _refuse_unstable(
+            self.closed_poles,
+            hint="check the signs (feedback is negative: u = r - C y), which output each column of the "
+            "controller reads, and that entries of a row with the same poles share one denominator",
         )
 
     def check_delay(self) -> None:
-        """Raise `SpecError` where the direct method would fail, see `refuse_instantaneous`.
+        """Raise `SpecError` where the direct method would fail, see `_refuse_instantaneous`.
 
         Raises:
             SpecError: `algebraic-loop`.
         """
-        if self.controller is not None and self.model.B[0] != 0.0 and self.controller.numerator[0] != 0.0:
-            refuse_instantaneous()
+        acting, p = self.instantaneous != 0.0, self.model.outputs
+        if np.any(acting[:p, p:] @ acting[p:, :p]):
+            _refuse_instantaneous()
 
     def responses(self, w: ArrayLike) -> LoopResponse:
-        """Transfer functions at normalised frequencies `w` (n,)."""
-        m = self.model
-        q = unit_circle(w)
-        A, B, C, D, F = (evaluate(p, q) for p in (m.A, m.B, m.C, m.D, m.F))
-        if self.controller is None:
-            one = np.ones_like(q)
-            return LoopResponse(y_x=B / (A * F), u_x=one, y_e=C / (A * D), u_e=np.zeros_like(q))
-        Nc, Dc = self.controller.numerator_at(w), self.controller.denominator_at(w)
-        closed = A * F * Dc + B * Nc
+        """From r and from e at normalised frequencies `w`: y_x (n, p, r), u_x (n, r, r), y_e (n, p, p), u_e.
+
+        y_x = G S_i, u_x = S_i = (I + C G)^-1, y_e = S_o H, u_e = -C S_o H with S_o = (I + G C)^-1.
+        """
+        left, noise = self.left_at(w), self.noise_at(w)
+        n, p, r = len(left), self.model.outputs, self.model.inputs
+        right = np.zeros((n, p + r, r + p), dtype=complex)
+        right[:, p + np.arange(r), np.arange(r)] = self.controller.fraction_at(w)[1]
+        right[:, :p, r:] = noise
+        solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
         return LoopResponse(
-            y_x=B * Dc / closed,
-            u_x=A * F * Dc / closed,
-            y_e=F * C * Dc / (D * closed),
-            u_e=-F * C * Nc / (D * closed),
+            y_x=solved[:, :p, :r], u_x=solved[:, p:, :r], y_e=solved[:, :p, r:], u_e=solved[:, p:, r:]
         )
 
+    def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
+        left, p = self.left_at(w), self.model.outputs
+        right = np.zeros((left.shape[0], left.shape[1], p), dtype=complex)
+        right[:, :p] = left[:, :p, :p]
+        solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
+        return solved[:, :p], -solved[:, p:]
 
-def refuse_instantaneous() -> None:
+    def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
+        """(n, k, p, r): what r contributes to the gradient of the prediction."""
+        t = self.responses(w)
+        return self.model.prediction_gradient(w, t.y_x, t.u_x, np.zeros_like(t.y_x))
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """(n, k, p, p): what e contributes, through the noise model and around the loop."""
+        t = self.responses(w)
+        e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), t.y_e.shape)
+        return self.model.prediction_gradient(w, t.y_e, t.u_e, e)
+
+
+@singledispatch
+def close_loop(model: Model, controller: TransferMatrix) -> Loop:
+    """The loop of a model under a controller; each kind of plant that has one registers its own.
+
+    Raises:
+        SpecError: `not-supported` for a plant that is not sampled.
+    """
+    raise bad_spec(
+        "not-supported",
+        "this version has no loop around a plant in continuous time",
+        hint="write plant.sample: zoh: controllers act on samples",
+        key="experiment.controller",
+    )
+
+
+def _refuse_instantaneous() -> None:
     """Raise `SpecError` (`algebraic-loop`): both plant and controller act at once.
 
     Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an estimate
@@ -127,7 +176,7 @@ def refuse_instantaneous() -> None:
     )
 
 
-def refuse_unstable(poles: ComplexArray, *, hint: str) -> None:
+def _refuse_unstable(poles: ComplexArray, *, hint: str) -> None:
     """Raise `SpecError` (`unstable-loop`) unless all closed-loop poles in z lie inside the unit circle."""
     if not poles.size or np.abs(poles).max() < 1.0:
         return

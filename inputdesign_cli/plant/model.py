@@ -1,35 +1,15 @@
-"""Prediction-error models y = G(q, theta) u + H(q, theta) e and their parameter gradients.
-
-The five-polynomial form A y = (B/F) u + (C/D) e of Ljung, System Identification (1999), Section 4.2,
-holds ARX, ARMAX, ARARMAX, OE, BJ and FIR as special cases.
-"""
+"""What every model with several inputs and outputs answers, and how its parameters are named."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.polynomial import (
-    Array,
-    ComplexArray,
-    evaluate,
-    join_roots,
-    roots_in_z,
-    unit_circle,
-)
-
-
-@dataclass(frozen=True)
-class Response:
-    """G, H and their gradients at n frequencies: p outputs, r inputs, k parameters."""
-
-    G: ComplexArray  # (n, p, r)
-    H: ComplexArray  # (n, p, p)
-    dG: ComplexArray  # (n, k, p, r)
-    dH: ComplexArray  # (n, k, p, p)
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 
 @dataclass(frozen=True)
@@ -42,146 +22,151 @@ class Fraction:
     denominator_gradient: ComplexArray
 
 
-def _one() -> Array:
-    return np.ones(1)
+class Model(Protocol):
+    """y = G(theta) u + H(theta) e with p outputs, r inputs, k parameters and e of a full covariance.
+
+    Frequencies `w` are in rad/sample, or in rad per time unit when `continuous`. Points of the frequency
+    plane are frequency + j damping (see `logarithmic_distance`).
+    """
+
+    continuous: bool
+
+    @property
+    def inputs(self) -> int: ...
+
+    @property
+    def outputs(self) -> int: ...
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def theta(self) -> Array: ...
+
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
+        ...
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        ...
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        ...
+
+    def is_fraction(self, output: int, input: int) -> bool:
+        """Whether numerator and denominator of an entry of G are affine in theta."""
+        ...
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as such a fraction, where `is_fraction`."""
+        ...
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
+        ...
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
+        ...
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        ...
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest.
+
+        Args:
+            step: time between samples of a plant in continuous time; others know theirs.
+        """
+        ...
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dtheta (n, k, p, r): the gradient of the one-step prediction that u causes."""
+        ...
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
+        ...
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """psi = -d epsilon / d theta (n, k, p, m) of the one-step prediction.
+
+        `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
+        outputs, inputs and prediction errors epsilon.
+        """
+        ...
 
 
 @dataclass(frozen=True)
-class PolynomialModel:
-    """SISO model A y = (B/F) u + (C/D) e, e white of the given variance.
+class Parameter:
+    """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
 
-    A, C, D and F are monic; every later coefficient, and every coefficient of B from its first
-    nonzero one on, is a free parameter (zeros in between included).
-    """
+    letter: str
+    power: int
+    places: tuple[tuple[int, int], ...]  # (output, input); (output, output) for noise polynomials
+    label: str
+    value: float
 
-    B: Array
-    A: Array = field(default_factory=_one)
-    C: Array = field(default_factory=_one)
-    D: Array = field(default_factory=_one)
-    F: Array = field(default_factory=_one)
-    variance: float = 1.0
+    @property
+    def name(self) -> str:
+        return f"{self.letter}{self.power}{self.label}"
 
-    outputs = 1
-    inputs = 1
 
-    @cached_property
-    def delay(self) -> int:
-        """Number of leading zeros of B."""
-        return int(np.flatnonzero(self.B)[0])
+def entry_label(output: int, input: int, *, single: bool) -> str:
+    """The channels of a parameter as they stand in its name, counted from one: `[2,1]`."""
+    return "" if single else f"[{output + 1},{input + 1}]"
 
-    @cached_property
-    def _lags(self) -> dict[str, range]:
-        return {
-            "a": range(1, len(self.A)),
-            "b": range(self.delay, len(self.B)),
-            "c": range(1, len(self.C)),
-            "d": range(1, len(self.D)),
-            "f": range(1, len(self.F)),
-        }
+
+class Parametrised:
+    """What a model knows by its list of `parameters`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def parameters(self) -> tuple[Parameter, ...]: ...
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Parameter names in the order of theta: a1.., b(delay).., c1.., d1.., f1.. ."""
-        return tuple(f"{letter}{lag}" for letter, lags in self._lags.items() for lag in lags)
+        return tuple(parameter.name for parameter in self.parameters)
 
     @cached_property
     def theta(self) -> Array:
-        """Parameter values (k,), in the order of `names`."""
-        polynomials = {"a": self.A, "b": self.B, "c": self.C, "d": self.D, "f": self.F}
-        return np.array([polynomials[letter][lag] for letter, lags in self._lags.items() for lag in lags])
+        return np.array([parameter.value for parameter in self.parameters])
 
-    @cached_property
-    def in_plant(self) -> np.ndarray:
-        """(k,) bool: the parameters on which G depends (k_G of them)."""
-        return np.array([name[0] in "abf" for name in self.names])
 
-    @cached_property
-    def poles(self) -> ComplexArray:
-        """Poles of G in z."""
-        return join_roots([roots_in_z(self.A), roots_in_z(self.F)])
+class WhiteNoise:
+    """H = I: the prediction is G u, so that e reaches its gradient through u alone."""
 
-    @cached_property
-    def zeros(self) -> ComplexArray:
-        """Finite zeros of G in z."""
-        return roots_in_z(self.B)
+    if TYPE_CHECKING:
 
-    @cached_property
-    def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the gradient of the one-step prediction with respect to theta."""
-        return join_roots(roots_in_z(p) for p in (self.C, self.D, self.F))
+        @property
+        def outputs(self) -> int: ...
 
-    def plant_at(self, w: ArrayLike) -> ComplexArray:
-        """G at normalised frequencies `w` (n,): (n,)."""
-        q = unit_circle(w)
-        return evaluate(self.B, q) / (evaluate(self.A, q) * evaluate(self.F, q))
+        @property
+        def theta(self) -> Array: ...
 
-    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dG/dtheta at normalised frequencies `w` (n,): (n, k)."""
-        q = unit_circle(w)
-        A, F = evaluate(self.A, q), evaluate(self.F, q)
-        G = evaluate(self.B, q) / (A * F)
-        zero = np.zeros_like(G)
-        return self._stack(q, {"a": -G / A, "b": 1 / (A * F), "c": zero, "d": zero, "f": -G / F})
+        def plant_gradient(self, w: ArrayLike) -> ComplexArray: ...
 
-    def fraction(self, w: ArrayLike) -> Fraction:
-        """G as a fraction of two polynomials that are affine in theta, at `w` (n,).
+    @property
+    def in_plant(self) -> NDArray[np.bool_]:
+        return np.ones(self.theta.size, dtype=bool)
 
-        Raises:
-            ValueError: both A and F have free coefficients, so that the denominator is a product.
-        """
-        if len(self.A) > 1 and len(self.F) > 1:
-            raise ValueError("the denominator A F is not affine in the parameters")
-        q = unit_circle(w)
-        one, zero = np.ones_like(q), np.zeros_like(q)
-        none = {"a": zero, "b": zero, "c": zero, "d": zero, "f": zero}
-        return Fraction(
-            numerator=evaluate(self.B, q),
-            denominator=evaluate(self.A, q) * evaluate(self.F, q),
-            numerator_gradient=self._stack(q, {**none, "b": one}),
-            denominator_gradient=self._stack(q, {**none, "a": one, "f": one}),
-        )
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        return self.plant_gradient(w)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """dH/dtheta at normalised frequencies `w` (n,): (n, k)."""
-        q = unit_circle(w)
-        A, D = evaluate(self.A, q), evaluate(self.D, q)
-        H = evaluate(self.C, q) / (A * D)
-        zero = np.zeros_like(H)
-        return self._stack(q, {"a": -H / A, "b": zero, "c": 1 / (A * D), "d": -H / D, "f": zero})
+        return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)
 
-    def response(self, w: ArrayLike) -> Response:
-        """G, H and their exact gradients at normalised frequencies `w` (n,)."""
-        q = unit_circle(w)
-        H = evaluate(self.C, q) / (evaluate(self.A, q) * evaluate(self.D, q))
-        return Response(
-            G=self.plant_at(w)[:, None, None],
-            H=H[:, None, None],
-            dG=self.plant_gradient(w)[:, :, None, None],
-            dH=self.noise_gradient(w)[:, :, None, None],
-        )
-
-    def prediction_gradient(
-        self, w: ArrayLike, y: ComplexArray, u: ComplexArray, e: ComplexArray
-    ) -> ComplexArray:
-        """Gradient psi = -d epsilon / d theta of the one-step prediction: (n, k).
-
-        `y`, `u`, `e` (n,) are the transfer functions from one common source to the output, the input
-        and the prediction error epsilon = (D/C)(A y - (B/F) u). Written with the polynomials of the
-        predictor alone (Ljung, Section 10.3), so that the poles of an unstable A cancel exactly.
-        """
-        q = unit_circle(w)
-        B, C, D, F = (evaluate(p, q) for p in (self.B, self.C, self.D, self.F))
-        return self._stack(
-            q,
-            {
-                "a": -D / C * y,
-                "b": D / (C * F) * u,
-                "c": e / C,
-                "d": -e / D,
-                "f": -D * B / (C * F * F) * u,
-            },
-        )
-
-    def _stack(self, q: ComplexArray, families: dict[str, ComplexArray]) -> ComplexArray:
-        columns = [families[letter] * q**lag for letter, lags in self._lags.items() for lag in lags]
-        return np.stack(columns, axis=-1)
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """dG/dtheta u (n, k, p, m), see `Model`."""
+        return np.asarray(self.plant_gradient(w) @ u[:, None])

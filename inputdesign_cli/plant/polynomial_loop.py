@@ -9,8 +9,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
-from inputdesign_cli.plant.channels import PolynomialChannels
+from inputdesign_cli.plant.loop import Loop, close_loop
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -20,18 +19,19 @@ from inputdesign_cli.plant.polynomial import (
     unit_circle,
 )
 from inputdesign_cli.plant.polynomial_matrix import at, stack
+from inputdesign_cli.plant.polynomial_model import PolynomialModel
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
-class PolynomialLoop(ChannelLoop):
-    """`ChannelLoop` with R_i = A_i prod_j F_ij and N = R G, so that R H = prod_j F_ij C_i / D_i.
+class PolynomialLoop(Loop):
+    """`Loop` with R_i = A_i prod_j F_ij and N = R G, so that R H = prod_j F_ij C_i / D_i.
 
     The roots of the determinant of the polynomial matrix on the left are all closed-loop poles (every 1/A_i
     is driven by its own noise e_i).
     """
 
-    model: PolynomialChannels
+    model: PolynomialModel
 
     @cached_property
     def _left(self) -> Array:
@@ -120,5 +120,5 @@ class PolynomialLoop(ChannelLoop):
 
 
 @close_loop.register
-def _(model: PolynomialChannels, controller: TransferMatrix) -> PolynomialLoop:
+def _(model: PolynomialModel, controller: TransferMatrix) -> PolynomialLoop:
     return PolynomialLoop(model, controller)

@@ -9,15 +9,15 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_loop import ChannelLoop, close_loop
+from inputdesign_cli.plant.loop import Loop, close_loop
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.plant.sampled import SampledChannels
+from inputdesign_cli.plant.sampled_model import SampledModel
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 
 @dataclass(frozen=True)
-class SampledLoop(ChannelLoop):
-    """`ChannelLoop` with R = I and N = G, which is stable, and H = I.
+class SampledLoop(Loop):
+    """`Loop` with R = I and N = G, which is stable, and H = I.
 
     Poles and signals are those of the states of the entries of G and of the rows of C: polynomials in q^-1
     would lose the digits of poles that crowd at z = 1 when sampling is fast. States of G that feedback does
@@ -26,7 +26,7 @@ class SampledLoop(ChannelLoop):
     y(t) is measured before u(t) is applied and held; a controller that needs time to compute has a delay.
     """
 
-    model: SampledChannels
+    model: SampledModel
 
     @cached_property
     def _states(self) -> tuple[Array, Array, Array]:
@@ -80,5 +80,5 @@ class SampledLoop(ChannelLoop):
 
 
 @close_loop.register
-def _(model: SampledChannels, controller: TransferMatrix) -> SampledLoop:
+def _(model: SampledModel, controller: TransferMatrix) -> SampledLoop:
     return SampledLoop(model, controller)

@@ -6,9 +6,11 @@ out, and the sensitivity function at low frequency depends on just those digits.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
+from operator import or_
 from typing import Protocol
 
 import numpy as np
@@ -163,24 +165,13 @@ class TransferMatrix:
 
     def common_fraction(self) -> tuple[Array, Array]:
         """P' (rows, columns, l) and d (m,) with T = P' / d; factors that rows share are in d once."""
-        shared: list[Array] = []
-        missing: list[list[Array]] = []
-        for row in self.factors:
-            left = list(shared)
-            for factor in row:
-                match = next((i for i, f in enumerate(left) if np.array_equal(f, factor)), None)
-                if match is None:
-                    shared.append(factor)
-                    for rest in missing:
-                        rest.append(factor)
-                else:
-                    del left[match]
-            missing.append(left)
+        own = [Counter(map(tuple, row)) for row in self.factors]
+        shared: Counter[tuple[float, ...]] = reduce(or_, own)
         rows = [
-            [product_of([p, *rest]).tolist() for p in row]
-            for row, rest in zip(self.numerator, missing, strict=True)
+            [product_of([p, *(shared - factors).elements()]).tolist() for p in row]
+            for row, factors in zip(self.numerator, own, strict=True)
         ]
-        return stack(rows), product_of(shared)
+        return stack(rows), product_of(shared.elements())
 
     @property
     def poles(self) -> ComplexArray:

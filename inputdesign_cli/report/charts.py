@@ -17,10 +17,10 @@ from inputdesign_cli.runs.results import (
     BoundCurves,
     BoundPanel,
     Curves,
-    MatrixSpectrumCurves,
     OptimalityCurves,
     Result,
     SignalCurves,
+    SpectrumCurves,
 )
 from inputdesign_cli.runs.text_formats import read_csv
 
@@ -135,7 +135,7 @@ def _spectrum(table: Mapping[str, Array], result: Result, *, symbol: str) -> Dra
     white = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation", [None])[0]
     record = table["phi_record"][:, None] if "phi_record" in table else None
     density = phi[:, None, None].astype(np.complex128)
-    curves = MatrixSpectrumCurves(w, density, white=white, symbol=symbol, record=record)
+    curves = SpectrumCurves(w, density, white=white, symbol=symbol, record=record)
     peak = w[int(np.argmax(phi))]
     alt = f"Spectral density of the excitation against frequency, with its peak at {peak:.3g}."
     return curves, alt, _CAPTIONS["spectrum"]

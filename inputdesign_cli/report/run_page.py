@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from inputdesign_cli.errors import DataError, Diagnostic, SpecError
 from inputdesign_cli.report.charts import run_charts
@@ -19,7 +18,7 @@ from inputdesign_cli.report.numbers import Fact, listed, provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.run_directory import read_run
 
 # Headings and the charts that belong under them; those of data and of simulated runs have their own.
@@ -40,7 +39,7 @@ _COMMANDS = {
 }
 
 
-def run_page(run: Path) -> dict[str, Any]:
+def run_page(run: Path) -> dict[str, Json]:
     """The content of the template for a run. Raises `DataError` as `read_run` does."""
     result = read_run(run)
     verb = _verb(result)
@@ -170,7 +169,7 @@ def _proofs(result: Result) -> list[str]:
     return proofs
 
 
-def flat(value: Any, path: str = "") -> list[tuple[str, str]]:
+def flat(value: Json, path: str = "") -> list[tuple[str, str]]:
     """Every entry of a result by its path; of a long list its length only."""
     if isinstance(value, Mapping):
         if set(value) == {"re", "im"}:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import citations
 from inputdesign_cli.runs.objectives import OBJECTIVES
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import read_run
 
 MOST_ROWS = 200
@@ -32,7 +32,7 @@ _SHOWN = (
 )
 
 
-def sweep_page(root: Path) -> dict[str, Any]:
+def sweep_page(root: Path) -> dict[str, Json]:
     """The content of the template for a sweep. Raises `DataError` as `read_sweep` does."""
     table = read_sweep(root)
     summary = table.summary
@@ -58,7 +58,7 @@ def sweep_page(root: Path) -> dict[str, Any]:
     }
 
 
-def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str, Any]]:
+def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str, Json]]:
     """The question and the result of the first point that has one: they speak for the others."""
     run = next((run for run in table.columns["run"] if run), None)
     if run is None:

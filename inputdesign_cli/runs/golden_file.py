@@ -42,7 +42,7 @@ _PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
 def _result_path(path: str) -> str:
     if not _PATH.fullmatch(path):
         hint = "write objective.value or power.input[0]"
-        raise fail(PathDiagnostic("golden-path", f"{path!r} is no path into a result", hint))
+        raise fail("golden-path", f"{path!r} is no path into a result", hint)
     return path
 
 
@@ -121,11 +121,9 @@ class Golden:
 def load_golden(path: Path) -> Golden:
     """Read a golden file.
 
-    Raises
-    ------
-    SpecError
-        Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
-        `golden-path`, `golden-tolerance`, `golden-name`.
+    Raises:
+        SpecError: Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
+            `golden-path`, `golden-tolerance`, `golden-name`.
     """
     tree = read(read_text(path), str(path))
     try:

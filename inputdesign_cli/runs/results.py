@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 # Data as JSON has it. What is in a result is known by its path, not by its type.
 Json = Any
 Result = Mapping[str, Json]
-# An entry of G by output and input, from zero; None is the only entry, or the norm of them all.
-Entry = tuple[int, int] | None
 
 
 @dataclass(frozen=True)
@@ -31,19 +29,6 @@ class Table:
 
 @dataclass(frozen=True)
 class SpectrumCurves:
-    """The designed spectrum over frequency, as a density, as lines, or both."""
-
-    frequency: Array  # (n,) rad per time unit
-    density: Array | None = None  # (n,) Phi(frequency)
-    white: float | None = None  # the flat level of the white baseline, for comparison
-    line_frequency: Array | None = None  # (L,)
-    line_power: Array | None = None  # (L,) mean square of each sinusoid
-    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
-    record: Array | None = None  # (n,) smoothed periodogram of the record
-
-
-@dataclass(frozen=True)
-class MatrixSpectrumCurves:
     """The spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
 
     frequency: Array  # (n,) rad per time unit
@@ -53,7 +38,7 @@ class MatrixSpectrumCurves:
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
     logarithmic: bool = False  # the axis of frequency; that of one input always is
     record: Array | None = None  # (n, r), smoothed periodograms of the record
-    band: tuple[float, float] | None = None  # where power may be, if that is wider than `frequency`
+    band: tuple[float, float] | None = None  # where the sinusoids might be
 
 
 @dataclass(frozen=True)
@@ -87,7 +72,7 @@ class BoundPanel:
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
-    entry: Entry = None
+    entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
 
 
 @dataclass(frozen=True)
@@ -144,7 +129,7 @@ class ErrorBandPanel:
     quantiles: Mapping[float, Array]  # probability -> (n,)
     r_u: Array | None = None
     r_adm: Array | None = None
-    entry: Entry = None
+    entry: tuple[int, int] | None = None  # as in `BoundPanel`
 
 
 @dataclass(frozen=True)
@@ -225,7 +210,6 @@ class MomentsCurves:
 
 Curves = (
     SpectrumCurves
-    | MatrixSpectrumCurves
     | DirectionCurves
     | LossCurves
     | BoundCurves

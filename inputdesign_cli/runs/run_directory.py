@@ -15,11 +15,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from inputdesign_cli.errors import DataError, Diagnostic, OutputError
 from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.results import BoundCurves, OptimalityCurves, Results, Table
+from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.text_formats import csv_text, json_text, plain
 
 __all__ = [
@@ -43,17 +42,16 @@ STANDARD_FILES = (
 JOURNAL = ".replacing-run.json"
 
 
-def finished_result(results: Results) -> dict[str, Any]:
+def finished_result(results: Results) -> dict[str, Json]:
     """The content of `result.json` in JSON's own types, with `environment` and `spec_sha256` filled in.
 
     `spec_sha256` is the digest of `spec.yaml` as it is written.
 
-    Raises
-    ------
-    ValueError, TypeError
-        The result holds a NaN, an infinity or a type that JSON lacks: a mistake of the program.
+    Raises:
+        ValueError, TypeError: The result holds a NaN, an infinity or a type that JSON lacks: a mistake of the
+            program.
     """
-    result: dict[str, Any] = plain(results.result)
+    result: dict[str, Json] = plain(results.result)
     if not result.get("environment"):
         result["environment"] = environment()
     if not result.get("spec_sha256"):
@@ -111,10 +109,8 @@ def write_run(
 def write_text(path: Path, text: str) -> None:
     """Write a single text file, UTF-8.
 
-    Raises
-    ------
-    OutputError
-        `output-not-writable`, `output-full`.
+    Raises:
+        OutputError: `output-not-writable`, `output-full`.
     """
     with complaining(path):
         _write(path, text)
@@ -124,10 +120,8 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
     """Write a text file (or one that comes in pieces) so that a reader finds the old one or the new one,
     whole, whenever the writer is killed.
 
-    Raises
-    ------
-    OutputError
-        `output-not-writable`, `output-full`.
+    Raises:
+        OutputError: `output-not-writable`, `output-full`.
     """
     partial = path.with_name(f".{path.name}.partial-{os.getpid()}")
     with complaining(path):
@@ -141,14 +135,12 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
             partial.unlink(missing_ok=True)
 
 
-def read_run(directory: Path) -> dict[str, Any]:
+def read_run(directory: Path) -> dict[str, Json]:
     """The content of `result.json` of a whole run.
 
-    Raises
-    ------
-    DataError
-        `run-missing` (no such directory, or no run in it), `run-incomplete` (one of its files is gone),
-        `run-unreadable` (`result.json` is not what `write_run` writes).
+    Raises:
+        DataError: `run-missing` (no such directory, or no run in it), `run-incomplete` (one of its files is
+            gone), `run-unreadable` (`result.json` is not what `write_run` writes).
     """
     result = _load_result(directory)
     missing = [name for name in result.get("files", ()) if not (directory / name).is_file()]
@@ -163,7 +155,7 @@ def read_run(directory: Path) -> dict[str, Any]:
     return result
 
 
-def _load_result(directory: Path) -> dict[str, Any]:
+def _load_result(directory: Path) -> dict[str, Json]:
     try:
         result = json.loads((directory / RESULT).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
@@ -187,11 +179,11 @@ def _unreadable(directory: Path, why: str) -> DataError:
 
 
 def _write_files(
-    results: Results, result: dict[str, Any], folder: Path, figures: Mapping[str, bytes]
+    results: Results, result: dict[str, Json], folder: Path, figures: Mapping[str, bytes]
 ) -> list[str]:
     """All files of the run into `folder`, on the disc when this returns; their names, the result last."""
     texts = {SPEC: results.resolved_spec}
-    texts |= {f"{stem}.csv": csv_text(table) for stem, table in _tables(results).items()}
+    texts |= {f"{stem}.csv": csv_text(table) for stem, table in results.tables.items()}
     for name, text in texts.items():
         _write(folder / name, text)
     contents = {**results.files, **figures}
@@ -204,21 +196,6 @@ def _write_files(
         _sync(folder / name)
     _sync(folder)
     return names
-
-
-def _tables(results: Results) -> dict[str, Table]:
-    """The tables, with what the curves show beyond them: a report is drawn from the files alone."""
-    tables = dict(results.tables)
-    for stem, curves in results.curves.items():
-        if isinstance(curves, OptimalityCurves) and stem not in tables:
-            header = f"frequency_rad_per_{results.time_unit}"
-            tables[stem] = Table({header: curves.frequency, "ratio": curves.ratio})
-        elif isinstance(curves, BoundCurves) and stem in tables and len(curves.panels) == 1:
-            (panel,) = curves.panels
-            more = {"r_u_white": panel.r_u_white, "r_u_record": panel.r_u_record}
-            shown = {name: values for name, values in more.items() if values is not None}
-            tables[stem] = Table({**tables[stem].columns, **shown})
-    return tables
 
 
 def _write(path: Path, text: str) -> None:

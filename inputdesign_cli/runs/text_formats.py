@@ -7,24 +7,20 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.runs.results import Array, Table
+from inputdesign_cli.runs.results import Array, Json, Table
 
 
-def plain(value: Any, where: str = "result") -> Any:
+def plain(value: Json, where: str = "result") -> Json:
     """`value` in JSON's own types: arrays as nested lists, complex numbers as {"re", "im"}, tuples as lists.
 
     Keys keep their order. `where` names the value in the diagnostic.
 
-    Raises
-    ------
-    ValueError
-        A NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
-    TypeError
-        A value or a key that has no place in JSON.
+    Raises:
+        ValueError: A NaN or an infinity: JSON has none, and a null in its place would hide a mistake of ours.
+        TypeError: A value or a key that has no place in JSON.
     """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
@@ -46,7 +42,7 @@ def plain(value: Any, where: str = "result") -> Any:
     raise TypeError(f"{where} is of type {type(value).__name__}, which JSON cannot hold")
 
 
-def json_text(value: Any) -> str:
+def json_text(value: Json) -> str:
     """`value` (anything that `plain` accepts) as JSON text with a final newline."""
     return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -54,10 +50,8 @@ def json_text(value: Any) -> str:
 def csv_text(table: Table) -> str:
     """A header line and one line a row, 17 significant digits, so that reading gives back every bit.
 
-    Raises
-    ------
-    ValueError
-        A column that is not a real vector, or columns of different lengths.
+    Raises:
+        ValueError: A column that is not a real vector, or columns of different lengths.
     """
     columns = {name: np.asarray(values) for name, values in table.columns.items()}
     for name, values in columns.items():

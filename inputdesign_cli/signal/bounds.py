@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.constraints import SignalConstraint
 from inputdesign_cli.signal.input_limits import InputLimits
@@ -56,7 +56,7 @@ def limiter_of(plant: FiniteRecord, settings: SignalSettings, bounds: Bounds) ->
 
 
 def limited_responses(
-    experiment: ChannelExperiment, bounds: Bounds, step: float, hold: int, frequencies: Array
+    experiment: Experiment, bounds: Bounds, step: float, hold: int, frequencies: Array
 ) -> list[LimitedResponse]:
     """From sinusoids of the values to each signal that is limited, in steady state, and its bound.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import os
 from collections.abc import Sequence
@@ -48,7 +49,7 @@ class SpecTemplate:
         Raises:
             SpecError: An override that cannot be applied.
         """
-        tree = Tree(_copy(self.data), Places())
+        tree = Tree(copy.deepcopy(self.data), Places())
         apply_overrides(tree, [*overrides, "sweep=null"])
         if tree.diagnostics:
             raise SpecError(tree.diagnostics)
@@ -99,14 +100,6 @@ def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -
     if tree.diagnostics:
         raise SpecError(tree.diagnostics)
     return SpecTemplate(text, file, FilePath(path).parent, tuple(overrides), tree.data)
-
-
-def _copy(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copy(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_copy(item) for item in value]
-    return value
 
 
 def _texts(value: Any) -> list[str]:

@@ -49,7 +49,9 @@ def describe(value: object) -> str:
 
 def show(value: float) -> str:
     """A number as a person would write it."""
-    return str(value) if isinstance(value, int) and abs(value) < 10**9 else f"{float(value):.6g}"
+    if isinstance(value, int) and (abs(value) < 10**9 or abs(value) >= 2**1024):
+        return str(value) if abs(value) < 10**9 else clip(str(value))
+    return f"{float(value):.6g}"
 
 
 def count(number: int, noun: str) -> str:

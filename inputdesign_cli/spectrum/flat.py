@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.information import ChannelExperiment, Quadrature, integrate_band
+from inputdesign_cli.information import Experiment, Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Functional, Pricing
 from inputdesign_cli.spectrum.directions import weighted_sums
@@ -80,6 +80,6 @@ class FlatBasis(DensityFamily):
         return entry | ({"order": 0, "coefficients": x} if self.inputs == 1 else {})
 
 
-def flat_basis(experiment: ChannelExperiment) -> FlatBasis:
+def flat_basis(experiment: Experiment) -> FlatBasis:
     """White excitation for an experiment: what its coordinates are whitened with."""
     return FlatBasis(experiment.inputs, experiment.band)

@@ -7,9 +7,9 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from inputdesign_cli.errors import Location, SpecError, bad_spec
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import Sweep
 from inputdesign_cli.specification.models.sweep import range_values
 from inputdesign_cli.specification.yaml.reader import read
@@ -36,7 +36,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Grid(Sequence[tuple[str, ...]]):
+class Grid:
     """The points as tuples of texts, one per axis; computed when asked for. The last axis runs fastest."""
 
     axes: tuple[Axis, ...]
@@ -46,7 +46,7 @@ class Grid(Sequence[tuple[str, ...]]):
         lengths = [len(axis.texts) for axis in self.axes]
         return (min(lengths) if self.zipped else math.prod(lengths)) if lengths else 0
 
-    def __getitem__(self, index: Any) -> Any:
+    def __getitem__(self, index: int) -> tuple[str, ...]:
         if not 0 <= index < len(self):
             raise IndexError(index)
         if self.zipped:
@@ -64,9 +64,9 @@ class Grid(Sequence[tuple[str, ...]]):
         """The point as `--set` takes it."""
         return [f"{axis.key}={text}" for axis, text in zip(self.axes, point, strict=True)]
 
-    def block(self) -> dict[str, Any]:
+    def block(self) -> dict[str, Json]:
         """The grid as the `sweep` block of a spec."""
-        block: dict[str, Any] = {
+        block: dict[str, Json] = {
             "set": {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
         }
         return {**block, "zip": True} if self.zipped else block
@@ -77,9 +77,8 @@ def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
 
     Commas inside brackets, braces and quotes belong to a value.
 
-    Raises
-    ------
-    SpecError : `bad-range`, `bad-override`, `sweep-twice`.
+    Raises:
+        SpecError: `bad-range`, `bad-override`, `sweep-twice`.
     """
     fixed: list[str] = []
     axes: dict[str, Axis] = {}
@@ -111,9 +110,8 @@ def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Gr
     """The grid of the spec's `sweep` block, in which the axes of the command line replace or join those
     of the block.
 
-    Raises
-    ------
-    SpecError : `sweep-empty`, `sweep-lengths`, `sweep-too-large`.
+    Raises:
+        SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`.
     """
     merged: dict[str, Axis] = {}
     if block is not None:
@@ -163,14 +161,14 @@ def _split(text: str) -> tuple[str, ...]:
     return (*parts, text[start:].strip())
 
 
-def _text(value: Any) -> str:
+def _text(value: Json) -> str:
     """A value of the `sweep` block as the text that `--set` takes."""
     if isinstance(value, str) and _WORD.fullmatch(value) and resolve(value) == value:
         return value
     return json.dumps(value, ensure_ascii=False)
 
 
-def _data(text: str) -> Any:
+def _data(text: str) -> Json:
     """What `--set` makes of a text; a text that it cannot read stays one."""
     try:
         return read(text, "--set").data

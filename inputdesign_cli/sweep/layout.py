@@ -21,9 +21,10 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from inputdesign_cli.errors import Diagnostic, OutputError
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import RESULT, complaining, replace_text
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
@@ -52,11 +53,11 @@ class Layout:
         """Whether a point has been tried in vain."""
         return self.failure(key).is_file()
 
-    def read(self, key: str) -> dict[str, Any] | None:
+    def read(self, key: str) -> dict[str, Json] | None:
         """The result of a point, or its failure (which has a `code`), or None."""
         for path in (self.run(key) / RESULT, self.failure(key)):
             with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-                content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+                content: dict[str, Json] = json.loads(path.read_text(encoding="utf-8"))
                 return content
         return None
 
@@ -92,11 +93,9 @@ class Layout:
 def opened(root: Path) -> Iterator[Layout]:
     """The directory of a sweep, made if it is missing and held for this process alone.
 
-    Raises
-    ------
-    OutputError
-        `sweep-locked` (another process sweeps into it), `output-not-a-sweep` (something else is in it),
-        `output-not-a-directory`, `output-not-writable`, `output-full`.
+    Raises:
+        OutputError: `sweep-locked` (another process sweeps into it), `output-not-a-sweep` (something else is
+            in it), `output-not-a-directory`, `output-not-writable`, `output-full`.
     """
     with contextlib.ExitStack() as held:
         with complaining(root):

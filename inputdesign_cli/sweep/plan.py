@@ -14,7 +14,7 @@ from inputdesign_cli import __version__
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
-from inputdesign_cli.sweep.point import PointTask
+from inputdesign_cli.sweep.point import PointJob
 from inputdesign_cli.sweep.verbs import Verb
 
 _KEY_LENGTH = 24
@@ -42,7 +42,7 @@ class Plan:
             self._keys.append(hashlib.sha256(name.encode()).hexdigest()[:_KEY_LENGTH])
         return self._keys[index]
 
-    def task(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointTask:
+    def job(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointJob:
         """A point for a worker; `with_files` if the worker may not see the files that the spec names."""
         overrides = tuple(self.grid.overrides(self.grid[index]))
         files = None
@@ -50,14 +50,13 @@ class Plan:
             with suppress(SpecError):
                 names = self.draft.files(self.draft.variant(overrides))
                 files = {name: (self.draft.folder / name).read_bytes() for name in names}
-        return PointTask(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
+        return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
 
     def check(self) -> None:
         """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
 
-        Raises
-        ------
-        SpecError : what is wrong with the first point, if no point that is tried can be read.
+        Raises:
+            SpecError: what is wrong with the first point, if no point that is tried can be read.
         """
         first: SpecError | None = None
         for index in dict.fromkeys(i * (len(self.grid) - 1) // _TRIED for i in range(_TRIED + 1)):
@@ -79,9 +78,8 @@ class Plan:
 def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb) -> Plan:
     """Read the spec and the settings.
 
-    Raises
-    ------
-    SpecError : the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
+    Raises:
+        SpecError: the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
     """
     if verb not in get_args(Verb):
         hint = "sweep with --verb solve"

@@ -8,7 +8,6 @@ import threading
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from inputdesign_cli.errors import (
     EXIT_BAD_INPUT,
@@ -19,6 +18,7 @@ from inputdesign_cli.errors import (
     OutputError,
 )
 from inputdesign_cli.runs.provenance import environment
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.specification import SpecTemplate
 from inputdesign_cli.sweep.layout import Layout, at_work
@@ -34,7 +34,7 @@ _alone = threading.Lock()
 
 
 @dataclass(frozen=True)
-class PointTask:
+class PointJob:
     """What a worker needs to know of a point."""
 
     index: int
@@ -56,51 +56,50 @@ class PointEnd:
     files: dict[str, bytes] | None = None
 
 
-def run_point(task: PointTask) -> PointEnd:
+def run_point(job: PointJob) -> PointEnd:
     """Compute a point and write it into the directory of the sweep.
 
-    Raises
-    ------
-    OutputError : the files cannot be written, which is not the fault of the point.
+    Raises:
+        OutputError: the files cannot be written, which is not the fault of the point.
     """
-    layout = Layout(task.root)
-    with at_work(task.root):
-        end = _compute(task, layout.run(task.key))
+    layout = Layout(job.root)
+    with at_work(job.root):
+        end = _compute(job, layout.run(job.key))
         if end.failure:
-            layout.write_failure(task.key, end.failure)
+            layout.write_failure(job.key, end.failure)
         return replace(end, failure="")
 
 
-def run_point_elsewhere(task: PointTask) -> PointEnd:
+def run_point_elsewhere(job: PointJob) -> PointEnd:
     """Compute a point on a machine that may not see the directory of the sweep, and return its files."""
     # A worker of a cluster may have several threads; the plots and the clocks of the points want one.
     with _alone, tempfile.TemporaryDirectory(prefix="idesign-") as folder:
         run = Path(folder) / "run"
         data = Path(folder).joinpath(*_DEPTH)
         data.mkdir(parents=True)
-        for name, content in (task.files or {}).items():
+        for name, content in (job.files or {}).items():
             path = Path(os.path.normpath(data / name))
             if path.is_relative_to(folder):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
-        end = _compute(replace(task, draft=replace(task.draft, folder=data)), run)
+        end = _compute(replace(job, draft=replace(job.draft, folder=data)), run)
         if end.failure:
             return end
         return replace(end, files={path.name: path.read_bytes() for path in sorted(run.iterdir())})
 
 
-def _compute(task: PointTask, directory: Path) -> PointEnd:
+def _compute(job: PointJob, directory: Path) -> PointEnd:
     started = time.perf_counter()
     try:
-        spec = task.draft.spec(task.overrides)
-        results = run_verb(task.verb, spec)
+        spec = job.draft.spec(job.overrides)
+        results = run_verb(job.verb, spec)
         seconds = time.perf_counter() - started
         timing = {**results.result.get("timing_s", {}), "point": seconds}
         results = replace(results, result={**results.result, "timing_s": timing})
         from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
-        write_run(results, directory, draw_all(results) if task.figures else {})
+        write_run(results, directory, draw_all(results) if job.figures else {})
     except OutputError:
         raise
     except IdesignError as error:
@@ -115,7 +114,7 @@ def _compute(task: PointTask, directory: Path) -> PointEnd:
 
 def failed(status: str, diagnostic: Diagnostic, seconds: float) -> PointEnd:
     """The end of a point without a result, with the content of its failure file."""
-    content: dict[str, Any] = {
+    content: dict[str, Json] = {
         "format": 1,
         "status": status,
         "code": diagnostic.code,

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import (
@@ -20,6 +20,7 @@ from inputdesign_cli.errors import (
     SpecError,
 )
 from inputdesign_cli.runs.provenance import environment
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import complaining, replace_text
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.specification.yaml.writer import to_yaml
@@ -30,7 +31,7 @@ from inputdesign_cli.sweep.point import (
     LOST,
     STATUS,
     PointEnd,
-    PointTask,
+    PointJob,
     failed,
     run_point,
     run_point_elsewhere,
@@ -117,19 +118,17 @@ def sweep(
 ) -> SweepSummary:
     """Run a verb at every point of a grid, but for the points that are done already.
 
-    Parameters
-    ----------
-    settings : `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points.
-    executor : where the points are computed (default: in this process).
-    fail_fast : stop at the first point without a result instead of noting it in the table.
-    rerun_failed : try points again that failed in an earlier call.
-    figures : draw the figures of every point too.
-    watch : is told after every point how far the sweep is.
+    Args:
+        settings: `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points.
+        executor: where the points are computed (default: in this process).
+        fail_fast: stop at the first point without a result instead of noting it in the table.
+        rerun_failed: try points again that failed in an earlier call.
+        figures: draw the figures of every point too.
+        watch: is told after every point how far the sweep is.
 
-    Raises
-    ------
-    SpecError, OutputError : before anything is computed; later OutputError only.
-    IdesignError : the first failure, with `fail_fast`.
+    Raises:
+        SpecError, OutputError: before anything is computed; later OutputError only.
+        IdesignError: the first failure, with `fail_fast`.
     """
     plan = build_plan(spec, settings, zipped=zipped, verb=verb)
     with opened(directory) as layout:
@@ -161,7 +160,7 @@ class _Run:
     computed: int = 0
     failed: int = 0
     stopped: bool = False
-    lost: dict[str, dict[str, Any]] = field(default_factory=dict)
+    lost: dict[str, dict[str, Json]] = field(default_factory=dict)
     first_failure: IdesignError | None = None
 
     def compute(self) -> None:
@@ -171,8 +170,8 @@ class _Run:
             points.mkdir(exist_ok=True)
         due = time.monotonic() + _REST
         function = run_point if self.executor.shares_files else run_point_elsewhere
-        finished: Finished[PointTask, PointEnd]
-        for finished in self.executor.run(function, self._tasks()):
+        finished: Finished[PointJob, PointEnd]
+        for finished in self.executor.run(function, self._jobs()):
             self._take(finished)
             if self.stopped:
                 return
@@ -185,7 +184,7 @@ class _Run:
         """Write sweep.csv as things stand, and count the points by status."""
         statuses: Counter[str] = Counter()
 
-        def read(key: str) -> dict[str, Any] | None:
+        def read(key: str) -> dict[str, Json] | None:
             content = self.layout.read(key) or self.lost.get(key)
             statuses[content.get("status", "done") if content else PENDING] += 1
             return content
@@ -194,7 +193,7 @@ class _Run:
         # The table reads every point twice.
         return {status: n // 2 for status, n in sorted(statuses.items())}
 
-    def _tasks(self) -> Iterator[PointTask]:
+    def _jobs(self) -> Iterator[PointJob]:
         seen: set[str] = set()
         here = self.executor.shares_files
         root = self.layout.root if here else Path()
@@ -210,11 +209,11 @@ class _Run:
             if known:
                 self._tell()
             else:
-                yield self.plan.task(index, root, figures=self.figures, with_files=not here)
+                yield self.plan.job(index, root, figures=self.figures, with_files=not here)
 
-    def _take(self, finished: Finished[PointTask, PointEnd]) -> None:
+    def _take(self, finished: Finished[PointJob, PointEnd]) -> None:
         """File what a worker has answered."""
-        task, end = finished.task, finished.answer
+        job, end = finished.job, finished.answer
         self.computed += 1
         if isinstance(finished.error, OutputError):
             raise finished.error
@@ -223,19 +222,19 @@ class _Run:
             code, status = ("worker-lost", LOST) if lost else ("internal-error", BROKEN)
             end = failed(status, Diagnostic(code, str(finished.error)), 0.0)
         if end.files is not None:
-            self.layout.adopt(task.key, end.files)
+            self.layout.adopt(job.key, end.files)
         if end.status == LOST:
             # Not the fault of the point: the next call tries it again.
-            self.lost[task.key] = json.loads(end.failure)
+            self.lost[job.key] = json.loads(end.failure)
         elif end.failure:
-            self.layout.write_failure(task.key, end.failure)
+            self.layout.write_failure(job.key, end.failure)
         elif end.status not in FAILURES:
-            self.layout.failure(task.key).unlink(missing_ok=True)
+            self.layout.failure(job.key).unlink(missing_ok=True)
         if end.status in FAILURES:
-            self._note_failure(task.index, self.lost.get(task.key) or self.layout.read(task.key) or {})
+            self._note_failure(job.index, self.lost.get(job.key) or self.layout.read(job.key) or {})
         self._tell()
 
-    def _note_failure(self, index: int, content: dict[str, Any]) -> None:
+    def _note_failure(self, index: int, content: dict[str, Json]) -> None:
         self.failed += 1
         self.stopped = self.stopped or self.fail_fast
         if self.first_failure is None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.sweep.plan import Plan
 
-Read = Callable[[str], Mapping[str, Any] | None]
+Read = Callable[[str], Mapping[str, Json] | None]
 
 PENDING = "pending"
 MOST_ENTRIES = 4
@@ -39,9 +39,8 @@ _LEFT_OUT = frozenset(
 def table_lines(plan: Plan, read: Read) -> Iterator[str]:
     """The lines of the table, one point in memory at a time.
 
-    Parameters
-    ----------
-    read : key of a point -> its result, its failure (which has a `code`), or None while it is pending.
+    Args:
+        read: key of a point -> its result, its failure (which has a `code`), or None while it is pending.
     """
     found: dict[str, None] = {}
     for index in range(len(plan.grid)):
@@ -68,9 +67,9 @@ def table_lines(plan: Plan, read: Read) -> Iterator[str]:
             yield _line([*point, content.get("status", "done"), *cells, seconds, "", "", f"points/{key}"])
 
 
-def scalars(value: Any, path: str = "") -> dict[str, Any]:
+def scalars(value: Json, path: str = "") -> dict[str, Json]:
     """Every number, text and truth value of a result by its path (`power.input[0]`), short lists included."""
-    found: dict[str, Any] = {}
+    found: dict[str, Json] = {}
     if isinstance(value, Mapping):
         for key, item in value.items():
             if key not in _LEFT_OUT:
@@ -84,7 +83,7 @@ def scalars(value: Any, path: str = "") -> dict[str, Any]:
     return found
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Json) -> str:
     if value is None:
         return ""
     return f"{value:.17g}" if isinstance(value, float) else str(value)

@@ -23,16 +23,12 @@ def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Result
     Raises:
         IdesignError: as the verb does.
     """
+    from inputdesign_cli import tasks
+
     match verb:
         case "solve":
-            from inputdesign_cli.tasks import solve
-
-            return solve(spec)
+            return tasks.solve(spec)
         case "analyse":
-            from inputdesign_cli.tasks import analyse
-
-            return analyse(spec)
+            return tasks.analyse(spec)
         case "simulate":
-            from inputdesign_cli.tasks import simulate
-
-            return simulate(spec, executor=executor)
+            return tasks.simulate(spec, executor=executor)

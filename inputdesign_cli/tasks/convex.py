@@ -17,7 +17,7 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Results, Table
@@ -63,7 +63,7 @@ class ConvexTask:
 
     header: Header
     question: Question
-    experiment: ChannelExperiment
+    experiment: Experiment
     cost: dict[PowerKind, Weight]
     alpha: float
     tolerance: float
@@ -245,7 +245,7 @@ class ConvexTask:
             )
         optimality = optimality_curves(units, design)
         if optimality is not None:
-            curves["optimality"] = optimality
+            tables["optimality"], curves["optimality"] = optimality
         shown = white if problem.needs_definite else None
         ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
         if ellipses is not None:

@@ -13,7 +13,7 @@ from inputdesign_cli.accuracy import ModelError, Requirement, worst
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weights_of
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Results, Table
@@ -44,7 +44,7 @@ class GivenExcitation:
 
     kind: str
     power: dict[PowerKind, list[float]]
-    information: Callable[[ChannelExperiment], Array]
+    information: Callable[[Experiment], Array]
     basis: TabulatedSpectrum | LinesBasis | None = None
     x: Array | None = None
     sinusoids: tuple[Array, Array] | None = None
@@ -56,13 +56,13 @@ class GivenExcitation:
         kind: str,
         basis: TabulatedSpectrum | LinesBasis,
         x: Array,
-        experiment: ChannelExperiment,
+        experiment: Experiment,
         *,
         sinusoids: tuple[Array, Array] | None = None,
     ) -> GivenExcitation:
         """An excitation that is known by its spectrum."""
 
-        def information(coordinates: ChannelExperiment) -> Array:
+        def information(coordinates: Experiment) -> Array:
             maps = basis.integrals(coordinates.information_density, coordinates.singularities)
             return coordinates.baseline_information + np.tensordot(x, maps, axes=1)
 
@@ -80,7 +80,7 @@ class GivenExcitation:
         return cls(kind, found, information, basis, x, sinusoids)
 
     @classmethod
-    def even(cls, experiment: ChannelExperiment, power: float) -> GivenExcitation:
+    def even(cls, experiment: Experiment, power: float) -> GivenExcitation:
         """White excitation of this total power, flat over the band and even over the channels."""
         share = np.full(experiment.inputs, power / experiment.inputs)
         return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
@@ -101,7 +101,7 @@ class GivenTask:
     """
 
     header: Header
-    experiment: ChannelExperiment
+    experiment: Experiment
     requirements: Sequence[RequirementFactory]
     unstated: Sequence[ModelError]
     excitation: GivenExcitation
@@ -180,7 +180,7 @@ class GivenTask:
         return Delivered(results, record.samples, self._renewed(len(record.samples)))
 
     def _result(
-        self, experiment: ChannelExperiment, requirements: Sequence[Requirement], information: Array
+        self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
     ) -> dict[str, Any]:
         met = all(worst(r.violations(information)).ratio <= 1.0 + _ROUNDING for r in requirements)
         result: dict[str, Any] = {
@@ -206,7 +206,7 @@ class GivenTask:
                 entry["coefficients"] = excitation.power["excitation"]
         return entry
 
-    def _record(self, experiment: ChannelExperiment, ratio: Callable[[Array], float]) -> Record | None:
+    def _record(self, experiment: Experiment, ratio: Callable[[Array], float]) -> Record | None:
         """The signal as given, or one record of the given spectrum; None for one too short."""
         excitation, request = self.excitation, self.record
         if excitation.samples is not None:
@@ -237,7 +237,7 @@ class GivenTask:
         self,
         frequencies: Array,
         amplitudes: Array,
-        experiment: ChannelExperiment,
+        experiment: Experiment,
         ratio: Callable[[Array], float],
     ) -> Record | None:
         """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
@@ -251,7 +251,7 @@ class GivenTask:
 
 
 def _ratio_of(
-    request: RecordRequest, experiment: ChannelExperiment, record: Array, ratio: Callable[[Array], float]
+    request: RecordRequest, experiment: Experiment, record: Array, ratio: Callable[[Array], float]
 ) -> float:
     """The worst ratio of a record; infinite when it is too short to excite every parameter."""
     try:
@@ -260,7 +260,7 @@ def _ratio_of(
         return np.inf
 
 
-def _check_excites(experiment: ChannelExperiment, information: Array) -> None:
+def _check_excites(experiment: Experiment, information: Array) -> None:
     """Raise `SpecError` (`not-exciting`) when the information matrix is singular to working precision."""
     eigenvalues, vectors = np.linalg.eigh(information)
     if eigenvalues[0] > _TOO_FAINT * eigenvalues[-1]:

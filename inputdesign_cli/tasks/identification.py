@@ -10,8 +10,8 @@ from pathlib import Path
 from inputdesign_cli.accuracy import ModelError, Requirement
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.identification import identify as estimate_model
-from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ChannelModel
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
@@ -33,7 +33,7 @@ class ModelQuestion:
             the spec designs nothing.
     """
 
-    experiment: ChannelExperiment
+    experiment: Experiment
     alpha: float
     requirements: Sequence[Requirement]
     entries: Sequence[ModelError]
@@ -52,9 +52,9 @@ class Identification:
     """
 
     header: Header
-    nominal: ChannelModel
+    nominal: Model
     assessable: bool
-    at: Callable[[ChannelModel, int, str], ModelQuestion]
+    at: Callable[[Model, int, str], ModelQuestion]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Identified:
     """An estimate, its data, and what is asked of it."""
 
     estimate: Estimate
-    model: ChannelModel
+    model: Model
     data: Data
     question: ModelQuestion
 

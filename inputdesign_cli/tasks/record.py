@@ -11,7 +11,7 @@ import numpy as np
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     Bounds,
@@ -76,7 +76,7 @@ class RecordRequest:
         return -(-(self.samples or experiment) // block) * block
 
 
-def make_record(request: RecordRequest, design: Design, experiment: ChannelExperiment) -> Record | None:
+def make_record(request: RecordRequest, design: Design, experiment: Experiment) -> Record | None:
     """The best of several records of the designed spectrum.
 
     Best is the least power that meets the requirements by the record itself, or the best criterion. None when
@@ -126,7 +126,7 @@ def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGen
 
 def given_record(
     request: RecordRequest,
-    experiment: ChannelExperiment,
+    experiment: Experiment,
     spectrum: DesignedSpectrum,
     ratio: Callable[[Array], float],
 ) -> Record | None:

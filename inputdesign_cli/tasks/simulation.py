@@ -16,11 +16,11 @@ from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn
 from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_truth
 from inputdesign_cli.monte_carlo.trials import PredictedError
-from inputdesign_cli.plant import ChannelLoop, ChannelModel
+from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import BoundCurves, Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Units
@@ -43,11 +43,11 @@ class TrueSystem:
     With `relative_noise` the standard deviation of the noise is that share of the weakest output's.
     """
 
-    model: ChannelModel
-    loop: ChannelLoop | None
+    model: Model
+    loop: Loop | None
     relative_noise: float | None = None
 
-    def experiment(self, nominal: ChannelExperiment, output_power: Sequence[float]) -> ChannelExperiment:
+    def experiment(self, nominal: Experiment, output_power: Sequence[float]) -> Experiment:
         """The nominal experiment on this system; `output_power` (p,) is that of the design."""
         model = self.model
         if self.relative_noise is not None:
@@ -71,7 +71,7 @@ class Simulation:
     """
 
     units: Units
-    nominal: ChannelExperiment
+    nominal: Experiment
     truth: TrueSystem | None
     runs: int
     seed: int

@@ -86,7 +86,7 @@ def test_weight_divides():
 
 def test_vanishing_admissible_error_is_refused():
     """G vanishes at pi, and a relative bound with it."""
-    model = PolynomialModel(B=np.array([0.0, 1.0, 1.0]))
+    model = PolynomialModel.single(B=np.array([0.0, 1.0, 1.0]))
     requirement = ModelError(Experiment(Loop(model), 100), Relative(model, 0.1), 2.0)
     with pytest.raises(SpecError) as error:
         requirement.check_positive()

@@ -65,8 +65,8 @@ def test_weighted_variance_is_the_definition(flexible):
 
 
 def models():
-    one = PolynomialModel(B=np.array([0, 3.6]), F=np.array([1, -0.7]), C=np.array([1, -0.9]))
-    two = PolynomialModel(A=np.array([1, -1.5, 0.7]), B=np.array([0, 1.0, 0.5]), variance=0.1)
+    one = PolynomialModel.single(B=np.array([0, 3.6]), F=np.array([1, -0.7]), C=np.array([1, -0.9]))
+    two = PolynomialModel.single(A=np.array([1, -1.5, 0.7]), B=np.array([0, 1.0, 0.5]), variance=0.1)
     return [one, two]
 
 

@@ -79,7 +79,7 @@ def test_two_workers_share_the_work(loopback):
 
 
 def test_errors_come_back(loopback):
-    done = {f.task: f for f in Cluster(loopback.address).run(jobs.fail_on_three, range(5))}
+    done = {f.job: f for f in Cluster(loopback.address).run(jobs.fail_on_three, range(5))}
     assert str(done[3].error) == "three"
     assert done[4].answer == 4
 

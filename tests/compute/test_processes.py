@@ -15,8 +15,8 @@ from inputdesign_cli.compute.processes import Processes
 
 @pytest.mark.parametrize("executor", [InProcess(), Processes(1), Processes(2)])
 def test_answers_and_errors_belong_to_their_tasks(executor):
-    done = {f.task: f for f in executor.run(jobs.fail_on_three, range(6))}
-    assert {task: f.answer for task, f in done.items()} == {0: 0, 1: 1, 2: 2, 3: None, 4: 4, 5: 5}
+    done = {f.job: f for f in executor.run(jobs.fail_on_three, range(6))}
+    assert {job: f.answer for job, f in done.items()} == {0: 0, 1: 1, 2: 2, 3: None, 4: 4, 5: 5}
     assert isinstance(done[3].error, ValueError)
     assert str(done[3].error) == "three"
 

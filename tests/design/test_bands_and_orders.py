@@ -8,8 +8,8 @@ from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.design.convex.designs import Question, white_power, whitened_problem
 from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ContinuousChannels
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.spectrum import PolynomialBasis
 
 
@@ -21,12 +21,12 @@ def random_plant(rng):
     for index in np.ndindex(*size):
         frequency, damping = 10 ** rng.uniform(-0.5, 0.5), rng.uniform(0.1, 1.0)
         denominator[index] = [frequency**2, 2 * damping * frequency, 1.0]
-    return ContinuousChannels.monic(arrays(numerator), arrays(denominator.tolist()), np.eye(2))
+    return ContinuousModel.monic(arrays(numerator), arrays(denominator.tolist()), np.eye(2))
 
 
 def solved(model, band, order, criterion, *, hermitian=False):
     question = Question(
-        ChannelExperiment(model, 1, band),
+        Experiment(model, 1, band),
         PolynomialBasis(2, order, band, hermitian),
         "factor",
         [lambda experiment: Criterion(criterion, experiment.factor)],

@@ -80,7 +80,7 @@ def gram_program(problem, order, unit=1.0):
 @pytest.mark.parametrize("letter", ["D", "A", "E", "T"])
 def test_criteria_agree_with_a_plain_program(letter):
     """log_det, tr_inv, lambda_min and trace of cvxpy under two power limits."""
-    model = PolynomialModel(A=np.array([1, -0.8]), B=np.array([0, 1.0, 0.4]), variance=0.5)
+    model = PolynomialModel.single(A=np.array([1, -0.8]), B=np.array([0, 1.0, 0.4]), variance=0.5)
     experiment = Experiment(Loop(model), 100)
     limits = [PowerLimit("input", 1.0), PowerLimit("output", 2.5)]
     design = solve(experiment, "factor", criterion(letter), limits=limits)
@@ -101,7 +101,7 @@ def test_criteria_agree_with_a_plain_program(letter):
 
 def resonant():
     """A lightly damped OE system, where cheap inputs and quiet outputs are different things."""
-    model = PolynomialModel(B=np.array([0, 1.0, 0.3]), F=np.array([1, -1.4, 0.81]), variance=0.2)
+    model = PolynomialModel.single(B=np.array([0, 1.0, 0.3]), F=np.array([1, -1.4, 0.81]), variance=0.2)
     return Experiment(Loop(model), 300)
 
 
@@ -267,7 +267,7 @@ def test_contradictory_limits_are_proved(first_order):
 
 
 def test_too_few_lines_are_refused():
-    model = PolynomialModel(A=np.array([1, -0.5, 0.3]), B=np.array([0, 1.0, 0.5]))
+    model = PolynomialModel.single(A=np.array([1, -0.5, 0.3]), B=np.array([0, 1.0, 0.5]))
     experiment = Experiment(Loop(model), 100000)
     oe = Experiment(Loop(dataclasses.replace(model, A=np.ones(1), F=model.A)), 100)
     with pytest.raises(SpecError) as caught:
@@ -285,7 +285,7 @@ def test_too_few_lines_are_refused():
 
 def test_application_example_of_the_peer():
     """y = 10 u(t-1) - 9 u(t-2) + e: chi2(0.95, 2) * 100 / 2 * 2 = N c_0 for b2, by hand 1.1982929."""
-    experiment = Experiment(Loop(PolynomialModel(B=np.array([0, 10.0, -9.0]))), 500)
+    experiment = Experiment(Loop(PolynomialModel.single(B=np.array([0, 10.0, -9.0]))), 500)
     target = 5.991464547107979 * 100 / 2 * np.diag([0.0, 2.0])
     design = solve(experiment, requirements=[lambda e: InformationTarget(e.whiten_matrix(target))], order=19)
     check(design)
@@ -295,7 +295,7 @@ def test_application_example_of_the_peer():
 
 @pytest.mark.parametrize(("letter", "value"), [("A", -1.0412035), ("E", 1.0), ("D", 4.6912898)])
 def test_criteria_of_the_peer(letter, value):
-    experiment = Experiment(Loop(PolynomialModel(A=np.array([1, 0.95]), B=np.ones(1))), 1)
+    experiment = Experiment(Loop(PolynomialModel.single(A=np.array([1, 0.95]), B=np.ones(1))), 1)
     design = solve(experiment, "factor", criterion(letter), order=19, limits=[PowerLimit("input", 1.0)])
     check(design)
     ours = Criterion(letter, np.eye(2))
@@ -305,7 +305,7 @@ def test_criteria_of_the_peer(letter, value):
 
 
 def weighted_example():
-    model = PolynomialModel(
+    model = PolynomialModel.single(
         A=np.array([1, -1.99185, 2.20265, -1.84083, 0.89413]),
         B=np.array([0, 0, 0, 0.10276, 0.18123]),
         variance=0.05,

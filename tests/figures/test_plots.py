@@ -22,11 +22,11 @@ from inputdesign_cli.runs.results import (
     FitCurves,
     FitPanel,
     LossCurves,
-    MatrixSpectrumCurves,
     MomentsCurves,
     OptimalityCurves,
     ResidualCurves,
     SignalCurves,
+    SpectrumCurves,
 )
 
 W = np.geomspace(1e-3, np.pi, 200)
@@ -42,13 +42,13 @@ def bound(*panels):
 
 def one_input(values, *more, **settings):
     """Curves of the spectrum of one input from real values (n,)."""
-    return MatrixSpectrumCurves(W, values[:, None, None], *more, **settings)
+    return SpectrumCurves(W, values[:, None, None], *more, **settings)
 
 
 def lines(frequencies, powers, **settings):
     """Curves of sinusoids of one input."""
     power = np.array(powers)[:, None, None]
-    return MatrixSpectrumCurves(np.array(frequencies), power, lines=True, **settings)
+    return SpectrumCurves(np.array(frequencies), power, lines=True, **settings)
 
 
 def correlations(p, r):
@@ -74,16 +74,16 @@ CURVES = {
     "limited signal": SignalCurves(np.arange(50.0), {"u1": 3 + np.sin(np.arange(50.0))}, {"u1": (1.5, 4.5)}),
     "lines": lines([0.1553], [0.1925], white=1.7, band=(1e-3, np.pi)),
     "lines in a loop": lines([0.02, 0.1], [0.1, 0.2], symbol="r"),
-    "matrix": MatrixSpectrumCurves(W, PAIR, 1.7),
-    "matrix of lines": MatrixSpectrumCurves(W[::20], PAIR[::20], lines=True),
-    "matrix with zeros": MatrixSpectrumCurves(W, PAIR * np.maximum(np.cos(20 * W), 0.0)[:, None, None]),
+    "matrix": SpectrumCurves(W, PAIR, 1.7),
+    "matrix of lines": SpectrumCurves(W[::20], PAIR[::20], lines=True),
+    "matrix with zeros": SpectrumCurves(W, PAIR * np.maximum(np.cos(20 * W), 0.0)[:, None, None]),
     "directions": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([DENSITY, W], 1), 1.7),
     "directions of lines": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
     "loss": LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
     "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
-    "matrix on a logarithmic axis": MatrixSpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
-    "matrix with a peak": MatrixSpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
-    "one line of channels": MatrixSpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
+    "matrix on a logarithmic axis": SpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
+    "matrix with a peak": SpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
+    "one line of channels": SpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
     "bounds of entries": bound(
         BoundPanel(W, 0.008 * G, G, 0.01 * G, entry=(0, 1)), BoundPanel(W, 0.008 * G, G, entry=(1, 0))
     ),

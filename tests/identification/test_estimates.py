@@ -8,14 +8,14 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.predictor import prediction_errors
 from inputdesign_cli.identification.stability import is_stable, reflected
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.spectrum import FirBasis
 
 
 def theory(name, samples):
     """M of unit white input, from the frequency domain."""
-    experiment = ChannelExperiment(SYSTEMS[name], samples)
+    experiment = Experiment(SYSTEMS[name], samples)
     maps = FirBasis(0).integrals(experiment.information_density, experiment.singularities)
     return experiment.baseline_information + maps[0]
 

@@ -8,15 +8,15 @@ from channel_records import shifted, simulated
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify, identify_polynomials
 from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.spectrum import MatrixFirBasis
 
 
 def theory(model, samples):
     """M of unit white inputs, from the frequency domain."""
-    experiment = ChannelExperiment(model, samples)
+    experiment = Experiment(model, samples)
     basis = MatrixFirBasis(model.inputs, 0)
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     densities = np.array([basis.density(unit, np.zeros(1))[0].real.ravel() for unit in np.eye(len(maps))])
@@ -132,7 +132,7 @@ def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone(
     u, y = (x[0] for x in simulated(model, 600, np.random.default_rng(7)))
     both = identify_polynomials(model, u, y, noise=model.covariance)
     for i in range(2):
-        own = PolynomialChannels(
+        own = PolynomialModel(
             model.B[i : i + 1], model.A, model.F[i : i + 1], (model.C[i],), model.D, np.eye(1)
         )
         alone = identify(own, u, y[:, i : i + 1])
@@ -194,9 +194,7 @@ def test_residual_tests_are_as_often_significant_as_they_should():
 def test_a_model_that_is_too_small_fails_the_residual_tests():
     u, y = (x[0] for x in simulated(box_jenkins(), 2000, np.random.default_rng(13)))
     one = (np.ones(1),)
-    small = PolynomialChannels(
-        arrays([[[0, 1.0]] * 3] * 2), one, arrays([[[1.0]] * 3] * 2), one, one, np.eye(2)
-    )
+    small = PolynomialModel(arrays([[[0, 1.0]] * 3] * 2), one, arrays([[[1.0]] * 3] * 2), one, one, np.eye(2))
     found = identify(small, u, y)
     assert found.whiteness.probability < 1e-6
     assert found.independence.probability < 1e-6

@@ -17,16 +17,16 @@ from inputdesign_cli.identification.transfer_matrix import (
 )
 from inputdesign_cli.identification.transfer_problem import evaluate
 from inputdesign_cli.identification.transfer_record import TransferRecord
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
-from inputdesign_cli.plant import ContinuousChannels, Intersample, SampledChannels
+from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 
 STEP = 0.4
 SPECS = Path(__file__).parents[2] / "specs"
 
 
 def plant(numerator, denominator, *, common=False):
-    return ContinuousChannels.monic(
+    return ContinuousModel.monic(
         descending(numerator), descending(denominator), np.eye(len(numerator)), common=common
     )
 
@@ -42,7 +42,7 @@ PLANTS = {
 HOLDS = pytest.mark.parametrize("hold", [False, True], ids=["band-limited", "held"])
 
 
-def actual() -> ContinuousChannels:
+def actual() -> ContinuousModel:
     """The true plant of the spectral design paper, near its nominal one."""
     return plant(
         [[[3.2], [3.1]], [[5.2], [1.5]]], [[[1, 1.6, 1.5], [1, 1.9, 1]], [[1, 0.5, 0.95], [1, 0.9, 0.3]]]
@@ -66,7 +66,7 @@ def noisy(model, u, rng, *, hold, level, covariance=None, runs=None):
 
 
 def as_sampled(model, hold):
-    return SampledChannels(model, STEP) if hold else model
+    return SampledModel(model, STEP) if hold else model
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -110,7 +110,7 @@ def test_a_band_limited_input_is_its_fine_interpolation():
 def test_outputs_are_those_by_which_the_record_was_judged(name, hold):
     model = PLANTS[name]
     u = excitation(500, model.inputs, np.random.default_rng(2), share=0.3)
-    expected = FiniteRecord(ChannelExperiment(as_sampled(model, hold), 500), 500, STEP).signals("output", u)
+    expected = FiniteRecord(Experiment(as_sampled(model, hold), 500), 500, STEP).signals("output", u)
     ours = model.driven(np.stack([u, 2 * u]), Intersample(STEP, hold))
     tolerance = 1e-10 if hold else 1e-5
     np.testing.assert_allclose(ours[0], expected, atol=tolerance * np.std(expected))
@@ -205,7 +205,7 @@ def test_the_covariance_is_that_of_the_records_information(hold):
     y, _ = noisy(actual(), u, rng, hold=hold, level=0.2, covariance=[[1, 0.7], [0.7, 1]])
     found = identify_transfer_matrix(two_by_two(), u, y, Intersample(STEP, hold))
     model = as_sampled(two_by_two().at(found.theta, found.noise), hold)
-    expected = FiniteRecord(ChannelExperiment(model, 500), 500, STEP).information(u)
+    expected = FiniteRecord(Experiment(model, 500), 500, STEP).information(u)
     scale = np.sqrt(np.diag(expected))
     difference = (found.information - expected) / np.outer(scale, scale)
     assert np.abs(difference).max() < (1e-9 if hold else 1e-5)
@@ -310,7 +310,7 @@ def efficiency(u, runs, *, hold, level, covariance=None, seed=16):
     y, truth = noisy(actual(), u, rng, hold=hold, level=level, covariance=covariance, runs=runs)
     found = fit_transfer_matrices(two_by_two(), u, y, Intersample(STEP, hold), start=two_by_two().theta)
     assert np.all(found.converged)
-    experiment = ChannelExperiment(as_sampled(truth, hold), len(u))
+    experiment = Experiment(as_sampled(truth, hold), len(u))
     information = FiniteRecord(experiment, len(u), STEP).information(u)
     off = found.theta - truth.theta
     bound = np.sqrt(np.diag(np.linalg.inv(information)))

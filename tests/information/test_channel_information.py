@@ -5,8 +5,8 @@ import pytest
 from channel_plants import arrays, arx, box_jenkins, paper_experiment, two_by_two
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.information import ChannelExperiment, Experiment
-from inputdesign_cli.plant import ContinuousChannels, Loop, PolynomialChannels, PolynomialModel
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import ContinuousModel, Loop, PolynomialModel
 from inputdesign_cli.spectrum import FirBasis, FlatBasis, MatrixFirBasis
 
 W = np.array([0.1, 0.9, 2.2])
@@ -14,9 +14,9 @@ W = np.array([0.1, 0.9, 2.2])
 
 def siso_pair():
     A, B, C, D, F = (np.array(p) for p in ([1, -0.5], [0, 2.0, 0.3], [1, 0.2], [1, 0.6], [1, -0.1, 0.4]))
-    siso = PolynomialModel(A=A, B=B, C=C, D=D, F=F, variance=0.7)
-    one = PolynomialChannels(((B,),), (A,), ((F,),), (C,), (D,), 0.7 * np.eye(1))
-    return Experiment(Loop(siso), 50), ChannelExperiment(one, 50)
+    siso = PolynomialModel.single(A=A, B=B, C=C, D=D, F=F, variance=0.7)
+    one = PolynomialModel(((B,),), (A,), ((F,),), (C,), (D,), 0.7 * np.eye(1))
+    return Experiment(Loop(siso), 50), Experiment(one, 50)
 
 
 def test_one_channel_is_the_siso_experiment():
@@ -29,9 +29,7 @@ def test_one_channel_is_the_siso_experiment():
     np.testing.assert_allclose(one.value_density(Y, W), siso.value_density(Y, W), rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "experiment", [paper_experiment(), ChannelExperiment(box_jenkins(), 10).whitened(1.0)]
-)
+@pytest.mark.parametrize("experiment", [paper_experiment(), Experiment(box_jenkins(), 10).whitened(1.0)])
 def test_densities_are_the_definition(experiment):
     """(3) of the spectral design paper, for a random Hermitian spectrum at each frequency."""
     rng = np.random.default_rng(0)
@@ -59,7 +57,7 @@ def test_densities_are_the_definition(experiment):
 
 
 def test_channel_powers_add_up():
-    experiment = ChannelExperiment(box_jenkins(), 10)
+    experiment = Experiment(box_jenkins(), 10)
     for kind, number in (("input", 3), ("output", 2)):
         parts = sum(experiment.power_density(kind, W, channel=i) for i in range(number))
         np.testing.assert_allclose(parts, experiment.power_density(kind, W), atol=1e-14)
@@ -67,7 +65,7 @@ def test_channel_powers_add_up():
 
 @pytest.mark.parametrize("power", [1.0, 30.0])
 def test_whitening_makes_even_excitation_the_identity(power):
-    for experiment in (ChannelExperiment(two_by_two(), 3, (0.2, 1.5)), ChannelExperiment(arx(), 40)):
+    for experiment in (Experiment(two_by_two(), 3, (0.2, 1.5)), Experiment(arx(), 40)):
         white = experiment.whitened(power)
         basis = FlatBasis(2, white.band)
         information = (
@@ -80,7 +78,7 @@ def test_whitening_makes_even_excitation_the_identity(power):
 def test_noise_alone_informs_about_arx_parameters_as_a_lyapunov_equation_says():
     """y_i = -a y_i(t-1) + e: E y^2 = s^2 / (1 - a^2); errors are correlated across outputs."""
     model = arx()
-    M0 = ChannelExperiment(model, 1).baseline_information
+    M0 = Experiment(model, 1).baseline_information
     covariance, precision = model.covariance, np.linalg.inv(model.covariance)
     for i, a in enumerate((-0.7, 0.4)):
         for j, b in enumerate((-0.7, 0.4)):
@@ -98,11 +96,11 @@ def test_matrix_fir_of_one_channel_is_fir():
 
 def test_parameters_that_the_band_cannot_tell_apart_are_named():
     """(s + 1) / (s + 1)^2: the common factor leaves a direction without information."""
-    model = ContinuousChannels.monic(
+    model = ContinuousModel.monic(
         arrays([[[1.0, 1.0]], [[1.0]]]), arrays([[[1.0, 2.0, 1.0]], [[2.0, 1.0]]]), np.eye(2)
     )
     with pytest.raises(
         SpecError, match=r"within the band can tell.* b0\[1,1\], a0\[1,1\], a1\[1,1\]$"
     ) as caught:
-        ChannelExperiment(model, 1, (0.0, 1.0)).whitened(1.0)
+        Experiment(model, 1, (0.0, 1.0)).whitened(1.0)
     assert caught.value.diagnostics[0].code == "not-identifiable"

@@ -9,14 +9,13 @@ from channel_plants import arrays
 from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.information import ChannelExperiment, Experiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import (
     Loop,
-    MatrixController,
-    PolynomialChannels,
     PolynomialLoop,
     PolynomialModel,
     Rational,
+    TransferMatrix,
 )
 from inputdesign_cli.spectrum import FirBasis, MatrixFirBasis
 
@@ -27,7 +26,7 @@ STEP = 1e-6
 def box_jenkins(theta=None):
     """Every polynomial, the first A unstable, three inputs and two outputs, one entry zero."""
     covariance = np.array([[1.0, 0.3], [0.3, 0.5]])
-    plant = PolynomialChannels(
+    plant = PolynomialModel(
         arrays([[[0, 1.0, 0.4], [0, -0.3], [0]], [[0, 0.2], [0, 0.8, -0.1], [0, 0, 0.5]]]),
         (np.array([1.0, -1.1]), np.array([1.0, 0.3])),
         arrays([[[1, -0.2], [1], [1]], [[1], [1, 0.4], [1, -0.5]]]),
@@ -60,7 +59,7 @@ DENOMINATOR = [[[1, -1], [1, -1]], [[1], [1, -0.3]], [[1, 0.2], [1]]]
 
 
 def controller():
-    return MatrixController.build(NUMERATOR, DENOMINATOR)
+    return TransferMatrix.build(NUMERATOR, DENOMINATOR)
 
 
 def simulated(plant, r, e):
@@ -124,7 +123,7 @@ def experiment():
     plant = box_jenkins()
     loop = PolynomialLoop(plant, controller())
     loop.check_stability()
-    return ChannelExperiment(plant, 7, loop=loop)
+    return Experiment(plant, 7, loop=loop)
 
 
 def test_information_is_that_of_simulated_impulses(experiment):
@@ -157,15 +156,15 @@ def test_one_channel_is_the_siso_loop():
     A, B, F = [1, -1.2, 0.5], [0, 0.3, 0.2], [1]
     C, D = [1, -0.4], [1, 0.3]
     numerator, denominator = [1.1, -0.7], [1, -1]
-    siso = PolynomialModel(*(np.array(p, dtype=float) for p in (B, A, C, D, F)), 0.7)
+    siso = PolynomialModel.single(*(np.array(p, dtype=float) for p in (B, A, C, D, F)), 0.7)
     one = Experiment(Loop(siso, Rational.build(numerator, denominator)), 50)
     one.loop.check_stability()
-    plant = PolynomialChannels(
+    plant = PolynomialModel(
         arrays([[B]]), (np.array(A),), arrays([[F]]), (np.array(C),), (np.array(D),), np.array([[0.7]])
     )
-    loop = PolynomialLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
+    loop = PolynomialLoop(plant, TransferMatrix.build([[numerator]], [[denominator]]))
     loop.check_stability()
-    several = ChannelExperiment(plant, 50, loop=loop)
+    several = Experiment(plant, 50, loop=loop)
     assert several.model.names == one.model.names
     np.testing.assert_allclose(several.noise_information, one.noise_information, rtol=1e-9)
     basis = FirBasis(6)
@@ -199,12 +198,12 @@ def test_unstable_and_algebraic_loops_are_refused():
     plant = box_jenkins()
     with pytest.raises(SpecError) as caught:
         PolynomialLoop(
-            plant, MatrixController.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)
+            plant, TransferMatrix.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)
         ).check_stability()
     assert caught.value.diagnostics[0].code == "unstable-loop"
-    direct = PolynomialChannels(
+    direct = PolynomialModel(
         arrays([[[1.0]]]), (np.ones(1),), arrays([[[1.0]]]), (np.ones(1),), (np.ones(1),), np.eye(1)
     )
     with pytest.raises(SpecError) as caught:
-        PolynomialLoop(direct, MatrixController.build([[[-1.0, 0.5]]], [[[1.0]]])).check_stability()
+        PolynomialLoop(direct, TransferMatrix.build([[[-1.0, 0.5]]], [[[1.0]]])).check_stability()
     assert caught.value.diagnostics[0].code == "algebraic-loop"

@@ -9,9 +9,9 @@ from channel_plants import arrays, arx, paper_experiment
 from inputdesign_cli.signal.single import as_channels
 from plants import random_case
 
-from inputdesign_cli.information import ChannelExperiment, Experiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.information.record_transforms import RecordTransforms
-from inputdesign_cli.plant import MatrixController, PolynomialChannels, PolynomialLoop
+from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix
 from inputdesign_cli.signal import grid_lines, multisine_record
 
 
@@ -67,7 +67,7 @@ def test_record_information_tends_to_that_of_the_spectrum(first_order):
 def test_information_of_a_record_is_that_of_simulated_regressors():
     """For ARX the gradient of the prediction is the regressor itself, filtered by nothing."""
     model = arx()
-    experiment = ChannelExperiment(model, 100).whitened(1.0)
+    experiment = Experiment(model, 100).whitened(1.0)
     rng = np.random.default_rng(3)
     u = rng.normal(size=(300, 2))
     y = np.stack(
@@ -86,7 +86,7 @@ def test_information_of_a_record_is_that_of_simulated_regressors():
             psi[:, index, i] = source
     precision = np.linalg.inv(model.covariance)
     expected = np.einsum("tki,ij,tlj->kl", psi, precision, psi)
-    noise = ChannelExperiment(model, 300).baseline_information
+    noise = Experiment(model, 300).baseline_information
     ours = experiment.to_raw(FiniteRecord(experiment, 300).information(u))
     np.testing.assert_allclose(ours, expected + noise, atol=1e-8 * np.abs(expected).max())
 
@@ -104,7 +104,7 @@ def test_a_long_record_in_continuous_time_has_the_information_of_its_spectrum():
     np.testing.assert_allclose(ours, expected, atol=0.02 * np.abs(expected).max())
 
 
-SLOW = PolynomialChannels(
+SLOW = PolynomialModel(
     arrays([[[0, 1.0, 0.4], [0, 0.3]], [[0, 0.5], [0, 1.2]]]),
     (np.array([1.0, -0.99999]), np.array([1.0, -0.5])),
     arrays([[[1.0], [1.0]], [[1.0], [1.0, -1.9, 0.9995]]]),
@@ -117,7 +117,7 @@ SLOW = PolynomialChannels(
 def test_a_plant_that_remembers_longer_than_the_record_is_filtered_exactly():
     """An almost integrating and a lightly damped entry, against the difference equations."""
     u = np.random.default_rng(0).standard_normal((300, 2))
-    plant = FiniteRecord(ChannelExperiment(SLOW, 300), 300, 1.0)
+    plant = FiniteRecord(Experiment(SLOW, 300), 300, 1.0)
     wanted = np.zeros((300, 2))
     for i in range(2):
         right = sum(scipy.signal.lfilter(SLOW.B[i][j], SLOW.F[i][j], u[:, j]) for j in range(2))
@@ -131,11 +131,11 @@ def test_a_slow_loop_is_filtered_exactly_and_at_once():
     """Integrators of gain 1e-5 settle in a million samples; the record has 200."""
     model = arx()
     gains = 1e-5 * np.linalg.inv(model.plant_at(np.zeros(1))[0].real)
-    controller = MatrixController.build([[[g] for g in row] for row in gains], [[[1, -1]] * 2] * 2)
+    controller = TransferMatrix.build([[[g] for g in row] for row in gains], [[[1, -1]] * 2] * 2)
     loop = PolynomialLoop(model, controller)
     loop.check_stability()
     r = np.random.default_rng(1).standard_normal((200, 2))
-    plant = FiniteRecord(ChannelExperiment(model, 200, loop=loop), 200, 1.0)
+    plant = FiniteRecord(Experiment(model, 200, loop=loop), 200, 1.0)
     y, u = loop.signals(r, np.zeros((200, 2)))
     np.testing.assert_allclose(plant.signals("output", r), y, atol=1e-10)
     np.testing.assert_allclose(plant.signals("input", r), u, atol=1e-10)
@@ -143,7 +143,7 @@ def test_a_slow_loop_is_filtered_exactly_and_at_once():
 
 
 def test_the_adjoint_of_an_output():
-    plant = FiniteRecord(ChannelExperiment(arx(), 240).whitened(1.0), 240, 1.0)
+    plant = FiniteRecord(Experiment(arx(), 240).whitened(1.0), 240, 1.0)
     u, weights = (
         np.random.default_rng(0).normal(size=(240, 2)),
         np.random.default_rng(1).normal(size=(240, 2)),

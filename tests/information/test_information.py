@@ -60,7 +60,7 @@ def test_pole_on_the_circle_is_refused():
 
 def test_noise_only_information_of_an_autoregression():
     """AR(1) without input: M = N / (1 - a^2), whatever the variance."""
-    model = PolynomialModel(A=np.array([1.0, -0.8]), B=np.array([0.0, 1.0]), variance=3.0)
+    model = PolynomialModel.single(A=np.array([1.0, -0.8]), B=np.array([0.0, 1.0]), variance=3.0)
     M0 = Experiment(Loop(model), 200).baseline_information
     np.testing.assert_allclose(M0, [[200 / (1 - 0.64), 0], [0, 0]], rtol=1e-11, atol=1e-8)
 
@@ -68,7 +68,7 @@ def test_noise_only_information_of_an_autoregression():
 def test_information_of_an_arx_model_with_white_input():
     """y + a y(t-1) = b u(t-1) + e: E y^2 = (b^2 P + sigma^2) / (1 - a^2), E y u(t-.) at lag one of phi: 0."""
     a, b, variance, power, N = -0.7, 2.0, 0.5, 1.3, 100
-    model = PolynomialModel(A=np.array([1.0, a]), B=np.array([0.0, b]), variance=variance)
+    model = PolynomialModel.single(A=np.array([1.0, a]), B=np.array([0.0, b]), variance=variance)
     experiment = Experiment(Loop(model), N)
     basis = FirBasis(0)
     M = (
@@ -108,7 +108,7 @@ def test_whitened_coordinates(seed):
 
 
 def test_prior_information_adds():
-    model = PolynomialModel(B=np.array([0.0, 1.0, 0.5]))
+    model = PolynomialModel.single(B=np.array([0.0, 1.0, 0.5]))
     prior = np.array([[4.0, 1.0], [1.0, 3.0]])
     with_prior = Experiment(Loop(model), 10, prior)
     np.testing.assert_allclose(with_prior.baseline_information, prior)
@@ -118,7 +118,7 @@ def test_prior_information_adds():
 
 def test_parameters_that_cannot_be_told_apart_are_named():
     """A common factor of B and F."""
-    model = PolynomialModel(B=np.convolve([0.0, 1.0], [1, -0.5]), F=np.convolve([1, -0.5], [1, 0.3]))
+    model = PolynomialModel.single(B=np.convolve([0.0, 1.0], [1, -0.5]), F=np.convolve([1, -0.5], [1, 0.3]))
     with pytest.raises(SpecError) as error:
         Experiment(Loop(model), 100).whitened(1.0)
     diagnostic = error.value.diagnostics[0]

@@ -7,14 +7,14 @@ from channel_plants import arrays, descending
 from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import (
-    ContinuousChannels,
-    MatrixController,
-    PolynomialChannels,
+    ContinuousModel,
     PolynomialLoop,
-    SampledChannels,
+    PolynomialModel,
     SampledLoop,
+    SampledModel,
+    TransferMatrix,
 )
 from inputdesign_cli.spectrum import MatrixFirBasis
 
@@ -32,8 +32,8 @@ BELOW = [[[1, -1], [1, -1]], [[1], [1, -1]]]
 
 def held_first_order():
     rows = [[[b] for b in row] for row in GAIN], [[[1.0, a] for a in row] for row in DECAY]
-    plant = ContinuousChannels.monic(descending(rows[0]), descending(rows[1]), COVARIANCE)
-    return SampledChannels(plant, T)
+    plant = ContinuousModel.monic(descending(rows[0]), descending(rows[1]), COVARIANCE)
+    return SampledModel(plant, T)
 
 
 def polynomial_first_order():
@@ -41,7 +41,7 @@ def polynomial_first_order():
     B = [[[0, b] for b in row] for row in GAIN / DECAY * (1 - forgotten)]
     F = [[[1, -f] for f in row] for row in forgotten]
     one = (np.ones(1),)
-    return PolynomialChannels(arrays(B), one, arrays(F), one, one, COVARIANCE)
+    return PolynomialModel(arrays(B), one, arrays(F), one, one, COVARIANCE)
 
 
 def derivative():
@@ -58,11 +58,11 @@ def derivative():
 @pytest.fixture(scope="module")
 def pair():
     """The same loop, by states and by polynomials."""
-    C = MatrixController.build(PI, BELOW)
+    C = TransferMatrix.build(PI, BELOW)
     loops = SampledLoop(held_first_order(), C), PolynomialLoop(polynomial_first_order(), C)
     for loop in loops:
         loop.check_stability()
-    return [ChannelExperiment(loop.model, 9, loop=loop) for loop in loops]
+    return [Experiment(loop.model, 9, loop=loop) for loop in loops]
 
 
 def test_information_is_that_of_polynomials_by_the_chain_rule(pair):
@@ -110,8 +110,8 @@ UNDER = [[[1, -1], [1, -1]], [[1], [1, -0.3]], [[1, 0.2], [1]]]
 
 
 def held_second_order(theta=None):
-    plant = ContinuousChannels.monic(descending(NUMERATOR), descending(DENOMINATOR), COVARIANCE)
-    return SampledChannels(plant if theta is None else plant.at(theta), T)
+    plant = ContinuousModel.monic(descending(NUMERATOR), descending(DENOMINATOR), COVARIANCE)
+    return SampledModel(plant if theta is None else plant.at(theta), T)
 
 
 def sampled(model):
@@ -181,9 +181,9 @@ def impulse_gradients(model, source):
 @pytest.fixture(scope="module")
 def experiment():
     model = held_second_order()
-    loop = SampledLoop(model, MatrixController.build(CONTROLLER, UNDER))
+    loop = SampledLoop(model, TransferMatrix.build(CONTROLLER, UNDER))
     loop.check_stability()
-    return ChannelExperiment(model, 7, loop=loop)
+    return Experiment(model, 7, loop=loop)
 
 
 def test_information_is_that_of_simulated_impulses(experiment):
@@ -207,8 +207,8 @@ def test_responses_are_those_of_matrix_algebra(experiment):
 
 
 def one(numerator, denominator, C, below=(1.0,), *, step=T):
-    plant = ContinuousChannels.monic(descending([[numerator]]), descending([[denominator]]), np.eye(1))
-    return SampledLoop(SampledChannels(plant, step), MatrixController.build([[C]], [[list(below)]]))
+    plant = ContinuousModel.monic(descending([[numerator]]), descending([[denominator]]), np.eye(1))
+    return SampledLoop(SampledModel(plant, step), TransferMatrix.build([[C]], [[list(below)]]))
 
 
 def test_closed_poles_are_the_roots_of_the_characteristic_polynomial():

@@ -1,15 +1,9 @@
 """The distillation column and random data that the tests of this folder share."""
 
 import numpy as np
-from inputdesign_cli.design.loop_error.transfer import sampled
 
-from inputdesign_cli.design.loop_error import (
-    ClosedLoopProblem,
-    MatrixPlant,
-    MatrixTransfer,
-    ModelReference,
-    PowerLimit,
-)
+from inputdesign_cli.design.loop_error import LoopErrorProblem, MatrixPlant, ModelReference, PowerLimit
+from inputdesign_cli.plant import TransferMatrix, zero_order_hold
 
 POLE = np.exp(-2 / 75)
 GAINS = np.array([[0.878, -0.864], [1.082, -1.096]])
@@ -19,15 +13,22 @@ TOTAL = (PowerLimit("input", 2.0),)
 def column(*, limits=TOTAL, white_noise=False, variance=1e-10):
     """Errata: exact G_d of the gains; H = 1e-5/(z-a), or without its pole."""
     B = (1 - POLE) * GAINS
-    plant = MatrixPlant.build(
+    plant = matrix_plant(
         A=[[1.0, -POLE]],
         B=[[[0.0, b] for b in row] for row in B],
         C=[[1.0, -POLE]] * 2 if white_noise else [[1.0]],
         covariance=variance * np.eye(2),
     )
-    above, below = sampled([1.0], [75.0, 1.0], 2.0)
-    law = ModelReference(MatrixTransfer.diagonal(above, below, 2))
-    return ClosedLoopProblem(plant, law, limits, np.ones(2))
+    law = ModelReference(TransferMatrix.diagonal(zero_order_hold([1.0], [75.0, 1.0], 2.0), 2))
+    return LoopErrorProblem(plant, law, limits, np.ones(2))
+
+
+def matrix_plant(*, B, covariance, A=((1.0,),), F=None, C=((1.0,),), D=((1.0,),)):
+    """From plain numbers; A, C and D hold one polynomial for all outputs or one an output."""
+    A, C, D = (tuple(np.asarray(p, dtype=float) for p in rows) for rows in (A, C, D))
+    F = F or [[[1.0] for _ in row] for row in B]
+    B, F = (tuple(tuple(np.asarray(p, dtype=float) for p in row) for row in rows) for rows in (B, F))
+    return MatrixPlant(B=B, A=A, F=F, C=C, D=D, covariance=np.asarray(covariance, dtype=float))
 
 
 def random_complex(rng, *shape):
@@ -37,6 +38,15 @@ def random_complex(rng, *shape):
 def random_hermitian(rng, K, n):
     X = random_complex(rng, K, n, n)
     return X @ np.conj(np.swapaxes(X, 1, 2)) + 0.1 * np.eye(n)
+
+
+def jacobian(law, G, w):
+    """d vec C / d vec G of C = G^-1 X."""
+    return -kronecker(np.swapaxes(law.controller(G, w), 1, 2), np.linalg.inv(G))
+
+
+def kronecker(left, right):
+    return np.array([np.kron(a, b) for a, b in zip(left, right, strict=True)])
 
 
 def adjoint(X):
@@ -55,4 +65,4 @@ def random_plant(rng, n, *, delay=1, radius=0.9):
         B.append(row)
     C = [np.poly(rng.uniform(-0.7, 0.7, 1)).tolist() for _ in range(n)]
     X = rng.standard_normal((n, n))
-    return MatrixPlant.build(A=A, B=B, C=C, covariance=X @ X.T + np.eye(n))
+    return matrix_plant(A=A, B=B, C=C, covariance=X @ X.T + np.eye(n))

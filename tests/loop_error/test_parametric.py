@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.design.loop_error import (
-    ClosedLoopProblem,
+    LoopErrorProblem,
     MatrixPlant,
-    MatrixTransfer,
     MinimumVariance,
     ModelReference,
     PowerLimit,
 )
 from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
-from loop_error.column import adjoint, column, random_hermitian, random_plant
+from inputdesign_cli.plant import Rational, TransferMatrix
+from loop_error.column import adjoint, column, matrix_plant, random_hermitian, random_plant
 
 W = np.array([0.05, 0.4, 1.3, 2.8])
 
 
 def full_plant():
     """Every polynomial has parameters; two outputs, two inputs."""
-    return MatrixPlant.build(
+    return matrix_plant(
         A=[[1, -0.5], [1, 0.3, 0.1]],
         B=[[[0, 1.0, 0.2], [0, 0.1]], [[0, 0, 0.3], [0, 1.5]]],
         F=[[[1, -0.2], [1]], [[1, 0.1, 0.2], [1, 0.4]]],
@@ -30,26 +30,19 @@ def full_plant():
     )
 
 
-def moved(plant, name, step):
-    """The plant with one parameter changed, found by its name."""
-    letter, rest = name[0].upper(), name[1:]
-    lag, _, place = rest.partition("[")
-    index = [int(c) - 1 for c in place.rstrip("]").split(",")] if place else [0]
-    parts = {
-        key: [list(p) if key in "ACD" else [list(q) for q in p] for p in getattr(plant, key)]
-        for key in "ABCDF"
-    }
-    target = parts[letter][index[0]] if len(index) == 1 else parts[letter][index[0]][index[1]]
-    target[int(lag)] += step
-    return MatrixPlant.build(**parts, covariance=plant.covariance)
+def moved(plant, index, step):
+    """The plant with one parameter changed."""
+    theta = plant.theta.copy()
+    theta[index] += step
+    return MatrixPlant.of(plant.at(theta))
 
 
 @pytest.mark.parametrize("plant", [full_plant(), column().plant], ids=["all polynomials", "column"])
 def test_gradients_are_those_of_finite_differences(plant):
     dG, dH = plant.plant_gradient(W), plant.noise_at(W)[:, None] @ plant.noise_gradient(W)
     step = 1e-6
-    for k, name in enumerate(plant.names):
-        up, down = moved(plant, name, step), moved(plant, name, -step)
+    for k in range(plant.theta.size):
+        up, down = moved(plant, k, step), moved(plant, k, -step)
         np.testing.assert_allclose(
             dG[:, k], (up.plant_at(W) - down.plant_at(W)) / (2 * step), rtol=1e-7, atol=1e-8
         )
@@ -66,10 +59,10 @@ def test_parameters_are_named_by_output_and_input():
 def test_the_information_of_an_arx_model_is_that_of_its_regressors():
     """M = sum of E phi phi^T / lambda: covariances of y and u from impulse responses, not from integrals."""
     a, b, variance, power = 0.8, 0.5, 0.3, 2.0
-    plant = MatrixPlant.build(A=[[1, -a]], B=[[[0, b]]], covariance=[[variance]])
-    problem = ClosedLoopProblem(
+    plant = matrix_plant(A=[[1, -a]], B=[[[0, b]]], covariance=[[variance]])
+    problem = LoopErrorProblem(
         plant,
-        ModelReference(MatrixTransfer.diagonal([0, 0.5], [1, -0.5], 1)),
+        ModelReference(TransferMatrix.diagonal(Rational.build([0, 0.5], [1, -0.5]), 1)),
         (PowerLimit("input", 1.0),),
         np.ones(1),
     )
@@ -83,31 +76,30 @@ def test_the_information_of_an_arx_model_is_that_of_its_regressors():
 def test_w_is_the_second_order_growth_of_the_error_of_the_loop():
     """theta^T W theta against the H2 norm of the loop with a slightly wrong model."""
     plant = random_plant(np.random.default_rng(1), 2)
-    law = ModelReference(MatrixTransfer.diagonal([0, 0.4], [1, -0.6], 2))
-    problem = ClosedLoopProblem(plant, law, (PowerLimit("input", 1.0),), np.array([1.0, 2.0]))
+    law = ModelReference(TransferMatrix.diagonal(Rational.build([0, 0.4], [1, -0.6]), 2))
+    problem = LoopErrorProblem(plant, law, (PowerLimit("input", 1.0),), np.array([1.0, 2.0]))
     Wmatrix = problem.parametric().W
     rule = problem.rule(1)
     w = rule.nodes
     G, entering = plant.plant_at(w), problem.entering(w)
     T = law.complementary(w)
-    for name in plant.names[:6]:
+    for index in range(6):
         step = 1e-5
-        C = law.controller(moved(plant, name, step).plant_at(w), w)
+        C = law.controller(moved(plant, index, step).plant_at(w), w)
         error = np.linalg.solve(np.eye(2) + G @ C, G @ C) - T
         square = np.einsum("kab,kbc,kac,k->", error, entering, np.conj(error), rule.weights).real
-        index = plant.names.index(name)
         assert square / step**2 == pytest.approx(Wmatrix[index, index], rel=2e-3, abs=1e-9)
 
 
 def test_w_of_minimum_variance_includes_the_noise_model():
     plant = random_plant(np.random.default_rng(4), 2)
-    problem = ClosedLoopProblem(plant, MinimumVariance(plant), (PowerLimit("input", 1.0),), np.ones(2))
+    problem = LoopErrorProblem(plant, MinimumVariance(plant), (PowerLimit("input", 1.0),), np.ones(2))
     Wmatrix = problem.parametric().W
     rule = problem.rule(1)
     w, step = rule.nodes, 1e-5
     G, entering = plant.plant_at(w), problem.entering(w)
-    for index, name in enumerate(plant.names):
-        other = moved(plant, name, step)
+    for index in range(plant.theta.size):
+        other = moved(plant, index, step)
         C = MinimumVariance(other).controller(other.plant_at(w), w)
         S = np.linalg.inv(np.eye(2) + G @ C)
         error = sensitivity(S) - MinimumVariance(plant).complementary(w)

@@ -1,18 +1,18 @@
-"""Records of matrix spectra: masses, multisines, causal factors and low-order filters."""
+"""Records of matrix spectra: lines, multisines, causal factors and low-order filters."""
 
 import numpy as np
 import pytest
-from inputdesign_cli.signal.tabulated_multisine import (
-    lines_of,
-    masses_of_density,
-    masses_on_record,
-    matrix_multisine,
-    periodic_noise,
-    periodogram_masses,
-    roots_of,
-)
 
+from inputdesign_cli.signal.lines import Lines, grid_lines
 from inputdesign_cli.signal.matrix_factor import matrix_factor
+from inputdesign_cli.signal.periodic import (
+    dense_roots,
+    even_multisine,
+    harmonics,
+    noise_drive,
+    periodogram,
+    shaped_noise,
+)
 from inputdesign_cli.signal.rational import rational_filter
 from loop_error.column import adjoint, column, random_hermitian
 
@@ -26,52 +26,56 @@ def moving_average(w):
 
 
 def covariance(u):
-    return u @ u.T / u.shape[1]
+    return u.T @ u / len(u)
 
 
 @pytest.mark.parametrize("samples", [64, 65])
-def test_masses_add_up_to_the_covariance(samples):
-    masses = masses_of_density(moving_average(lines_of(samples)), samples)
+def test_powers_add_up_to_the_covariance(samples):
+    lines = grid_lines(moving_average(harmonics(samples)), samples, 1.0)
     expected = sum(tap @ tap.T for tap in TAPS)
-    np.testing.assert_allclose(masses.sum(axis=0).real, expected, rtol=1e-12)
+    np.testing.assert_allclose(lines.powers.sum(axis=0).real, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("samples", "periods"), [(128, 2), (126, 2), (128, 1), (96, 3)])
-def test_a_multisine_has_its_masses(samples, periods):
+def test_a_multisine_has_its_spectrum(samples, periods):
     rng = np.random.default_rng(0)
     n = max(periods, 2)
     length = samples // periods
-    masses = masses_of_density(random_hermitian(rng, length // 2 + 1, n), length)
-    u = matrix_multisine(masses, samples, rng, periods=periods)
-    assert u.shape == (n, samples)
-    blocks = [periodogram_masses(block) for block in np.split(u, periods, axis=1)]
+    lines = grid_lines(random_hermitian(rng, length // 2 + 1, n), length, 1.0)
+    powers = lines.dense(length)
+    # At 0 and pi a signal is real.
+    powers[[0] if length % 2 else [0, -1]] = powers[[0] if length % 2 else [0, -1]].real
+    u = even_multisine(lines, samples, rng, periods=periods)
+    assert u.shape == (samples, n)
+    blocks = [periodogram(block).powers for block in np.split(u, periods)]
     if periods == n:
-        np.testing.assert_allclose(sum(blocks) / periods, masses, atol=1e-12)
-        np.testing.assert_allclose(covariance(u), masses.sum(axis=0).real, atol=1e-12)
+        np.testing.assert_allclose(sum(blocks) / periods, powers, atol=1e-12)
+        np.testing.assert_allclose(covariance(u), powers.sum(axis=0).real, atol=1e-12)
     for block in blocks:  # one period: every line has rank one
         values = np.linalg.eigvalsh(block)
         assert np.all(values[:, :-1] < 1e-12 * values[:, -1:].max())
 
 
-def test_masses_of_a_record_give_its_covariance():
-    u = np.random.default_rng(1).standard_normal((3, 51))
-    np.testing.assert_allclose(periodogram_masses(u).sum(axis=0).real, covariance(u), rtol=1e-12)
+def test_the_periodogram_of_a_record_gives_its_covariance():
+    u = np.random.default_rng(1).standard_normal((51, 3))
+    np.testing.assert_allclose(periodogram(u).powers.sum(axis=0).real, covariance(u), rtol=1e-12)
 
 
 def test_periodic_noise_has_the_spectrum_on_average():
     rng = np.random.default_rng(2)
-    masses = masses_of_density(moving_average(lines_of(32)), 32)
-    u = periodic_noise(roots_of(masses), 32, 20_000, rng)
-    mean = np.mean([periodogram_masses(u[:, r]) for r in range(0, 20_000, 4)], axis=0)
-    np.testing.assert_allclose(mean, masses, atol=6 * np.abs(masses).max() / np.sqrt(5000))
+    lines = grid_lines(moving_average(harmonics(32)), 32, 1.0)
+    u = shaped_noise(dense_roots(lines, 32), noise_drive(2, 32, 5000, rng), 32)
+    assert u.shape == (5000, 32, 2)
+    mean = np.mean([periodogram(record).powers for record in u], axis=0)
+    np.testing.assert_allclose(mean, lines.powers, atol=6 * np.abs(lines.powers).max() / np.sqrt(5000))
 
 
 def test_lines_move_to_the_nearest_of_the_record_and_keep_their_power():
     frequencies = np.array([0.0, 0.101, 0.103, np.pi])
-    masses = random_hermitian(np.random.default_rng(3), 4, 2)
-    moved = masses_on_record(frequencies, masses, 1000)
-    assert np.count_nonzero(np.abs(moved).sum(axis=(1, 2))) == 3
-    np.testing.assert_allclose(moved.sum(axis=0).real, masses.sum(axis=0).real, rtol=1e-12)
+    powers = random_hermitian(np.random.default_rng(3), 4, 2)
+    dense = Lines(frequencies, powers).dense(1000)
+    assert np.count_nonzero(np.abs(dense).sum(axis=(1, 2))) == 3
+    np.testing.assert_allclose(dense.sum(axis=0).real, powers.sum(axis=0).real, rtol=1e-12)
 
 
 def test_the_factor_of_a_moving_average_is_its_taps():
@@ -120,4 +124,4 @@ def test_low_order_filters_of_the_column_are_stable_and_nearly_as_good(order):
     M = criterion.information(rule.nodes, filter_.spectrum(rule.nodes), rule.weights)
     assert criterion.value(M) < {2: 6.3e-6, 4: 5.3e-6}[order]
     u = filter_.filtered(100_000, np.random.default_rng(1))
-    np.testing.assert_allclose((u**2).mean(axis=1), filter_.power(), rtol=0.1)
+    np.testing.assert_allclose((u**2).mean(axis=0), filter_.power(), rtol=0.1)

@@ -5,48 +5,35 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.signal
-from inputdesign_cli.monte_carlo.arx import ArxStudy
-from inputdesign_cli.signal.tabulated_multisine import lines_of, masses_of_density
 
-from inputdesign_cli.design.loop_error import (
-    ClosedLoopProblem,
-    MatrixTransfer,
-    ModelReference,
-    PowerLimit,
-)
-from inputdesign_cli.monte_carlo.loop_error import closed_loop_study, error_filters, prefilter
+from inputdesign_cli.design.loop_error import LoopErrorProblem, ModelReference, PowerLimit
+from inputdesign_cli.identification.least_squares import estimated_polynomials, least_squares
+from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
+from inputdesign_cli.monte_carlo.loop_error import study_losses
+from inputdesign_cli.plant import Rational, TransferMatrix
 from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
+from inputdesign_cli.signal.lines import grid_lines
+from inputdesign_cli.signal.periodic import harmonics
 from loop_error.column import column, random_plant
 
 W = np.linspace(0.05, 3.1, 9)
 
 
 def flat(samples, n=2):
-    L = lines_of(samples)
-    return masses_of_density(np.broadcast_to(np.eye(n, dtype=complex), (L.size, n, n)), samples)
+    L = harmonics(samples)
+    return grid_lines(np.broadcast_to(np.eye(n, dtype=complex), (L.size, n, n)), samples, 1.0)
 
 
 def target(n, *, matrix):
     if not matrix:
-        return MatrixTransfer.diagonal([0.0, 0.4], [1.0, -0.6], n)
+        return TransferMatrix.diagonal(Rational.build([0.0, 0.4], [1.0, -0.6]), n)
     entries = [[[0.0, 0.4 if i == j else 0.05 * (i - j)] for j in range(n)] for i in range(n)]
-    return MatrixTransfer.build(entries, [[[1.0, -0.6]] * n] * n)
+    return TransferMatrix.build(entries, [[[1.0, -0.6]] * n] * n)
 
 
 def arx(plant):
     """The plant with white equation noise."""
     return replace(plant, C=(np.ones(1),), D=(np.ones(1),))
-
-
-def nominal(plant):
-    """The parameters in the order of their names."""
-    values = []
-    for name in plant.names:
-        lag, _, place = name[1:].partition("[")
-        index = [int(c) - 1 for c in place.rstrip("]").split(",")] if place else [0] * (1 + (name[0] == "b"))
-        polynomial = plant.A[index[0]] if name[0] == "a" else plant.B[index[0]][index[1]]
-        values.append(polynomial[int(lag)])
-    return np.array(values)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -69,9 +56,9 @@ def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
     rng = np.random.default_rng(10 * n + matrix)
     bare = arx(column().plant if common and n == 2 else random_plant(rng, n))
     T = target(n, matrix=matrix)
-    law, theta = ModelReference(T), nominal(bare)
+    law, theta = ModelReference(T), bare.theta
     theta = theta + 0.01 * rng.standard_normal((2, theta.size)) * np.abs(theta)
-    A, B = ArxStudy(bare).polynomials(theta)
+    A, B = estimated_polynomials(bare, theta)
     numerator, denominator = error_filters(bare, T, A, B)
     for run in range(2):
         q = np.exp(-1j * W)
@@ -99,15 +86,13 @@ def test_the_filters_are_the_difference_of_the_two_loops(n, matrix, common):
 
 def test_least_squares_without_noise_is_exact():
     plant = arx(random_plant(np.random.default_rng(0), 2))
-    quiet = ArxStudy(plant)
-    rng = np.random.default_rng(1)
-    u = rng.standard_normal((2, 3, 400))
+    u = np.random.default_rng(1).standard_normal((3, 400, 2))
     y = np.zeros_like(u)
     for i in range(2):
         for j in range(2):
-            y[i] += scipy.signal.lfilter(plant.B[i][j], plant.A[i], u[j])
-    theta = quiet.estimate(u, y)
-    np.testing.assert_allclose(theta, np.broadcast_to(nominal(plant), theta.shape), atol=1e-9)
+            y[..., i] += scipy.signal.lfilter(plant.B[i][j], plant.A[i], u[..., j])
+    theta = least_squares(plant, u, y)
+    np.testing.assert_allclose(theta, np.broadcast_to(plant.theta, theta.shape), atol=1e-9)
 
 
 def test_least_squares_is_weighted_with_the_noise():
@@ -116,28 +101,25 @@ def test_least_squares_is_weighted_with_the_noise():
     covariance = np.array([[1.0, 0.6], [0.6, 2.0]])
     plant = arx(problem.plant)
     plant = replace(plant, covariance=covariance)
-    study = ArxStudy(plant)
     rng = np.random.default_rng(2)
-    u = rng.standard_normal((2, 1, 200))
-    y = study.outputs(u, study.noise(1, 200, rng))
+    u, y = rng.standard_normal((1, 200, 2)), rng.standard_normal((1, 200, 2))
     inverse = np.linalg.inv(covariance)
     normal, rhs = np.zeros((5, 5)), np.zeros(5)
     for t in range(1, 200):
         Phi = np.zeros((2, 5))
-        Phi[:, 0] = -y[:, 0, t - 1]
-        Phi[0, 1:3] = u[:, 0, t - 1]
-        Phi[1, 3:5] = u[:, 0, t - 1]
+        Phi[:, 0] = -y[0, t - 1]
+        Phi[0, 1:3] = u[0, t - 1]
+        Phi[1, 3:5] = u[0, t - 1]
         normal += Phi.T @ inverse @ Phi
-        rhs += Phi.T @ inverse @ y[:, 0, t]
-    np.testing.assert_allclose(study.estimate(u, y)[0], np.linalg.solve(normal, rhs), rtol=1e-9)
+        rhs += Phi.T @ inverse @ y[0, t]
+    np.testing.assert_allclose(least_squares(plant, u, y)[0], np.linalg.solve(normal, rhs), rtol=1e-9)
 
 
 def test_the_loss_of_the_column_agrees_with_theory():
     problem = column()
     samples, runs = 4000, 150
-    found = closed_loop_study(
+    found = study_losses(
         problem,
-        problem.law.target,
         {"white": flat(samples)},
         samples=samples,
         runs=runs,
@@ -155,21 +137,20 @@ def test_the_loss_of_the_column_agrees_with_theory():
 def test_a_study_is_repeatable_and_treats_inputs_alike():
     problem = column()
     both = {"a": flat(500), "b": flat(500)}
-    study = closed_loop_study(problem, problem.law.target, both, samples=500, runs=7, seed=3)
+    study = study_losses(problem, both, samples=500, runs=7, seed=3)
     np.testing.assert_array_equal(study["a"].loss, study["b"].loss)
-    again = closed_loop_study(problem, problem.law.target, both, samples=500, runs=7, seed=3)
+    again = study_losses(problem, both, samples=500, runs=7, seed=3)
     np.testing.assert_array_equal(study["a"].loss, again["a"].loss)
 
 
 def test_unstable_loops_are_counted_and_left_out():
     plant = arx(random_plant(np.random.default_rng(0), 1))
     noisy = replace(plant, covariance=np.array([[400.0]]))
-    problem = ClosedLoopProblem(
+    problem = LoopErrorProblem(
         noisy, ModelReference(target(1, matrix=False)), (PowerLimit("input", 1.0),), np.ones(1)
     )
-    found = closed_loop_study(
+    found = study_losses(
         problem,
-        target(1, matrix=False),
         {"white": flat(60, 1)},
         samples=60,
         runs=80,

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import MatrixTransfer, ModelReference
+from inputdesign_cli.design.loop_error import ModelReference
 from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_of, power_of
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
-from inputdesign_cli.design.loop_error.weight import general_weight, reference_weight, weight
-from loop_error.column import adjoint, column, random_complex, random_hermitian
+from inputdesign_cli.design.loop_error.weight import weight
+from inputdesign_cli.plant import TransferMatrix
+from loop_error.column import GAINS, adjoint, column, jacobian, kronecker, random_complex, random_hermitian
 
 W = np.linspace(0.05, 3.0, 40)
 
@@ -16,7 +17,7 @@ def random_case(n, seed=0):
     rng = np.random.default_rng(seed)
     G = random_complex(rng, W.size, n, n)
     law = ModelReference(
-        MatrixTransfer.build(
+        TransferMatrix.build(
             [[[0.0, *(0.3 * rng.standard_normal(2))] for _ in range(n)] for _ in range(n)],
             [[[1.0, -0.6]] * n] * n,
         )
@@ -26,14 +27,15 @@ def random_case(n, seed=0):
 
 @pytest.mark.parametrize("n", [2, 3])
 @pytest.mark.parametrize("seed", range(5))
-def test_the_general_formula_agrees_with_formula_19(n, seed):
+def test_the_weight_agrees_with_formula_19_and_with_the_general_formula(n, seed):
     law, G, entering, noise = random_case(n, seed)
     S = sensitivity(law.complementary(W))
     CS = law.controller(G, W) @ S
-    by_19 = reference_weight(S, CS, entering, noise)
+    power = np.trace(S @ noise @ adjoint(S), axis1=1, axis2=2).real
+    by_19 = power[:, None, None] * np.conj(CS @ entering @ adjoint(CS))
     scale = np.abs(by_19).max(axis=(1, 2), keepdims=True)
-    general = general_weight(S, G, law.jacobian(G, W), entering, noise)
-    np.testing.assert_allclose(general / scale, by_19 / scale, atol=1e-12)
+    by_13 = weight(kronecker(np.swapaxes(S, 1, 2), S @ G) @ jacobian(law, G, W), entering, noise)
+    np.testing.assert_allclose(by_13 / scale, by_19 / scale, atol=1e-12)
     finite = weight(propagation(law, G, W), entering, noise)
     np.testing.assert_allclose(finite / scale, by_19 / scale, atol=1e-12)
     assert np.abs(by_19.imag / scale).max() > 0.05  # so that a lost transpose would show
@@ -46,7 +48,7 @@ def test_z_is_what_the_covariance_of_the_estimate_costs(n):
     Phi = random_hermitian(np.random.default_rng(5), W.size, n)
     Z = weight(propagation(law, G, W), entering, noise)
     S = sensitivity(law.complementary(W))
-    J = law.jacobian(G, W)
+    J = jacobian(law, G, W)
     for k in range(0, W.size, 7):
         R = np.linalg.cholesky(entering[k])
         sent = np.kron((S[k] @ R).T, S[k] @ G[k]) @ J[k]
@@ -89,8 +91,6 @@ def test_the_spectrum_of_the_column_is_the_matrix_root_times_s2():
 
 
 def test_the_printed_matrix_is_the_elementwise_root():
-    from asymptotic.column import GAINS
-
     K = np.linalg.inv(GAINS)
     gram = K @ K.T
     printed = np.array([[50.86022, 50.81780], [50.81780, 50.78046]])

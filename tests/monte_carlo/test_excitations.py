@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import InPhase, Recorded, Redrawn
-from inputdesign_cli.plant import PolynomialChannels
+from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.spectrum import LinesBasis
 
 SAMPLES = 2000
@@ -17,7 +17,7 @@ def experiment(channels):
     F = (one * channels,) * channels
     B = tuple(tuple(np.array([0.0, gain]) for gain in row[:channels]) for row in GAINS[:channels])
     covariance = np.array([[1.0, 0.4], [0.4, 0.5]])[:channels, :channels]
-    return ChannelExperiment(PolynomialChannels(B, one, F, one, one, covariance), SAMPLES)
+    return Experiment(PolynomialModel(B, one, F, one, one, covariance), SAMPLES)
 
 
 def flat(method, channels, samples=SAMPLES):

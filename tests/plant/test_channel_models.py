@@ -8,10 +8,10 @@ import pytest
 import scipy.signal
 from channel_plants import arrays, arx, box_jenkins, descending, two_by_two
 
-from inputdesign_cli.plant import ContinuousChannels, PolynomialChannels, PolynomialModel, SampledChannels
+from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
 
 W = np.array([0.05, 0.4, 1.3, 2.9])
-COMMON = ContinuousChannels.monic(
+COMMON = ContinuousModel.monic(
     descending([[[2.0, 1.0], [1.0]], [[0.0], [3.0, -1.0, 2.0]]]),
     descending([[[2.0, 3.0, 2.0]] * 2] * 2),
     np.eye(2),
@@ -23,17 +23,17 @@ MODELS = {
     "box-jenkins": box_jenkins(),
     "continuous": two_by_two(),
     "common continuous": COMMON,
-    "sampled": SampledChannels(two_by_two(), 0.4),
-    "common sampled": SampledChannels(COMMON, 0.7),
+    "sampled": SampledModel(two_by_two(), 0.4),
+    "common sampled": SampledModel(COMMON, 0.7),
 }
 
 
 def moved(model, index, step):
     """The model with one parameter changed: every coefficient that it stands for."""
-    if isinstance(model, SampledChannels):
-        return SampledChannels(moved(model.continuous_plant, index, step), model.sample_time)
+    if isinstance(model, SampledModel):
+        return SampledModel(moved(model.continuous_plant, index, step), model.sample_time)
     parameter = model.parameters[index]
-    if isinstance(model, ContinuousChannels):
+    if isinstance(model, ContinuousModel):
         field = "numerator" if parameter.letter == "b" else "denominator"
     else:
         field = parameter.letter.upper()
@@ -102,14 +102,14 @@ def test_names_carry_output_and_input():
     assert two_by_two().names[:4] == ("b0[1,1]", "b0[1,2]", "b0[2,1]", "b0[2,2]")
     assert two_by_two().names[-2:] == ("a0[2,2]", "a1[2,2]")
     assert COMMON.names == ("b0[1,1]", "b1[1,1]", "b0[1,2]", "b0[2,2]", "b1[2,2]", "b2[2,2]", "a0", "a1")
-    single = ContinuousChannels.monic(descending([[[2.0]]]), descending([[[1.0, 3.0]]]), np.eye(1))
+    single = ContinuousModel.monic(descending([[[2.0]]]), descending([[[1.0, 3.0]]]), np.eye(1))
     assert single.names == ("b0", "a0")
 
 
 def test_one_channel_is_the_siso_model():
     A, B, C, D, F = (np.array(p) for p in ([1, -0.5], [0, 2.0, 0.3], [1, 0.2], [1, 0.6], [1, -0.1, 0.4]))
-    siso = PolynomialModel(A=A, B=B, C=C, D=D, F=F)
-    one = PolynomialChannels(((B,),), (A,), ((F,),), (C,), (D,), np.eye(1))
+    siso = PolynomialModel.single(A=A, B=B, C=C, D=D, F=F)
+    one = PolynomialModel(((B,),), (A,), ((F,),), (C,), (D,), np.eye(1))
     assert one.names == siso.names
     np.testing.assert_allclose(one.theta, siso.theta)
     np.testing.assert_allclose(one.plant_gradient(W)[:, :, 0, 0], siso.plant_gradient(W), atol=1e-13)
@@ -121,7 +121,7 @@ def test_one_channel_is_the_siso_model():
 @pytest.mark.parametrize("model", [two_by_two(), COMMON], ids=["strictly proper", "biproper"])
 def test_zero_order_hold_is_that_of_the_matrix_exponential(model):
     period = 0.4
-    sampled = SampledChannels(model, period)
+    sampled = SampledModel(model, period)
     for i, j in model.active:
         top, bottom = model.numerator[i][j][::-1], model.denominator[i][j][::-1]
         num, den, _ = scipy.signal.cont2discrete((top, bottom), period, method="zoh")
@@ -134,16 +134,16 @@ def test_sampled_zeros_and_poles_are_those_of_the_sampled_entry():
     system = control.tf([3.125], [1, 1.5, 1.563]).sample(0.4)
     roots = np.concatenate([system.poles(), system.zeros()])
     points = np.abs(np.angle(roots)) + 1j * np.abs(np.log(np.abs(roots)))
-    ours = SampledChannels(model, 0.4).entry_singularities(0, 0)
+    ours = SampledModel(model, 0.4).entry_singularities(0, 0)
     np.testing.assert_allclose(np.sort_complex(ours), np.sort_complex(points), atol=1e-8)
 
 
 def test_widely_separated_time_constants_survive_sampling():
     """Poles at 1e-3 and 1e3 rad/s, sampled slowly: the static gain must come out to rounding."""
-    model = ContinuousChannels.monic(arrays([[[1.0]]]), arrays([[[1.0, 1000.001, 1.0]]]), np.eye(1))
-    assert SampledChannels(model, 1.0).plant_at(np.zeros(1))[0, 0, 0] == pytest.approx(1.0, rel=1e-9)
+    model = ContinuousModel.monic(arrays([[[1.0]]]), arrays([[[1.0, 1000.001, 1.0]]]), np.eye(1))
+    assert SampledModel(model, 1.0).plant_at(np.zeros(1))[0, 0, 0] == pytest.approx(1.0, rel=1e-9)
 
 
 def test_plant_of_any_scale_of_leading_coefficients_is_the_same():
-    scaled = ContinuousChannels.monic(arrays([[[4.0, 2.0]]]), arrays([[[2.0, 6.0, 2.0]]]), np.eye(1))
+    scaled = ContinuousModel.monic(arrays([[[4.0, 2.0]]]), arrays([[[2.0, 6.0, 2.0]]]), np.eye(1))
     np.testing.assert_allclose(scaled.theta, [2.0, 1.0, 1.0, 3.0])

@@ -76,14 +76,16 @@ def test_prediction_gradient_equals_the_formulas_of_the_paper(structure, closed)
 
 
 def test_names_follow_the_contract():
-    model = PolynomialModel(B=np.array([0, 0, 0, 0.1, 0.2]), A=np.array([1, -0.5]), C=np.array([1, 0.1]))
+    model = PolynomialModel.single(
+        B=np.array([0, 0, 0, 0.1, 0.2]), A=np.array([1, -0.5]), C=np.array([1, 0.1])
+    )
     assert model.names == ("a1", "b3", "b4", "c1")
     assert list(model.in_plant) == [True, True, True, False]
 
 
 def test_unstable_plant_in_a_stable_loop_has_finite_gradients():
     """An ARX plant with an integrator: S G and the gradients stay finite at DC."""
-    model = PolynomialModel(A=np.array([1.0, -1.0]), B=np.array([0.0, 1.0]))
+    model = PolynomialModel.single(A=np.array([1.0, -1.0]), B=np.array([0.0, 1.0]))
     loop = Loop(model, Rational.build([0.5]))
     loop.check_stability()
     t = loop.responses(np.array([0.0]))
@@ -93,18 +95,18 @@ def test_unstable_plant_in_a_stable_loop_has_finite_gradients():
 
 
 def test_unstable_and_algebraic_loops_are_refused():
-    model = PolynomialModel(A=np.array([1.0, -0.9]), B=np.array([0.0, 1.0]))
+    model = PolynomialModel.single(A=np.array([1.0, -0.9]), B=np.array([0.0, 1.0]))
     with pytest.raises(SpecError) as unstable:
         Loop(model, Rational.build([-0.5])).check_stability()
     assert unstable.value.diagnostics[0].code == "unstable-loop"
-    direct = PolynomialModel(B=np.array([1.0, 0.5]))
+    direct = PolynomialModel.single(B=np.array([1.0, 0.5]))
     with pytest.raises(SpecError) as algebraic:
         Loop(direct, Rational.build([-1.0])).check_stability()
     assert algebraic.value.diagnostics[0].code == "algebraic-loop"
 
 
 def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_no_delay():
-    direct, delayed = (PolynomialModel(B=np.array(B)) for B in ([1.0, 0.5], [0.0, 1.0]))
+    direct, delayed = (PolynomialModel.single(B=np.array(B)) for B in ([1.0, 0.5], [0.0, 1.0]))
     now, later = Rational.build([0.3]), Rational.build([0.0, 0.3])
     with pytest.raises(SpecError) as caught:
         Loop(direct, now).check_delay()

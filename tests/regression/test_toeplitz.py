@@ -12,10 +12,9 @@ from inputdesign_cli.design.regression import (
     energy_bound,
     least_energy,
 )
-from inputdesign_cli.design.regression.alternating import alternate
-from inputdesign_cli.design.regression.branch import Search
+from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.lift import Box
-from inputdesign_cli.design.regression.limits import reach
+from inputdesign_cli.design.regression.limits import box_limits
 from inputdesign_cli.design.regression.structured import least_variance
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
@@ -54,7 +53,7 @@ def test_example_4_is_infeasible_from_alpha_one(alpha):
     with pytest.raises(OutOfReachError) as error:
         design(regression([1], [2], alpha), target=1.0)
     assert error.value.bias == pytest.approx(1.0, rel=1e-8)
-    assert error.value.reach >= 1e6
+    assert error.value.proved >= 1e6
     assert not error.value.assumed
 
 
@@ -126,21 +125,21 @@ def test_no_shape_in_a_box_beats_its_bound(m, n):
     rng = np.random.default_rng([m, n])
     weights = rng.standard_normal(n)
     problem = ToeplitzProblem.of(regression(weights[:m], weights[m:], 0.7))
-    lift = Search.start(problem).lift
+    lift = BranchAndBound.start(problem).lift
     for width in (2.0, 0.5, 0.1, 0.01):
         for kappa in (0.03, 1.0, 10.0):
             centre = autocorrelations(rng.uniform(-0.8, 0.8, n - 1))
             head = centre[1:m]
             box = Box(np.maximum(head - width / 2, -1), np.minimum(head + width / 2, 1))
             largest_v = 50.0
-            found = lift.bound(box, kappa, reach(problem, box, largest_v).scaling)
-            shapes = [problem.shape(centre)]
+            found = lift.bound(box, kappa, box_limits(problem, box, largest_v).scaling)
+            shapes = [problem.evaluate(centre)]
             for _ in range(200):
                 rho = autocorrelations(rng.uniform(-1, 1, n - 1))
                 rho = centre + rng.random() * (rho - centre)
                 inside = np.all(rho[1:m] >= box.lower) and np.all(rho[1:m] <= box.upper)
                 if inside:
-                    shapes.append(problem.shape(rho))
+                    shapes.append(problem.evaluate(rho))
             values = [s.bias_squared + kappa * s.v for s in shapes if s is not None and s.v <= largest_v]
             assert found.bound <= min(values) * (1 + 1e-9)
 
@@ -151,10 +150,10 @@ def test_weights_stay_within_their_limit():
         m = int(rng.integers(1, 5))
         problem = ToeplitzProblem.of(regression(rng.standard_normal(m), rng.standard_normal(2), 1.0))
         rho = autocorrelations(rng.uniform(-0.95, 0.95, m + 1))
-        shape = problem.shape(rho)
+        shape = problem.evaluate(rho)
         shift, width = rng.uniform(-0.5, 0.5, m - 1), 10.0 ** rng.uniform(-4, 0)
         box = Box(rho[1:m] + (shift - 0.5) * width, rho[1:m] + (shift + 0.5) * width)
-        allowed = reach(problem, box, 1.01 * shape.v)
+        allowed = box_limits(problem, box, 1.01 * shape.v)
         u = problem.weights(scipy.linalg.toeplitz(rho))
         w = np.linalg.lstsq(allowed.scaling.D, u - allowed.scaling.centre, rcond=None)[0]
         assert w @ w <= allowed.scaling.limit * (1 + 1e-6)
@@ -165,7 +164,7 @@ def test_the_least_variance_is_a_bound():
     rng = np.random.default_rng(5)
     problem = ToeplitzProblem.of(regression(rng.standard_normal(3), rng.standard_normal(2), 1.0))
     least = least_variance(problem)
-    values = [problem.shape(autocorrelations(rng.uniform(-1, 1, 4))).v for _ in range(500)]
+    values = [problem.evaluate(autocorrelations(rng.uniform(-1, 1, 4))).v for _ in range(500)]
     assert 0.5 * min(values) < least <= min(values)
 
 
@@ -185,7 +184,7 @@ def test_all_units_scale_out():
 
 def test_the_alternation_leaves_the_shape_of_its_start():
     """For m = 2 it keeps rho_1 of white noise, and the gap that is reported says so."""
-    found = design(regression(*FOUR), energy=8.0, search=alternate)
+    found = design(regression(*FOUR), energy=8.0, alternating=True)
     assert found.rho[1] == pytest.approx(0.0, abs=1e-9)
     best = 1.072300
     assert found.split.total > best * 1.01
@@ -193,14 +192,14 @@ def test_the_alternation_leaves_the_shape_of_its_start():
 
 
 def test_the_alternation_is_enough_for_one_parameter():
-    found = design(regression([1], [1.2, 0.5], 0.5), energy=6.0, search=alternate)
+    found = design(regression([1], [1.2, 0.5], 0.5), energy=6.0, alternating=True)
     assert found.split.total == pytest.approx(0.525796, rel=1e-6)
 
 
 def test_infeasible_targets_of_two_parameters():
     with pytest.raises(OutOfReachError) as error:
         design(regression([1, -0.3], [1, 4], 1.0), target=1.0)
-    assert error.value.reach >= 1e6
+    assert error.value.proved >= 1e6
     # What would be feasible is: a target above the least bias.
     least = error.value.bias**2 * 1.09
     assert np.isfinite(design(regression([1, -0.3], [1, 4], 1.0), target=1.5 * least).energy)

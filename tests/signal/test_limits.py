@@ -5,7 +5,7 @@ import pytest
 from channel_plants import arx
 from inputdesign_cli.signal.single import as_channels
 
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import (
     Bounds,
     DesignedSpectrum,
@@ -175,7 +175,7 @@ def experiment(request, first_order):
     """The first-order system, or an ARX system of two inputs and outputs, in white coordinates."""
     if request.param == 1:
         return as_channels(first_order).whitened(1.0)
-    return ChannelExperiment(arx(), 240).whitened(1.0)
+    return Experiment(arx(), 240).whitened(1.0)
 
 
 @pytest.mark.parametrize("limited", LIMITS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from channel_plants import arx, paper_experiment
 
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.spectrum import (
     DirectedLines,
@@ -16,7 +16,7 @@ from inputdesign_cli.spectrum import (
     hvec,
 )
 
-DISCRETE = ChannelExperiment(arx(), 20).whitened(1.0)
+DISCRETE = Experiment(arx(), 20).whitened(1.0)
 PAPER = paper_experiment()
 FAMILIES = {
     "fir": (MatrixFirBasis(2, 6), DISCRETE),

@@ -11,7 +11,7 @@ from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import load_spec, solve, validate
 from inputdesign_cli.errors import EXIT_BAD_INPUT, SpecError
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 
@@ -283,7 +283,7 @@ def test_bad_input_is_refused_with_place_and_hint(name):
 
 def test_the_spec_of_the_example_is_that_of_the_tests():
     task = build_convex(load_spec(SPECS / "two_by_two_arx.yaml"))
-    assert task.experiment.model.names == ChannelExperiment(arx(), 1).model.names
+    assert task.experiment.model.names == Experiment(arx(), 1).model.names
 
 
 GAINS = """

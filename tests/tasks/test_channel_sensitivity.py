@@ -11,11 +11,10 @@ from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Absolute, LoopSensitivity, NormError, Sensitivity
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.plant import (
-    MatrixController,
-    PolynomialChannels,
     PolynomialLoop,
     PolynomialModel,
     Rational,
+    TransferMatrix,
 )
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
@@ -109,10 +108,10 @@ def test_models_of_the_ellipsoid_keep_the_sensitivity(design):
 def test_one_channel_is_the_siso_bound():
     A, B = [1, -0.9], [0, 0.5, 0.2]
     numerator, denominator, W = [0.4, -0.3], [1, -1], Rational.build([0.5, 0.1], [1, -0.3])
-    siso = PolynomialModel(np.array(B), np.array(A, dtype=float))
+    siso = PolynomialModel.single(np.array(B), np.array(A, dtype=float))
     one = ((np.ones(1),),)
-    plant = PolynomialChannels(((np.array(B),),), (np.array(A),), one, one[0], one[0], np.eye(1))
-    loop = PolynomialLoop(plant, MatrixController.build([[numerator]], [[denominator]]))
+    plant = PolynomialModel(((np.array(B),),), (np.array(A),), one, one[0], one[0], np.eye(1))
+    loop = PolynomialLoop(plant, TransferMatrix.build([[numerator]], [[denominator]]))
     expected = Sensitivity(siso, Rational.build(numerator, denominator), W).at(GRID)
     np.testing.assert_allclose(LoopSensitivity(loop, W).at(GRID), expected, rtol=1e-9)
 

@@ -19,7 +19,7 @@ from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, impli
 from inputdesign_cli.design.convex.problem import Goal, Problem, RequirementFactory, Weight
 from inputdesign_cli.design.convex.white import least_white_power
 from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 
@@ -38,7 +38,7 @@ class Question:
     `side` must hold besides. The other goals meet all of them.
     """
 
-    experiment: ChannelExperiment
+    experiment: Experiment
     basis: Basis
     goal: Goal
     requirements: Sequence[RequirementFactory]
@@ -132,7 +132,7 @@ def whitened_problem(question: Question, powers: Array) -> Problem:
     )
 
 
-def _stated(question: Question, experiment: ChannelExperiment) -> Problem:
+def _stated(question: Question, experiment: Experiment) -> Problem:
     """The problem but for what it requires."""
     densities = tuple(question.densities)
     implied = [implied_power(d, experiment.inputs) for d in densities if d.upper]

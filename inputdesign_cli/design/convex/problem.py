@@ -23,12 +23,12 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import ChannelExperiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Functional
 
-RequirementFactory = Callable[[ChannelExperiment], Requirement]
+RequirementFactory = Callable[[Experiment], Requirement]
 Goal = Literal["cost", "factor", "samples"]
 Weight = float | tuple[float, ...]
 
@@ -65,7 +65,7 @@ class Problem:
     experiment on the same or a larger basis, of whose integrals those of this basis are the head.
     """
 
-    experiment: ChannelExperiment
+    experiment: Experiment
     basis: Basis
     cost: Mapping[PowerKind, Weight]
     requirements: tuple[Requirement, ...]

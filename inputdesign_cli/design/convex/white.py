@@ -10,7 +10,7 @@ import scipy.optimize
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.design.convex.problem import Problem, RequirementFactory
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import flat_basis
 
 _POLISH = 3
@@ -18,7 +18,7 @@ _POLISH = 3
 _PLENTY, _STILL = 46.0, 1e-6
 
 
-def least_white_power(experiment: ChannelExperiment, factories: Sequence[RequirementFactory]) -> float:
+def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
     """The smallest white excitation power (per sample) that meets every requirement; 0 if none is needed.
 
     r_u falls monotonically as the power grows, so this is one scalar equation and needs no solver.

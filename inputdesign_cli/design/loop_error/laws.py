@@ -42,10 +42,6 @@ class ControlLaw(Protocol):
         """C(G)."""
         ...
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """d vec C / d vec G: (K, n^2, n^2)."""
-        ...
-
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
         """d vec C / d vec H: (K, n^2, n^2); None where C ignores the noise model."""
         ...
@@ -130,10 +126,6 @@ class ModelReference(_FixedLoop):
         T = self.target.at(w)
         return np.linalg.inv(G) @ T @ np.linalg.inv(sensitivity(T))
 
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        return -kronecker(_transposed(self.controller(G, w)), np.linalg.inv(G))
-
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""
         check_model_reference(plant, self.target, key=key)
@@ -156,8 +148,8 @@ class InternalModel(_FixedLoop):
         outside = plant.zeros[np.abs(plant.zeros) > 1]
         if outside.size:
             # (q^-1 - 1/z0)*... of modulus one on the circle, poles at the mirrored zeros, gain one at DC.
-            mirrored, blaschke = (np.poly(roots).real for roots in (1 / np.conj(outside), outside))
-            below = np.asarray(mirrored, dtype=float)
+            below = np.asarray(np.poly(1 / np.conj(outside)).real, dtype=float)
+            blaschke = np.poly(outside).real
             above = product_of([above, np.sum(below) / np.sum(blaschke) * blaschke])
         return cls(TransferMatrix.diagonal(filter_, plant.outputs).scaled(Rational(above, (below,))))
 
@@ -165,15 +157,6 @@ class InternalModel(_FixedLoop):
         """See `ControlLaw`."""
         Q = np.linalg.inv(G) @ self.target.at(w)
         return np.asarray(np.linalg.inv(sensitivity(Q @ G)) @ Q)
-
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        # dC = (I - Q G)^-1 [dQ (I + G C) + Q dG C] with dQ = -G^-1 dG Q.
-        inverse = np.linalg.inv(G)
-        Q, C = inverse @ self.target.at(w), self.controller(G, w)
-        outer = np.linalg.inv(sensitivity(Q @ G))
-        from_filter = -kronecker(_transposed(Q @ sensitivity(-G @ C)), outer @ inverse)
-        return from_filter + kronecker(_transposed(C), outer @ Q)
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """See `ControlLaw`."""
@@ -212,10 +195,6 @@ class MinimumVariance:
         """See `ControlLaw`."""
         X = -sensitivity(self.plant.noise_at(w) @ np.linalg.inv(self.unavoidable(w)))
         return np.asarray(np.linalg.inv(G) @ X)
-
-    def jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
-        """See `ControlLaw`."""
-        return -kronecker(_transposed(self.controller(G, w)), np.linalg.inv(G))
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
         """d vec C / d vec H with E held: its few terms are known far better than H pointwise."""

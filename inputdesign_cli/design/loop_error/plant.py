@@ -7,17 +7,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channels import PolynomialChannels
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, roots_in_z
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, stack
+from inputdesign_cli.plant.polynomial_model import PolynomialModel
 
 
-class MatrixPlant(PolynomialChannels):
-    """`PolynomialChannels` as G = R^-1 N, R diagonal, with what inverting a square G takes."""
+class MatrixPlant(PolynomialModel):
+    """`PolynomialModel` as G = R^-1 N, R diagonal, with what inverting a square G takes."""
 
     @classmethod
-    def of(cls, channels: PolynomialChannels) -> MatrixPlant:
+    def of(cls, channels: PolynomialModel) -> MatrixPlant:
         """The same plant."""
         return cls(channels.B, channels.A, channels.F, channels.C, channels.D, channels.covariance)
 

@@ -1,4 +1,4 @@
-"""The alternation of the MSE paper, Section 4.2: fix R11 and solve, fix Z = R11^-1 R12 and solve, repeat.
+"""The alternation of [eckhard-mse], Section 4.2: fix R11 and solve, fix Z = R11^-1 R12 and solve, repeat.
 
 With Z fixed, R11 Z = R12 generally leaves R only free to scale, so that for m >= 2 the shape of R11 never
 leaves its start. It is here so that one can see what it does; its gap comes from the proof of the others.
@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from inputdesign_cli.design.regression.local import Counter, Goal
 from inputdesign_cli.design.regression.steps import extend, rescale
-from inputdesign_cli.design.regression.toeplitz import Shape, ToeplitzProblem, Weight
+from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 
 _MAX_ROUNDS = 50
 _SETTLED = 1e-9
 
 
-def alternate(problem: ToeplitzProblem, goal: Goal, start: Shape, counter: Counter) -> Shape:
+def alternate(
+    problem: ToeplitzProblem, goal: Goal, start: Autocorrelations, counter: Counter
+) -> Autocorrelations:
     """Where the alternation ends from `start`.
 
     A target that the present shape misses is approached by reducing the bias alone.
@@ -30,7 +32,7 @@ def alternate(problem: ToeplitzProblem, goal: Goal, start: Shape, counter: Count
                 rho = extend(problem, weight, shape.rho[: problem.m])
             else:
                 rho = rescale(problem, weight, shape)
-            trial = None if rho is None else problem.shape(rho)
+            trial = None if rho is None else problem.evaluate(rho)
             if trial is not None and weight(trial) < weight(shape):
                 shape = trial
         now, then = goal.value(shape), goal.value(before)

@@ -13,7 +13,7 @@ from itertools import count
 import numpy as np
 
 from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound
-from inputdesign_cli.design.regression.limits import reach
+from inputdesign_cli.design.regression.limits import box_limits
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from inputdesign_cli.plant.polynomial import Array
 
@@ -30,7 +30,7 @@ class Node:
 
 
 @dataclass
-class Search:
+class BranchAndBound:
     """The state of a proof: boxes that are open, and the least bound of those that are done.
 
     Attributes:
@@ -48,12 +48,12 @@ class Search:
     _order: count = field(default_factory=count)
 
     @staticmethod
-    def start(problem: ToeplitzProblem) -> Search:
+    def start(problem: ToeplitzProblem) -> BranchAndBound:
         """All shapes in one box, nothing known."""
         edge = np.ones(problem.m - 1)
-        search = Search(problem, Lift(problem))
-        search.open.append(Node(-np.inf, next(search._order), Box(-edge, edge)))
-        return search
+        tree = BranchAndBound(problem, Lift(problem))
+        tree.open.append(Node(-np.inf, next(tree._order), Box(-edge, edge)))
+        return tree
 
     @property
     def assumed(self) -> bool:
@@ -101,7 +101,7 @@ class Search:
         level: Callable[[], float],
         suggest: Callable[[Array], None],
     ) -> None:
-        allowed = reach(self.problem, box, largest_v)
+        allowed = box_limits(self.problem, box, largest_v)
         if allowed.least_v > largest_v:
             self.closed = min(self.closed, level())
             return
@@ -125,8 +125,8 @@ class Search:
         coordinate = int(np.argmax(found.spread * width + 1e-12 * width))
         at = box.centre[coordinate]
         if found.rho.size:
-            reach = 0.25 * width[coordinate]
-            at = float(np.clip(found.rho[coordinate + 1], at - reach, at + reach))
+            quarter = 0.25 * width[coordinate]
+            at = float(np.clip(found.rho[coordinate + 1], at - quarter, at + quarter))
         return box.halves(coordinate, at)
 
 

@@ -1,4 +1,4 @@
-"""Moments without structure: Theorem 2 of the MSE paper in a form that is stable for alpha = 0 and L2 = 0.
+"""Moments without structure: [eckhard-mse] Theorem 2 in a form that is stable for alpha = 0 and L2 = 0.
 
 The optimal R is rank one, along v = [L1; (1 + k) L2]: regressors that move together in one direction.
 """
@@ -12,7 +12,7 @@ from inputdesign_cli.plant.polynomial import Array
 
 
 def least_energy(regression: Regression, target: float) -> Array:
-    """(n, n): the R of least trace whose worst mean-squared error is `target` (Theorem 2).
+    """(n, n): the R of least trace whose worst mean-squared error is `target` ([eckhard-mse], Theorem 2).
 
     k solves k^2 |L2|^2 alpha^2 + k S + gamma = 0. Of it and of 1 + k, which solves a quadratic of its
     own, the quotient is written with the sum of terms of one sign: nothing cancels and nothing is
@@ -34,8 +34,9 @@ def least_energy(regression: Regression, target: float) -> Array:
 def least_error(regression: Regression, energy: float) -> Array:
     """(n, n): the R of trace `energy` with the least worst mean-squared error.
 
-    By Lemma 1 the error of R along v = [L1; L2 + delta] is alpha^2 |delta|^2 + sigma^2 |v|^2 / energy,
-    a quadratic in delta with its minimum at delta = -sigma^2 L2 / (alpha^2 energy + sigma^2).
+    By [eckhard-mse], Lemma 1, the error of R along v = [L1; L2 + delta] is
+    alpha^2 |delta|^2 + sigma^2 |v|^2 / energy, a quadratic in delta with its minimum at
+    delta = -sigma^2 L2 / (alpha^2 energy + sigma^2).
     """
     gain = regression.neglected_norm**2 * energy
     v = np.concatenate([regression.estimated, gain / (gain + regression.variance) * regression.neglected])

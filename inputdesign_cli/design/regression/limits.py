@@ -23,7 +23,7 @@ _NARROW = 0.5  # change of P11 over a box, relative to its least eigenvalue, up 
 
 
 @dataclass(frozen=True)
-class Reach:
+class BoxLimits:
     """What a box allows.
 
     Attributes:
@@ -55,13 +55,13 @@ class _Part:
     assumed: bool
 
 
-def reach(problem: ToeplitzProblem, box: Box, largest_v: float) -> Reach:
+def box_limits(problem: ToeplitzProblem, box: Box, largest_v: float) -> BoxLimits:
     """Coordinates for a box and for shapes with v <= `largest_v`."""
     parts = _parts(problem, box, largest_v)
     least_v = sum(part.weight / part.highest for part in parts)
     narrow = all(part.radius <= _NARROW * (part.lowest + part.radius) for part in parts)
     scaling = _expanded(problem, box, parts) if narrow else _wide(problem, parts, largest_v)
-    return Reach(scaling, least_v, any(part.assumed for part in parts))
+    return BoxLimits(scaling, least_v, any(part.assumed for part in parts))
 
 
 def _parts(problem: ToeplitzProblem, box: Box, largest_v: float) -> list[_Part]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inputdesign_cli.design.regression.steps import Region, step
-from inputdesign_cli.design.regression.toeplitz import Shape, ToeplitzProblem, Weight
+from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 
 _MAX_STEPS = 60
 _SMALLEST_RADIUS = 1e-9
@@ -33,7 +33,7 @@ class Goal:
     target: float | None = None
     biased: bool = True
 
-    def value(self, shape: Shape) -> float:
+    def value(self, shape: Autocorrelations) -> float:
         """What is minimised: the error, or 1 / kappa (the energy but for a factor); infinite if not met."""
         if self.kappa is not None:
             return Weight(self.kappa, self.biased)(shape)
@@ -42,7 +42,7 @@ class Goal:
         return shape.v / slack if slack > 0.0 else np.inf
 
     def weight(self, value: float) -> Weight:
-        """The convexified goal at a value that is reached: least error at that energy (Dinkelbach)."""
+        """The convexified goal at a value that is reached: least error at that energy, [dinkelbach-1967]."""
         return Weight(self.kappa if self.kappa is not None else 1.0 / value, self.biased)
 
 
@@ -54,8 +54,14 @@ class Counter:
 
 
 def descend(
-    problem: ToeplitzProblem, region: Region, goal: Goal, start: Shape, *, tolerance: float, counter: Counter
-) -> Shape:
+    problem: ToeplitzProblem,
+    region: Region,
+    goal: Goal,
+    start: Autocorrelations,
+    *,
+    tolerance: float,
+    counter: Counter,
+) -> Autocorrelations:
     """A local minimum of the goal from `start`; it may miss the target if no feasible shape was met."""
     shape = start
     if not np.isfinite(goal.value(shape)):
@@ -90,14 +96,14 @@ def descend(
 def _trust_region(
     problem: ToeplitzProblem,
     region: Region,
-    shape: Shape,
-    weight_at: Callable[[Shape], Weight],
-    value: Callable[[Shape], float],
+    shape: Autocorrelations,
+    weight_at: Callable[[Autocorrelations], Weight],
+    value: Callable[[Autocorrelations], float],
     *,
     tolerance: float,
     counter: Counter,
-    until: Callable[[Shape], bool] = lambda _: False,
-) -> Shape:
+    until: Callable[[Autocorrelations], bool] = lambda _: False,
+) -> Autocorrelations:
     radius = 0.5
     for _ in range(_MAX_STEPS):
         if until(shape):
@@ -115,7 +121,7 @@ def _trust_region(
         predicted = now - model
         if predicted <= tolerance * now:
             break
-        trial = problem.shape(rho)
+        trial = problem.evaluate(rho)
         gained = now - weight(trial) if trial is not None else -np.inf
         if trial is not None and gained > 0.0 and value(trial) < value(shape):
             shape = trial
@@ -128,17 +134,17 @@ def _trust_region(
     return shape
 
 
-def starts(problem: ToeplitzProblem, count: int, rng: np.random.Generator) -> list[Shape]:
+def starts(problem: ToeplitzProblem, count: int, rng: np.random.Generator) -> list[Autocorrelations]:
     """White, and random shapes of a few lines over a little white noise."""
-    shapes = [problem.shape(np.eye(problem.n)[0])]
+    shapes = [problem.evaluate(np.eye(problem.n)[0])]
     for _ in range(count):
         lines = rng.integers(1, problem.n + 1)
         power = rng.dirichlet(np.ones(lines))
         rho = np.cos(np.arange(problem.n)[:, None] * np.pi * rng.random(lines)) @ power
-        shapes.append(problem.shape(0.9 * rho + 0.1 * np.eye(problem.n)[0]))
+        shapes.append(problem.evaluate(0.9 * rho + 0.1 * np.eye(problem.n)[0]))
     return [shape for shape in shapes if shape is not None]
 
 
-def best(shapes: Sequence[Shape], goal: Goal) -> Shape:
+def best(shapes: Sequence[Autocorrelations], goal: Goal) -> Autocorrelations:
     """The shape of least value; among those that miss the target the one of least bias."""
     return min(shapes, key=lambda s: (goal.value(s), s.bias_squared))

@@ -1,7 +1,7 @@
 """A linear regression of which some regressors are neglected, and the error that its moments buy.
 
 y = phi_1^T theta_1 + phi_2^T theta_2 + v; only theta_1 is estimated, by least squares on phi_1. The
-quantity of interest is L1^T theta_1 + L2^T theta_2 (MSE paper, Section 2).
+quantity of interest is L1^T theta_1 + L2^T theta_2 ([eckhard-mse], Section 2).
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Regression:
         return R[self.m :, : self.m] @ self._weights(R) - self.neglected
 
     def error(self, R: Array) -> ErrorSplit:
-        """The worst mean-squared error that the moments R (n, n) buy (MSE paper, (6), (33), (34)).
+        """The worst mean-squared error that the moments R (n, n) buy [eckhard-mse] (6), (33), (34).
 
         Infinite when R11 does not excite all of L1.
         """

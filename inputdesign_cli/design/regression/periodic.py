@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.design.regression.local import Counter, Goal, descend
 from inputdesign_cli.design.regression.model import Regression
 from inputdesign_cli.design.regression.steps import line_shapes
-from inputdesign_cli.design.regression.structured import Units
+from inputdesign_cli.design.regression.structured import Normalisation
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from inputdesign_cli.plant.polynomial import Array
 
@@ -57,13 +57,13 @@ def design_periodic(
         return PeriodicDesign(shares, fitted, energy, True)
     chosen = _candidates(shares)
     region = line_shapes(problem, lines[chosen])
-    units = Units(regression)
+    norm = Normalisation(regression)
     goal = Goal(
-        kappa=units.kappa(energy) if target is None else None,
-        target=None if target is None else target / units.error,
+        kappa=norm.kappa(energy) if target is None else None,
+        target=None if target is None else target / norm.error,
         biased=problem.biased,
     )
-    start = problem.shape(fitted)
+    start = problem.evaluate(fitted)
     shape = None
     if start is not None:
         shape = descend(problem, region, goal, start, tolerance=_STEP_TOLERANCE, counter=Counter())
@@ -73,7 +73,7 @@ def design_periodic(
     full[chosen] = _fit(shape.rho, lines[chosen])
     value = goal.value(shape)
     if target is not None and np.isfinite(value):
-        energy = units.energy(1.0 / value)
+        energy = norm.energy(1.0 / value)
     return PeriodicDesign(full, shape.rho, energy, False)
 
 

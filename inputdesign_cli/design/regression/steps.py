@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from inputdesign_cli.design.conic import Block, solve_conic
-from inputdesign_cli.design.regression.toeplitz import Shape, ToeplitzProblem, Weight
+from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec
 
@@ -56,7 +56,7 @@ def line_shapes(problem: ToeplitzProblem, frequencies: Array) -> Region:
 
 
 def step(
-    problem: ToeplitzProblem, region: Region, weight: Weight, at: Shape, radius: float
+    problem: ToeplitzProblem, region: Region, weight: Weight, at: Autocorrelations, radius: float
 ) -> tuple[Array, float] | None:
     """The best shape within `radius` of `at` for linearised bias and exact variance, and its model value.
 
@@ -71,7 +71,7 @@ def step(
 def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | None:
     """The best rho that begins with `head` (m,): the bias is then linear and the variance fixed.
 
-    This is the first half of the paper's alternation (R11 fixed).
+    This is the first half of the alternation of [eckhard-mse] (R11 fixed).
     """
     m = problem.m
     u = problem.weights(scipy.linalg.toeplitz(head))
@@ -85,8 +85,8 @@ def extend(problem: ToeplitzProblem, weight: Weight, head: Array) -> Array | Non
     return None if found is None else found[0]
 
 
-def rescale(problem: ToeplitzProblem, weight: Weight, at: Shape) -> Array | None:
-    """The best rho with the same Z = R11^-1 R12 as `at`: the second half of the paper's alternation.
+def rescale(problem: ToeplitzProblem, weight: Weight, at: Autocorrelations) -> Array | None:
+    """The best rho with the same Z = R11^-1 R12 as `at`: the second half of the alternation.
 
     Z fixed makes R11 Z = R12 linear, n - m equations for each of the m rows. Where they leave no
     freedom but the scale, which no shape has, `at` itself is returned.

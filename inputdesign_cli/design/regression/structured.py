@@ -9,21 +9,22 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from inputdesign_cli.design.regression.branch import Search
+from inputdesign_cli.design.regression.alternating import alternate
+from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.design.regression.local import Counter, Goal, best, descend, starts
 from inputdesign_cli.design.regression.model import ErrorSplit, Regression
 from inputdesign_cli.design.regression.steps import Region, all_shapes, extend
-from inputdesign_cli.design.regression.toeplitz import Shape, ToeplitzProblem, Weight
+from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 from inputdesign_cli.plant.polynomial import Array
 
 _STEP_TOLERANCE = 1e-10
 _NODES = {1: 400, 2: 400, 3: 400}
 _NODES_BEYOND = 100  # the boxes of m >= 4 are many and dear, and more of them close little
 _FAINT = 1e-5  # powers of lines below this share, in a design that is flat there
-OUT_OF_REACH = (1e6, 1e4, 1e2)
-"""A target is out of reach if no energy up to so many times n sigma^2 |L1|^2 / gamma is enough; the
-largest of these for which the proof closes counts."""
+# A target is out of reach if no energy up to so many times n sigma^2 |L1|^2 / gamma is enough; the largest
+# of these for which the proof closes counts.
+_PROVED_MULTIPLES = (1e6, 1e4, 1e2)
 
 
 class OutOfReachError(Exception):
@@ -31,13 +32,13 @@ class OutOfReachError(Exception):
 
     Attributes:
         bias: |b| / |L1| of the least biased shape that was found.
-        reach: the multiple of n sigma^2 |L1|^2 / gamma up to which it is proved; 0 if it is not.
+        proved: the multiple of n sigma^2 |L1|^2 / gamma up to which it is proved; 0 if it is not.
         assumed: whether the proof takes R11 / r_0 >= SMALLEST_EIGENVALUE.
     """
 
-    def __init__(self, bias: float, reach: float, assumed: bool) -> None:
+    def __init__(self, bias: float, proved: float, assumed: bool) -> None:
         super().__init__("the target is out of reach")
-        self.bias, self.reach, self.assumed = bias, reach, assumed
+        self.bias, self.proved, self.assumed = bias, proved, assumed
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class ToeplitzDesign:
 
 
 @dataclass(frozen=True)
-class Units:
+class Normalisation:
     """From the units of `ToeplitzProblem` to those of the regression."""
 
     regression: Regression
@@ -93,7 +94,7 @@ def design_toeplitz(
     most_nodes: int | None = None,
     count: int = 8,
     rng: np.random.Generator,
-    search: Callable[[ToeplitzProblem, Goal, Shape, Counter], Shape] | None = None,
+    alternating: bool = False,
 ) -> ToeplitzDesign:
     """Sequential convex programming from several starts, then branch and bound.
 
@@ -102,23 +103,23 @@ def design_toeplitz(
         energy: the trace of R; the error is minimised.
         tolerance: the relative gap to be proved; larger gaps are proved where it cannot be.
         most_nodes: how many boxes the proof may bound; None: what takes seconds.
-        search: another local method, run from white; its design is kept as it is and only the bound
-            comes from here.
+        alternating: the paper's alternation, run from white, in place of sequential convex programming;
+            its design is kept as it is and only the bound comes from here.
 
     Raises:
         OutOfReachError: no energy meets the target.
     """
-    problem, units = ToeplitzProblem.of(regression), Units(regression)
+    problem, norm = ToeplitzProblem.of(regression), Normalisation(regression)
     if most_nodes is None:
         most_nodes = _NODES.get(problem.m, _NODES_BEYOND)
     goal = Goal(
-        kappa=None if energy is None else units.kappa(energy),
-        target=None if target is None else target / units.error,
+        kappa=None if energy is None else norm.kappa(energy),
+        target=None if target is None else target / norm.error,
         biased=problem.biased,
     )
     counter = Counter()
-    if search is not None:
-        found = [search(problem, goal, starts(problem, 0, rng)[0], counter)]
+    if alternating:
+        found = [alternate(problem, goal, starts(problem, 0, rng)[0], counter)]
     else:
         region = all_shapes(problem)
         found = [
@@ -128,35 +129,35 @@ def design_toeplitz(
     shape = best(found, goal)
     if not np.isfinite(goal.value(shape)):
         raise _out_of_reach(problem, goal, shape, most_nodes)
-    proof = _Proof(problem, goal, shape, counter, keep=search is not None)
+    proof = _Proof(problem, goal, shape, counter, keep=alternating)
     bound = proof.run(tolerance, most_nodes)
-    if search is None:
+    if not alternating:
         proof.shape = _tidied(problem, goal, _least_biased(problem, proof.shape))
-    spent = energy if energy is not None else units.energy(1.0 / goal.value(proof.shape))
+    spent = energy if energy is not None else norm.energy(1.0 / goal.value(proof.shape))
     R = scipy.linalg.toeplitz(proof.shape.rho) * (spent / problem.n)
     return ToeplitzDesign(
         R=R,
         rho=proof.shape.rho,
         energy=spent,
         split=regression.error(R),
-        bound=bound * units.error if energy is not None else units.energy(1.0 / bound) if bound > 0 else 0.0,
-        assumed=SMALLEST_EIGENVALUE if proof.search.assumed else 0.0,
+        bound=bound * norm.error if energy is not None else norm.energy(1.0 / bound) if bound > 0 else 0.0,
+        assumed=SMALLEST_EIGENVALUE if proof.tree.assumed else 0.0,
         starts=len(found),
         solves=counter.solves,
-        nodes=proof.search.nodes,
+        nodes=proof.tree.nodes,
     )
 
 
-def _least_biased(problem: ToeplitzProblem, shape: Shape) -> Shape:
+def _least_biased(problem: ToeplitzProblem, shape: Autocorrelations) -> Autocorrelations:
     """Without alpha the bias is free: of the shapes with this R11 the least biased, the limit alpha -> 0."""
     if problem.biased or problem.n == problem.m:
         return shape
     rho = extend(replace(problem, biased=True), Weight(1.0), shape.rho[: problem.m])
-    trial = None if rho is None else problem.shape(rho)
+    trial = None if rho is None else problem.evaluate(rho)
     return shape if trial is None else trial
 
 
-def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Shape) -> Shape:
+def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations) -> Autocorrelations:
     """The same design on lines at multiples of 15 degrees, if it is no worse for it.
 
     An optimum is flat, so a search knows rho only to the root of its tolerance; a constant or
@@ -168,7 +169,7 @@ def _tidied(problem: ToeplitzProblem, goal: Goal, shape: Shape) -> Shape:
     powers[powers < _FAINT] = 0.0
     if residual > _FAINT or not powers.any():
         return shape
-    trial = problem.shape(columns @ powers / powers.sum())
+    trial = problem.evaluate(columns @ powers / powers.sum())
     if trial is None or not goal.value(trial) <= goal.value(shape) * (1.0 + _STEP_TOLERANCE):
         return shape
     return trial
@@ -178,13 +179,13 @@ class _Proof:
     """Bounds the goal from below while the incumbent may still improve."""
 
     def __init__(
-        self, problem: ToeplitzProblem, goal: Goal, shape: Shape, counter: Counter, *, keep: bool
+        self, problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations, counter: Counter, *, keep: bool
     ) -> None:
         self.problem, self.goal, self.shape, self.counter = problem, goal, shape, counter
         self.keep = keep
         self.challenger = shape
         self.region: Region = all_shapes(problem)
-        self.search = Search.start(problem)
+        self.tree = BranchAndBound.start(problem)
 
     def run(self, tolerance: float, most_nodes: int) -> float:
         """The lower bound on the goal's value."""
@@ -192,7 +193,7 @@ class _Proof:
         if goal.kappa is not None:
             kappa = goal.kappa
             self._prove(lambda: kappa, lambda: kept * self._value(), most_nodes)
-            return self.search.bound
+            return self.tree.bound
         assert goal.target is not None
         target = goal.target
         # Nothing beats `kept` times the incumbent if at that energy all errors exceed the target.
@@ -200,7 +201,7 @@ class _Proof:
             return kept * self._value()
         # At any smaller energy the error has grown by the variance at least.
         kappa = 1.0 / (kept * self._value())
-        missing = target - max(self.search.bound, 0.0)
+        missing = target - max(self.tree.bound, 0.0)
         return 1.0 / (kappa + missing / least_variance(self.problem))
 
     def _value(self) -> float:
@@ -210,18 +211,18 @@ class _Proof:
         def largest_v() -> float:
             return level() / kappa()
 
-        return self.search.prove(
+        return self.tree.prove(
             kappa, level, largest_v=largest_v, most_nodes=most_nodes, suggest=self._suggest
         )
 
     def _suggest(self, rho: Array) -> None:
         weight = self.goal.weight(self._value())
-        start = self.problem.shape(rho)
+        start = self.problem.evaluate(rho)
         if start is None:
             return
         self.counter.solves += 1
         extended = extend(self.problem, weight, start.rho[: self.problem.m])
-        trial = None if extended is None else self.problem.shape(extended)
+        trial = None if extended is None else self.problem.evaluate(extended)
         if trial is None or weight(trial) >= weight(self.challenger) * (1.0 - 1e-12):
             return
         self.challenger = descend(
@@ -231,17 +232,19 @@ class _Proof:
             self.shape = self.challenger
 
 
-def _out_of_reach(problem: ToeplitzProblem, goal: Goal, shape: Shape, most_nodes: int) -> OutOfReachError:
-    """Prove that the error stays above the target for all energies up to one of `OUT_OF_REACH`."""
+def _out_of_reach(
+    problem: ToeplitzProblem, goal: Goal, shape: Autocorrelations, most_nodes: int
+) -> OutOfReachError:
+    """Prove that the error stays above the target for all energies up to one of `_PROVED_MULTIPLES`."""
     assert goal.target is not None
     target = goal.target
     bias = float(np.sqrt(shape.bias_squared))
-    for reach in OUT_OF_REACH:
-        search = Search.start(problem)
-        if search.prove(
-            _always(target / reach), _always(target), largest_v=_always(reach), most_nodes=most_nodes
+    for multiple in _PROVED_MULTIPLES:
+        proof = BranchAndBound.start(problem)
+        if proof.prove(
+            _always(target / multiple), _always(target), largest_v=_always(multiple), most_nodes=most_nodes
         ):
-            return OutOfReachError(bias, reach, search.assumed)
+            return OutOfReachError(bias, multiple, proof.assumed)
     return OutOfReachError(bias, 0.0, False)
 
 
@@ -256,7 +259,7 @@ def least_variance(problem: ToeplitzProblem) -> float:
     spectrum of the shape. The y of the least v that is found is taken.
     """
     head = ToeplitzProblem(problem.first, np.zeros(0), biased=False)
-    white = head.shape(np.eye(head.n)[0])
+    white = head.evaluate(np.eye(head.n)[0])
     assert white is not None
     shape = descend(
         head,

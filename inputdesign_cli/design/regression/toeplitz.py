@@ -26,7 +26,7 @@ _OUTSIDE = 1e-7
 
 
 @dataclass(frozen=True)
-class Shape:
+class Autocorrelations:
     """What the autocorrelations `rho` (n,) with rho_0 = 1 cost and give."""
 
     rho: Array
@@ -97,14 +97,14 @@ class ToeplitzProblem:
             symmetric = np.hstack([symmetric, centre])
         return (symmetric, skew) if half else (symmetric,)
 
-    def shape(self, rho: Array) -> Shape | None:
+    def evaluate(self, rho: Array) -> Autocorrelations | None:
         """The shape of autocorrelations, made positive semidefinite; None if L1 is not excited."""
         rho = _inside(rho)
         P = scipy.linalg.toeplitz(rho)
         u = self.weights(P)
         if u is None:
             return None
-        return Shape(rho, P[self.m :, : self.m] @ u - self.second, float(self.first @ u))
+        return Autocorrelations(rho, P[self.m :, : self.m] @ u - self.second, float(self.first @ u))
 
     def weights(self, P: Array) -> Array | None:
         """(m,): u with P11 u = L1, of least norm; None if there is none, to rounding."""
@@ -135,7 +135,7 @@ class Weight:
     kappa: float
     biased: bool = True
 
-    def __call__(self, shape: Shape) -> float:
+    def __call__(self, shape: Autocorrelations) -> float:
         bias = shape.bias_squared if self.biased else 0.0
         return bias + self.kappa * shape.v
 

@@ -1,10 +1,10 @@
-"""Checks across sections. Each is a function of the spec that yields findings with absolute paths."""
+"""Checks across sections. Each is a function of the spec that yields diagnostics with absolute paths."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from inputdesign_cli.specification.checks import goal, plant, size
+from inputdesign_cli.specification.checks import goal, loop, plant, regression, simulation, size
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.places import Path, parse_key
@@ -14,22 +14,22 @@ Check = Callable[[Spec], Iterator[PathDiagnostic]]
 # What each check reads. It is skipped where one of these could not be read: its answer would mislead.
 CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (plant.stable_unless_controlled, ("plant", "experiment.controller")),
-    (plant.controller_fits, ("plant", "experiment.controller")),
-    (plant.kept_loop_fits, ("plant", "accuracy.model_error.sensitivity")),
+    (loop.controller_fits, ("plant", "experiment.controller")),
+    (loop.kept_loop_fits, ("plant", "accuracy.model_error.sensitivity")),
     (plant.noise_fits, ("plant", "noise")),
-    (plant.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
-    (plant.true_noise_fits, ("plant", "simulation.noise")),
+    (simulation.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
+    (simulation.true_noise_fits, ("plant", "simulation.noise")),
     (plant.spectrum_fits, ("plant", "spectrum.type")),
-    (plant.regression_fits, ("plant", "accuracy.mean_squared_error")),
+    (regression.regression_fits, ("plant", "accuracy.mean_squared_error")),
     (plant.weights_fit, ("plant.sample", "plant.continuous")),
-    (plant.control_fits, ("plant", "accuracy.closed_loop_error")),
+    (loop.control_fits, ("plant", "accuracy.closed_loop_error")),
     (size.channels, ("plant",)),
     (size.bands, ("plant.sample", "sample_time", "plant.continuous")),
     (size.frequencies, ("plant.sample", "sample_time", "limits.band")),
     (goal.something_asked, ("accuracy", "spectrum.given", "objective")),
     (goal.goals_agree, ("accuracy", "spectrum.given", "objective")),
     (goal.limits_present, ("accuracy", "limits", "objective", "spectrum.given", "plant")),
-    (goal.sensitivity_has_loop, ("experiment.controller", "accuracy.model_error.sensitivity")),
+    (loop.sensitivity_has_loop, ("experiment.controller", "accuracy.model_error.sensitivity")),
     (goal.lengths_agree, ("experiment.samples", "limits.samples", "objective")),
 )
 
@@ -40,10 +40,15 @@ def related(path: Path, broken: Iterable[Path]) -> bool:
 
 
 def run_checks(spec: Spec, broken: set[Path]) -> list[PathDiagnostic]:
-    """All findings of all checks whose inputs could be read."""
+    """What all checks find whose inputs could be read.
+
+    Args:
+        spec: The spec, which is valid section by section.
+        broken: The paths of what could not be read.
+    """
     return [
-        finding
+        found
         for check, reads in CHECKS
         if not any(related(parse_key(key), broken) for key in reads)
-        for finding in check(spec)
+        for found in check(spec)
     ]

@@ -88,20 +88,6 @@ def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
         )
 
 
-def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A sensitivity is that of a loop."""
-    error = spec.accuracy.model_error
-    if error is None or error.sensitivity is None or error.sensitivity.controller is not None:
-        return
-    if not spec.closed_loop:
-        yield PathDiagnostic(
-            "needs-controller",
-            "{key} is that of a control loop, but there is no controller",
-            "add experiment.controller, or a controller beside it for the loop to be kept",
-            ("accuracy", "model_error", "sensitivity"),
-        )
-
-
 def lengths_agree(spec: Spec) -> Iterator[PathDiagnostic]:
     """The experiment is no longer than it may be."""
     most = spec.limits.samples

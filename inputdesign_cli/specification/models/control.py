@@ -15,7 +15,7 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import ContinuousMatrix
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.specification.models.section import Section, pick, tag
-from inputdesign_cli.specification.models.shapes import check_factors
+from inputdesign_cli.specification.models.shapes import check_each
 from inputdesign_cli.specification.models.transfer import (
     ContinuousTransfer,
     DiscreteTransfer,
@@ -30,7 +30,7 @@ class DiscreteMatrix(MatrixRatio, family="transfer", phrase="a transfer matrix i
 
     def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
         """Its poles lie inside the unit circle; `path` leads to the matrix."""
-        yield from check_factors(self.denominator, check_delay_stable, *path)
+        yield from check_each(self.denominator, check_delay_stable, *path, "denominator")
 
 
 class ContinuousTarget(ContinuousMatrix):

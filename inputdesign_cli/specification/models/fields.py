@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry, fail
 from inputdesign_cli.specification.models.polynomials import (
     Polynomial,
     check_delay_stable,
@@ -50,7 +50,7 @@ def holds(check: Callable[[Polynomial], PathDiagnostic | None]) -> AfterValidato
 
     def checked(polynomial: Polynomial) -> Polynomial:
         if found := check(polynomial):
-            raise fail(found)
+            raise carry(found)
         return polynomial
 
     return AfterValidator(checked)
@@ -61,7 +61,7 @@ def nested(levels: int, what: str, hint: str) -> BeforeValidator:
 
     def check(value: object) -> object:
         if depth(value) != levels:
-            raise fail(PathDiagnostic("wrong-shape", f"{{key}} must be {what}", hint))
+            raise fail("wrong-shape", f"{{key}} must be {what}", hint)
         return value
 
     return BeforeValidator(check)

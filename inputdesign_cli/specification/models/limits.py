@@ -128,7 +128,7 @@ class Limits(Section):
 
 
 def _some(limit: Section, first: str, second: str, example: str) -> Iterator[PathDiagnostic]:
-    if not limit.model_dump(exclude_none=True):
+    if not limit.stated(first, second):
         message, hint = f"{{key}} needs {first} or {second}", f"write a number, or {example}"
         yield PathDiagnostic("missing-key", message, hint, keys=(first, second))
 

@@ -43,6 +43,11 @@ class PathDiagnostic:
         return Diagnostic(self.code, message, hint, key, location)
 
 
-def fail(*diagnostics: PathDiagnostic) -> PydanticCustomError:
+def carry(*diagnostics: PathDiagnostic) -> PydanticCustomError:
     """The pydantic error that carries the diagnostics; a validator raises it."""
     return PydanticCustomError(CARRIER, CARRIER, {CARRIER: diagnostics})
+
+
+def fail(code: str, message: str, hint: str = "") -> PydanticCustomError:
+    """The pydantic error of one diagnostic about the value at hand."""
+    return carry(PathDiagnostic(code, message, hint))

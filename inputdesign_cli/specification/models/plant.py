@@ -22,7 +22,7 @@ from inputdesign_cli.specification.models.polynomials import Polynomial, check_l
 from inputdesign_cli.specification.models.section import Section, pick, tag
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
-    check_factors,
+    check_each,
     check_gain,
     check_proper,
     check_shapes,
@@ -120,7 +120,7 @@ class ContinuousMatrix(Section):
         if shapes := list(check_shapes(self.numerator, self.denominator)):
             yield from shapes
             return
-        yield from check_factors(self.denominator, check_left_half_plane)
+        yield from check_each(self.denominator, check_left_half_plane, "denominator")
         for i, row in enumerate(self.numerator_matrix):
             for j, entry in enumerate(row):
                 where = (i, j) if depth(self.numerator) == 3 else ()

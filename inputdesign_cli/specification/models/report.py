@@ -8,18 +8,16 @@ from pydantic import BeforeValidator, Field
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import Name, Several
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.path_diagnostic import fail
 from inputdesign_cli.specification.models.section import Section
 
 
 def _pair(value: object) -> object:
     if isinstance(value, list | tuple) and (len(value) != 2 or value[0] == value[1]):
         raise fail(
-            PathDiagnostic(
-                "wrong-shape",
-                "{key} must hold two different parameters, which span the plane of the ellipse",
-                'write a pair, such as ["b1", "f1"] or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
-            )
+            "wrong-shape",
+            "{key} must hold two different parameters, which span the plane of the ellipse",
+            'write a pair, such as ["b1", "f1"] or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
         )
     return value
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
 from pydantic_core import core_schema
 
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
 
 TAG = "\x00"
 """Marks the tags that pydantic puts into the path of an error inside a union; they are not keys."""
@@ -46,7 +46,7 @@ class Section(BaseModel):
     @model_validator(mode="after")
     def _checked(self) -> Self:
         if found := tuple(self.check()):
-            raise fail(*found)
+            raise carry(*found)
         return self
 
 

@@ -32,13 +32,13 @@ def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnosti
         )
 
 
-def check_factors(
-    denominator: tuple, check: Callable[[Polynomial], PathDiagnostic | None], *path: str
+def check_each(
+    value: tuple, check: Callable[[Polynomial], PathDiagnostic | None], *path: str
 ) -> Iterator[PathDiagnostic]:
-    """Every factor of the denominator at `path` passes the check."""
-    for indices, factor in with_paths(denominator):
-        if found := check(factor):
-            yield replace(found, path=(*path, "denominator", *indices))
+    """What the check finds in each polynomial of the value at `path`."""
+    for indices, polynomial in with_paths(value):
+        if found := check(polynomial):
+            yield replace(found, path=(*path, *indices))
 
 
 def denominators_of(numerator: tuple, denominator: tuple) -> PolynomialMatrix:

@@ -1,4 +1,4 @@
-"""The spec as a whole: the frozen object that the other rooms read."""
+"""The spec as a whole: the frozen object that tasks are built from."""
 
 from __future__ import annotations
 
@@ -108,7 +108,10 @@ class Spec(Section):
         return math.pi / self.sample_time if self.plant.sampled else math.inf
 
     def clip_band(self, band: tuple[float, float] | None) -> tuple[float, float]:
-        """The band within [0, nyquist]; None is all frequencies. 3.1416 for pi passes the checks."""
+        """The band within [0, nyquist] in rad per time unit; None stands for all frequencies.
+
+        The end needs a clip: the checks let 3.1416 pass for pi.
+        """
         low, high = band or (0.0, math.inf)
         return low, min(high, self.nyquist)
 
@@ -127,11 +130,11 @@ class Spec(Section):
         return places.location(places.mark(parse_key(key)))
 
     def resolve_path(self, name: str) -> Path:
-        """The path of a file that the spec names, relative to the folder of the spec."""
+        """The path of a file that the spec names: relative names start in the folder of the spec."""
         return self._source.folder / name
 
     def complain(self, code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
-        """A `SpecError` with a single diagnostic that points at `key`."""
+        """An error with a single diagnostic that points at the line of `key`, for the caller to raise."""
         return SpecError(Diagnostic(code, message, hint, key, self.locate(key)))
 
     def place(self, error: _Error) -> _Error:

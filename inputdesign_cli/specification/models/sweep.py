@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import Flag, Several
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.yaml.scalars import resolve
 
@@ -64,7 +64,7 @@ def _expanded(value: object) -> object:
     try:
         found = range_values(value)
     except SpecError as error:
-        raise fail(*(PathDiagnostic(d.code, d.message, d.hint) for d in error.diagnostics)) from None
+        raise carry(*(PathDiagnostic(d.code, d.message, d.hint) for d in error.diagnostics)) from None
     return value if found is None else tuple(resolve(text) for text in found)
 
 

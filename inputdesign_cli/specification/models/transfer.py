@@ -17,12 +17,12 @@ from inputdesign_cli.specification.models.polynomials import (
     product,
 )
 from inputdesign_cli.specification.models.section import Section, pick, tag
-from inputdesign_cli.specification.models.shapes import check_factors, check_proper
+from inputdesign_cli.specification.models.shapes import check_each, check_proper
 from inputdesign_cli.specification.models.values import PolynomialList, depth
 
 
 def factors_of(denominator: Polynomial | PolynomialList) -> PolynomialList:
-    """The factors of a denominator; one polynomial is its own only factor."""
+    """The factors of a denominator; a single polynomial is its own only factor."""
     return cast(PolynomialList, denominator if depth(denominator) == 2 else (denominator,))
 
 
@@ -52,7 +52,7 @@ class DiscreteTransfer(Ratio, family="transfer", phrase="a transfer function in 
 
     def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
         """Its poles lie inside the unit circle; `path` leads to the transfer function."""
-        yield from check_factors(self.denominator, check_delay_stable, *path)
+        yield from check_each(self.denominator, check_delay_stable, *path, "denominator")
 
 
 class ContinuousRatio(Ratio):
@@ -75,7 +75,9 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
 
     def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
         """Its poles lie in the left half plane; `path` leads to the transfer function."""
-        yield from check_factors(self.continuous.denominator, check_left_half_plane, *path, "continuous")
+        yield from check_each(
+            self.continuous.denominator, check_left_half_plane, *path, "continuous", "denominator"
+        )
 
 
 def transfer_kind(value: dict[str, Any]) -> str:

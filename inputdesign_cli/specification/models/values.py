@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.path_diagnostic import fail
 from inputdesign_cli.specification.models.polynomials import MAX_ORDER, Polynomial, product
 from inputdesign_cli.specification.wording import show
 
@@ -41,11 +41,9 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
     for before, after in pairwise(values):
         if not before < after:
             raise fail(
-                PathDiagnostic(
-                    "not-increasing",
-                    f"{{key}} must increase: {show(after)} follows {show(before)}",
-                    "sort the entries and remove repetitions",
-                )
+                "not-increasing",
+                f"{{key}} must increase: {show(after)} follows {show(before)}",
+                "sort the entries and remove repetitions",
             )
     return values
 
@@ -54,7 +52,7 @@ def two_frequencies(value: object) -> object:
     """A band has two ends."""
     if not isinstance(value, list | tuple) or len(value) != 2:
         message = "{key} must be two frequencies, [low, high]"
-        raise fail(PathDiagnostic("bad-band", message, "write [0.01, 3.0]"))
+        raise fail("bad-band", message, "write [0.01, 3.0]")
     return value
 
 
@@ -63,7 +61,7 @@ def ascending(band: tuple[float, float]) -> tuple[float, float]:
     low, high = band
     if not low < high:
         message = f"{{key}} must ascend: {show(low)} is not below {show(high)}"
-        raise fail(PathDiagnostic("bad-band", message, "write [low, high]"))
+        raise fail("bad-band", message, "write [low, high]")
     return band
 
 
@@ -72,11 +70,9 @@ def same_columns(rows: Nested) -> Nested:
     if len({len(row) for row in rows}) > 1:
         lengths = ", ".join(str(len(row)) for row in rows)
         raise fail(
-            PathDiagnostic(
-                "wrong-shape",
-                f"the rows of {{key}} must have the same number of columns (they have {lengths})",
-                "one row per output, one column per input; write [0] where an input has no effect",
-            )
+            "wrong-shape",
+            f"the rows of {{key}} must have the same number of columns (they have {lengths})",
+            "one row per output, one column per input; write [0] where an input has no effect",
         )
     return rows
 
@@ -88,10 +84,10 @@ def product_exists(denominator: Nested) -> Nested:
     order = sum(len(factor) - 1 for factor in denominator)
     if order > MAX_ORDER:
         message = f"{{key}} has order {order}; orders above {MAX_ORDER} are not supported"
-        raise fail(PathDiagnostic("bad-polynomial", message))
+        raise fail("bad-polynomial", message)
     if not np.all(np.isfinite(product(denominator))):
         message = "the product of the factors of {key} is too large"
-        raise fail(PathDiagnostic("bad-polynomial", message, "rescale the factors"))
+        raise fail("bad-polynomial", message, "rescale the factors")
     return denominator
 
 
@@ -100,7 +96,7 @@ def symmetric(rows: Matrix) -> Matrix:
     for row in rows:
         if len(row) != len(rows):
             message = f"it has {len(rows)} rows, and one of them has {len(row)} entries"
-            raise fail(PathDiagnostic("wrong-shape", f"{{key}} must be square: {message}"))
+            raise fail("wrong-shape", f"{{key}} must be square: {message}")
     scale = max(abs(x) for row in rows for x in row)
     for i, row in enumerate(rows):
         for j in range(i):
@@ -109,7 +105,7 @@ def symmetric(rows: Matrix) -> Matrix:
                     f"{{key}} is not symmetric: entry ({i + 1}, {j + 1}) is {show(row[j])} "
                     f"but ({j + 1}, {i + 1}) is {show(rows[j][i])}"
                 )
-                raise fail(PathDiagnostic("not-symmetric", message))
+                raise fail("not-symmetric", message)
     return rows
 
 
@@ -117,7 +113,7 @@ def semidefinite(rows: Matrix) -> Matrix:
     """A symmetric matrix has no negative eigenvalue beyond rounding."""
     if _smallest_eigenvalue(rows) < -1e-9:
         message = "{key} must be positive semidefinite"
-        raise fail(PathDiagnostic("not-positive-definite", message, "check the signs of its entries"))
+        raise fail("not-positive-definite", message, "check the signs of its entries")
     return rows
 
 
@@ -125,12 +121,9 @@ def positive_definite(rows: Matrix) -> Matrix:
     """A covariance matrix has positive eigenvalues."""
     if _smallest_eigenvalue(rows) <= 0.0:
         raise fail(
-            PathDiagnostic(
-                "not-positive-definite",
-                "{key} is not a covariance matrix: it must be positive definite",
-                "each variance must be positive, and each covariance below the geometric mean of its "
-                "variances",
-            )
+            "not-positive-definite",
+            "{key} is not a covariance matrix: it must be positive definite",
+            "each variance must be positive, and each covariance below the geometric mean of its variances",
         )
     return rows
 

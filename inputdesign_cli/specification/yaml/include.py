@@ -20,9 +20,8 @@ def apply_includes(tree: Tree, folder: FilePath) -> None:
 
     A key that stands in both becomes a diagnostic of the tree.
 
-    Raises
-    ------
-    SpecError : a name that is no text, or a file that cannot be read, holds no blocks or includes others.
+    Raises:
+        SpecError: A name is no text, or a file cannot be read, holds no blocks or includes others.
     """
     if not isinstance(tree.data, dict) or KEY not in tree.data:
         return

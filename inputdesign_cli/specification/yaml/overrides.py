@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.specification.yaml.include import KEY, apply_includes
+from inputdesign_cli.specification.yaml.nodes import MAX_DEPTH
 from inputdesign_cli.specification.yaml.places import Mark, Path, format_key, parse_key
-from inputdesign_cli.specification.yaml.reader import MAX_DEPTH, Tree, read
+from inputdesign_cli.specification.yaml.reader import Tree, read
 
 
 def compose(tree: Tree, folder: FilePath, overrides: Sequence[str]) -> None:
@@ -20,7 +22,7 @@ def compose(tree: Tree, folder: FilePath, overrides: Sequence[str]) -> None:
     apply_overrides(tree, [override for override in overrides if override not in first])
 
 
-def apply_overrides(tree: Tree, overrides: list[str]) -> None:
+def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
     """Apply each `key.path=value` to the tree, in order; `null` as the value removes the key.
 
     A wrong override becomes a diagnostic of the tree. Missing mappings are created, so a misspelt key is
@@ -28,68 +30,66 @@ def apply_overrides(tree: Tree, overrides: list[str]) -> None:
     """
     for override in overrides:
         try:
-            _apply(tree, override)
+            _apply(tree, _Override(override))
         except SpecError as error:
             tree.diagnostics.extend(error.diagnostics)
 
 
-def _apply(tree: Tree, override: str) -> None:
-    file = f"--set {override}"
-    key, equals, text = override.partition("=")
-    path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(key.strip()))
+@dataclass(frozen=True)
+class _Override:
+    text: str
+
+    @property
+    def source(self) -> str:
+        """The name it goes by in diagnostics."""
+        return f"--set {self.text}"
+
+    def error(self, message: str, hint: str, column: int = 1) -> SpecError:
+        """What is wrong with it, at a column of its text."""
+        first = self.text.splitlines()[0] if self.text else ""
+        return SpecError(
+            Diagnostic("bad-override", message, hint, location=Location(self.source, 1, column, first))
+        )
+
+
+def _apply(tree: Tree, override: _Override) -> None:
+    key, equals, text = override.text.partition("=")
+    name = key.strip()
+    path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(name))
     if not equals or not path or "" in path or not key.isprintable():
-        raise _error(
-            file,
-            override,
-            1,
-            f"{override!r} is not of the form key.path=value",
-            "write --set noise.variance=0.5",
-        )
+        message = f"{override.text!r} is not of the form key.path=value"
+        raise override.error(message, "write --set noise.variance=0.5")
     if len(path) > MAX_DEPTH:
-        raise _error(file, override, 1, "the key has too many steps", "no key has more than six")
+        raise override.error("the key has too many steps", "no key has more than six")
     if not text.strip():
-        raise _error(
-            file,
-            override,
-            len(key) + 2,
-            f"no value is given for {key.strip()}",
-            f"write {key.strip()}=VALUE, or {key.strip()}=null to remove the key",
-        )
+        hint = f"write {name}=VALUE, or {name}=null to remove the key"
+        raise override.error(f"no value is given for {name}", hint, len(key) + 2)
     number = len(tree.places.sources)
-    where = _resolve(tree.data, path, file, override)
-    value = read(text, file, source=number, before=key + equals, at=where)
+    where = _resolve(tree.data, path, override)
+    value = read(text, override.source, source=number, before=key + equals, at=where)
     tree.places.sources.append(value.places.sources[0])
     _put(tree, where, value, Mark(number, 1, 1))
     tree.diagnostics.extend(value.diagnostics)
     tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
 
 
-def _resolve(data: Any, path: Path, file: str, override: str) -> Path:
+def _resolve(data: Any, path: Path, override: _Override) -> Path:
     """The path with digits turned into indices where the tree has a list."""
     found: list[str | int] = []
     for step in path:
+        above = format_key(found)
         if isinstance(data, list):
             index = int(step) if isinstance(step, int) or (step.isascii() and step.isdecimal()) else None
             if index is None or index >= len(data):
                 has = f"entries 0 to {len(data) - 1}" if data else "no entries"
-                raise _error(
-                    file,
-                    override,
-                    1,
-                    f"{format_key(found)} is a list with {has}; there is no entry {step}",
-                    f"give the whole list: --set {format_key(found)}=[..]",
-                )
+                message = f"{above} is a list with {has}; there is no entry {step}"
+                raise override.error(message, f"give the whole list: --set {above}=[..]")
             found.append(index)
             data = data[index]
             continue
         if data is not None and not isinstance(data, dict):
-            raise _error(
-                file,
-                override,
-                1,
-                f"{format_key(found)} is a single value, so it has no part {step}",
-                f"give the whole value: --set {format_key(found)}=..",
-            )
+            message = f"{above} is a single value, so it has no part {step}"
+            raise override.error(message, f"give the whole value: --set {above}=..")
         step = str(step)
         found.append(step)
         data = data.get(step) if isinstance(data, dict) else None
@@ -120,8 +120,3 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
 
 def _child(node: Any, step: str | int) -> Any:
     return node.get(step) if isinstance(node, dict) else node[step]
-
-
-def _error(file: str, override: str, column: int, message: str, hint: str) -> SpecError:
-    first = override.splitlines()[0] if override else ""
-    return SpecError(Diagnostic("bad-override", message, hint, location=Location(file, 1, column, first)))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import (
@@ -95,7 +95,7 @@ def _limits(spec: Spec) -> StatedLimits:
     )
 
 
-def _excitation(spec: Spec, stated: GivenSpectrum, experiment: ChannelExperiment) -> GivenExcitation:
+def _excitation(spec: Spec, stated: GivenSpectrum, experiment: Experiment) -> GivenExcitation:
     """The excitation that stands under `spectrum.given`.
 
     A power of white excitation is spread evenly over the channels unless there is one for each. The
@@ -143,14 +143,14 @@ def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
     return frequencies[there], amplitudes[there]
 
 
-def _recorded(spec: Spec, experiment: ChannelExperiment, given: GivenSignal) -> GivenExcitation:
+def _recorded(spec: Spec, experiment: Experiment, given: GivenSignal) -> GivenExcitation:
     samples = read_excitation_record(spec, given.signal, "spectrum.given.signal")
     plant = FiniteRecord(experiment, len(samples), record_step(spec))
     power: dict[PowerKind, list[float]] = {
         kind: plant.mean_squares(kind, samples).tolist() for kind in POWER_KINDS
     }
 
-    def information(coordinates: ChannelExperiment) -> Array:
+    def information(coordinates: Experiment) -> Array:
         return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
 
     return GivenExcitation("signal", power, information, samples=samples)

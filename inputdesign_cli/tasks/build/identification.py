@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.plant import ChannelModel
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import RegressionPlant, Spec, parse_spec
@@ -41,7 +41,7 @@ def build_identification(spec: Spec) -> Identification:
     )
 
 
-def _restated(spec: Spec, model: ChannelModel, source: str) -> Spec:
+def _restated(spec: Spec, model: Model, source: str) -> Spec:
     """The spec with another model in place of its nominal plant and noise."""
     return parse_spec(
         spec.to_yaml(),

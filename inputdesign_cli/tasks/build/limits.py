@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
 from inputdesign_cli.errors import DataError, Diagnostic
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment
+from inputdesign_cli.information import POWER_KINDS, Experiment
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
@@ -45,7 +45,7 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
     return limits
 
 
-def build_density_limits(spec: Spec, experiment: ChannelExperiment) -> list[DensityLimit]:
+def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:
     """Bounds on the density of the excitation at every frequency of its band.
 
     Raises:

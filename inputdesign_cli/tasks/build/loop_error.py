@@ -19,7 +19,7 @@ from inputdesign_cli.design.loop_error import (
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.least_squares import is_arx
-from inputdesign_cli.plant import PolynomialChannels, Rational, TransferMatrix, hold_entries, zero_order_hold
+from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix, hold_entries, zero_order_hold
 from inputdesign_cli.specification import (
     ClosedLoopError,
     ContinuousMatrixTransfer,
@@ -125,7 +125,7 @@ def _plant(
         )
     matrix = plant.continuous
     held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, spec.sample_time)
-    sampled = PolynomialChannels(
+    sampled = PolynomialModel(
         B=tuple(tuple(entry.numerator for entry in row) for row in held),
         A=(np.ones(1),),
         F=tuple(tuple(entry.denominator_polynomial for entry in row) for row in held),

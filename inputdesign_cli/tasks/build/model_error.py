@@ -17,8 +17,8 @@ from inputdesign_cli.accuracy import (
     active_entries,
 )
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
-from inputdesign_cli.information import ChannelExperiment
-from inputdesign_cli.plant import ChannelModel, Rational
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.specification import ModelError as StatedError
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
@@ -36,7 +36,7 @@ def confidence_factor(probability: float, parameters: int) -> float:
     return float(np.sqrt(2.0 * scipy.special.gammaincinv(parameters / 2.0, probability)))
 
 
-def model_error_alpha(spec: Spec, model: ChannelModel) -> float:
+def model_error_alpha(spec: Spec, model: Model) -> float:
     """alpha as given, or from the confidence and the number of parameters of G."""
     error = spec.accuracy.model_error
     if error is not None and error.alpha is not None:
@@ -46,7 +46,7 @@ def model_error_alpha(spec: Spec, model: ChannelModel) -> float:
 
 
 def required_band(
-    spec: Spec, experiment: ChannelExperiment, stated: tuple[float, float] | None
+    spec: Spec, experiment: Experiment, stated: tuple[float, float] | None
 ) -> tuple[float, float]:
     """The band of a requirement: as stated, or all frequencies, in continuous time those that are excited."""
     if not spec.plant.sampled:
@@ -55,7 +55,7 @@ def required_band(
     return lo * spec.sample_time, min(hi * spec.sample_time, float(np.pi))
 
 
-def build_model_errors(spec: Spec, experiment: ChannelExperiment) -> list[OnModelError]:
+def build_model_errors(spec: Spec, experiment: Experiment) -> list[OnModelError]:
     """`accuracy.model_error` in raw coordinates: one an entry of G that is not zero, or one of the norm.
 
     Empty when it is not asked for.
@@ -75,7 +75,7 @@ def build_model_errors(spec: Spec, experiment: ChannelExperiment) -> list[OnMode
     return [_on_entry(spec, error, experiment, band, entry) for entry in places]
 
 
-def unstated_errors(spec: Spec, experiment: ChannelExperiment) -> list[ModelError]:
+def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
     """What has r_u of every entry where no bound on it is stated; r_adm means nothing."""
     band, alpha = required_band(spec, experiment, None), model_error_alpha(spec, experiment.model)
     return [
@@ -87,7 +87,7 @@ def unstated_errors(spec: Spec, experiment: ChannelExperiment) -> list[ModelErro
 def _on_entry(
     spec: Spec,
     error: StatedError,
-    experiment: ChannelExperiment,
+    experiment: Experiment,
     band: tuple[float, float],
     entry: Entry | None,
 ) -> OnModelError:
@@ -113,7 +113,7 @@ def _on_entry(
     return made
 
 
-def _check_fraction(spec: Spec, model: ChannelModel, entry: Entry | None) -> None:
+def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
     """Raise `SpecError` (`not-supported`) unless the entry is a fraction affine in the parameters."""
     if entry is None:
         raise spec.complain(
@@ -136,7 +136,7 @@ def _check_fraction(spec: Spec, model: ChannelModel, entry: Entry | None) -> Non
 def _admissible(
     spec: Spec,
     error: StatedError,
-    model: ChannelModel,
+    model: Model,
     band: tuple[float, float],
     entry: Entry | None,
 ) -> AdmissibleError:
@@ -154,7 +154,7 @@ def _admissible(
     return _sensitivity(spec, error, model)
 
 
-def _sensitivity(spec: Spec, error: StatedError, model: ChannelModel) -> Sensitivity:
+def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
     asked = error.sensitivity
     given = None if asked is None else asked.controller or spec.experiment.controller
     if asked is None or given is None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from inputdesign_cli.accuracy import Criterion, InformationTarget, WeightedVariance, active_entries
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.design.convex.problem import RequirementFactory
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import build_model_errors, confidence_factor, required_band
@@ -21,7 +21,7 @@ from inputdesign_cli.tasks.build.weights import build_weight
 _RELATIVE_ZERO = 1e-9
 
 
-def build_requirements(spec: Spec, experiment: ChannelExperiment) -> list[RequirementFactory]:
+def build_requirements(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
     """One maker for each requirement that `accuracy` states, in the order of the contract.
 
     Requirements over frequency are made entry by entry of G.
@@ -49,7 +49,7 @@ def build_requirements(spec: Spec, experiment: ChannelExperiment) -> list[Requir
     return makers
 
 
-def build_criterion(spec: Spec, experiment: ChannelExperiment) -> RequirementFactory | None:
+def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | None:
     """`accuracy.criterion`, of the parameters or of their relative errors.
 
     Raises:
@@ -70,7 +70,7 @@ def build_criterion(spec: Spec, experiment: ChannelExperiment) -> RequirementFac
                 key="accuracy.scale",
             )
 
-    def make(coordinates: ChannelExperiment) -> Criterion:
+    def make(coordinates: Experiment) -> Criterion:
         factor = np.eye(coordinates.size) if coordinates.factor is None else coordinates.factor
         return Criterion(letter, scale[:, None] * factor)
 
@@ -93,7 +93,7 @@ def _target(
     return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
 
 
-def _weighted_variances(spec: Spec, experiment: ChannelExperiment) -> list[WeightedVariance]:
+def _weighted_variances(spec: Spec, experiment: Experiment) -> list[WeightedVariance]:
     """`accuracy.weighted_variance` of every entry of G that is not zero."""
     stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
     if stated is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Simulation as SimulationSection
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
@@ -12,7 +12,7 @@ from inputdesign_cli.tasks.build.true_system import build_true_system
 from inputdesign_cli.tasks.simulation import Simulation
 
 
-def build_simulation(spec: Spec, nominal: ChannelExperiment) -> Simulation:
+def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
     """What `simulate` needs besides the design or the given excitation.
 
     Args:

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.design.convex.problem import Weight
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord, PowerKind
+from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
-    ChannelLoop,
-    ChannelModel,
-    ContinuousChannels,
-    PolynomialChannels,
-    SampledChannels,
+    ContinuousModel,
+    Loop,
+    Model,
+    PolynomialModel,
+    SampledModel,
     TransferMatrix,
     close_loop,
 )
@@ -39,7 +39,7 @@ from inputdesign_cli.tasks.build.weights import rational
 _PRIOR = "experiment.prior.information"
 
 
-def build_model(spec: Spec) -> ChannelModel:
+def build_model(spec: Spec) -> Model:
     """The model of `plant` and `noise`.
 
     Raises:
@@ -58,13 +58,13 @@ def build_model(spec: Spec) -> ChannelModel:
                     key=f"noise.{name}",
                 )
             matrix = plant.continuous
-            continuous = ContinuousChannels.monic(
+            continuous = ContinuousModel.monic(
                 _reversed(matrix.numerator_matrix),
                 _reversed(matrix.denominator_matrix),
                 covariance,
                 common=depth(matrix.denominator) != 3,
             )
-            return SampledChannels(continuous, spec.sample_time) if plant.sampled else continuous
+            return SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
     raise spec.complain(
         "not-supported",
         "a regression has no dynamics to be estimated here",
@@ -73,9 +73,9 @@ def build_model(spec: Spec) -> ChannelModel:
     )
 
 
-def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Array) -> PolynomialChannels:
+def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Array) -> PolynomialModel:
     """A plant in q^-1; A, C and D that the spec states once are common to the outputs."""
-    return PolynomialChannels(
+    return PolynomialModel(
         B=_arrays(plant.B_matrix),
         A=rows_of(plant.A),
         F=_arrays(plant.F_matrix),
@@ -85,7 +85,7 @@ def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Arra
     )
 
 
-def build_experiment(spec: Spec) -> ChannelExperiment:
+def build_experiment(spec: Spec) -> Experiment:
     """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
     Raises:
@@ -96,11 +96,11 @@ def build_experiment(spec: Spec) -> ChannelExperiment:
     loop = None if controller is None else build_loop(model, controller)
     if loop is not None:
         loop.check_delay()
-    experiment = ChannelExperiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+    experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
     return replace(experiment, prior=_prior(spec, experiment))
 
 
-def build_loop(model: ChannelModel, controller: DiscreteTransfer | ControllerMatrix) -> ChannelLoop:
+def build_loop(model: Model, controller: DiscreteTransfer | ControllerMatrix) -> Loop:
     """The loop of a model that is sampled; a single transfer function is a controller of one entry.
 
     Raises:
@@ -167,7 +167,7 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
     return {kind: w for kind, w in weights.items() if np.any(np.asarray(w) > 0)}
 
 
-def _prior(spec: Spec, experiment: ChannelExperiment) -> Array | None:
+def _prior(spec: Spec, experiment: Experiment) -> Array | None:
     """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment."""
     prior = spec.experiment.prior
     if prior is None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import RegressionPlant, Spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
+from inputdesign_cli.tasks.build.regression import build_regression_task
 from inputdesign_cli.tasks.task import Task
 
 
@@ -17,6 +18,8 @@ def build_task(spec: Spec) -> Task:
     """
     if not spec.designs:
         return build_given(spec)
+    if isinstance(spec.plant, RegressionPlant):
+        return build_regression_task(spec)
     if spec.accuracy.closed_loop_error is not None:
         return build_loop_error_task(spec)
     return build_convex(spec)

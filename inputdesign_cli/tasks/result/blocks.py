@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import singledispatch
 
-from inputdesign_cli.plant import ChannelModel, ContinuousChannels, PolynomialChannels, SampledChannels
-from inputdesign_cli.plant.channels import Rows
+from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel, SampledModel
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.runs.results import Json
 
 Blocks = dict[str, dict[str, Json]]
 
 
 @singledispatch
-def blocks_of(model: ChannelModel) -> Blocks:
+def blocks_of(model: Model) -> Blocks:
     """`plant` and `noise` of a model; polynomials that are 1 are left out.
 
     Raises:
@@ -24,7 +24,7 @@ def blocks_of(model: ChannelModel) -> Blocks:
 
 
 @blocks_of.register
-def _(model: PolynomialChannels) -> Blocks:
+def _(model: PolynomialModel) -> Blocks:
     single = model.outputs == model.inputs == 1
     everything: dict[str, tuple[Json, bool]] = {
         "A": (_rows(model.A), _matter(model.A)),
@@ -39,7 +39,7 @@ def _(model: PolynomialChannels) -> Blocks:
 
 
 @blocks_of.register
-def _(model: ContinuousChannels) -> Blocks:
+def _(model: ContinuousModel) -> Blocks:
     below = _matrix(model.denominator, descending=True)
     i, j = model.active[0]
     matrix = {
@@ -50,23 +50,23 @@ def _(model: ContinuousChannels) -> Blocks:
 
 
 @blocks_of.register
-def _(model: SampledChannels) -> Blocks:
+def _(model: SampledModel) -> Blocks:
     blocks = blocks_of(model.continuous_plant)
     return {**blocks, "plant": {**blocks["plant"], "sample": "zoh"}}
 
 
 @singledispatch
-def predictor_of(model: ChannelModel) -> dict[str, list[Array]]:
+def predictor_of(model: Model) -> dict[str, list[Array]]:
     """The polynomials of a model that must be stable, by letter: C, D and F; none of a plant in s."""
     return {}
 
 
 @predictor_of.register
-def _(model: PolynomialChannels) -> dict[str, list[Array]]:
+def _(model: PolynomialModel) -> dict[str, list[Array]]:
     return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
 
 
-def _variance(model: ChannelModel) -> dict[str, Json]:
+def _variance(model: Model) -> dict[str, Json]:
     covariance = model.covariance
     return {"variance": float(covariance[0, 0]) if covariance.size == 1 else covariance.tolist()}
 

@@ -12,7 +12,7 @@ from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.designs import Design, Question
 from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
-from inputdesign_cli.information import POWER_KINDS, ChannelExperiment, PowerKind
+from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis
@@ -33,7 +33,7 @@ class Designed:
     header: Header
     question: Question
     design: Design
-    experiment: ChannelExperiment
+    experiment: Experiment
     cost: dict[PowerKind, Weight]
     alpha: float
 
@@ -79,7 +79,7 @@ def design_result(done: Designed, how: dict[str, Any], tolerance: float) -> dict
     return result
 
 
-def information_entry(experiment: ChannelExperiment, information: Array) -> dict[str, Any]:
+def information_entry(experiment: Experiment, information: Array) -> dict[str, Any]:
     """The information matrix in raw parameters, its inverse and the predicted standard deviations."""
     entry: dict[str, Any] = {
         "parameters": list(experiment.model.names),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.information import ChannelExperiment
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Ellipse, EllipseCurves
 
@@ -17,7 +17,7 @@ Pairs = Sequence[tuple[str, str]]
 
 
 def experiment_ellipses(
-    experiment: ChannelExperiment, information: Array, white: Array | None, pairs: Pairs | None
+    experiment: Experiment, information: Array, white: Array | None, pairs: Pairs | None
 ) -> EllipseCurves | None:
     """The chosen `pairs`, by default those most correlated where there are several channels.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, worst
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.plant import ChannelModel
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, Json, ResidualCurves, Table
 from inputdesign_cli.runs.units import Units
@@ -16,7 +16,7 @@ from inputdesign_cli.tasks.result.bound import bound_curves
 
 
 def data_curves(
-    units: Units, u: Array, y: Array, model: ChannelModel, estimate: Estimate
+    units: Units, u: Array, y: Array, model: Model, estimate: Estimate
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
     """fit.csv and residuals.csv with their figures.
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.identification import Estimate, ResidualTest
-from inputdesign_cli.plant import ChannelModel
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
@@ -67,7 +67,7 @@ def _test(test: ResidualTest) -> dict[str, Json]:
     }
 
 
-def identification_notes(of_the_data: Sequence[str], model: ChannelModel, estimate: Estimate) -> list[str]:
+def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Estimate) -> list[str]:
     """What a user should know of the data, and what speaks against trusting the estimate.
 
     Args:
@@ -114,7 +114,7 @@ def identification_notes(of_the_data: Sequence[str], model: ChannelModel, estima
     return notes
 
 
-def model_text(model: ChannelModel, estimate: Estimate) -> str:
+def model_text(model: Model, estimate: Estimate) -> str:
     """The blocks to paste, with the covariance and, as a comment, the same as prior information."""
     lines = [
         f"# Estimated from {len(estimate.errors)} samples: paste in place of the blocks of the same names,",

@@ -14,7 +14,7 @@ from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.runs.results import Curves, DirectionCurves, MatrixSpectrumCurves, Table
+from inputdesign_cli.runs.results import Curves, DirectionCurves, SpectrumCurves, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.result.spectrum import hermitian_columns
 
@@ -121,7 +121,7 @@ def spectrum_results(
     power = np.einsum("kai,kab,kbi->ki", np.conj(directions), drawn, directions).real
     frequency, lines = shown / units.frequency, design.of_lines
     return {"spectrum": table}, {
-        "spectrum": MatrixSpectrumCurves(frequency, drawn, white=white, lines=lines, logarithmic=True),
+        "spectrum": SpectrumCurves(frequency, drawn, white=white, lines=lines, logarithmic=True),
         "directions": DirectionCurves(frequency, gains, power, white=white, lines=lines),
     }
 

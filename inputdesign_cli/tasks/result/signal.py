@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement
-from inputdesign_cli.information import ChannelExperiment, FiniteRecord
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import SignalCurves, Table
 from inputdesign_cli.runs.units import Units
@@ -22,7 +22,7 @@ _LAGS = 50
 def signal_entry(
     request: RecordRequest,
     units: Units,
-    experiment: ChannelExperiment,
+    experiment: Experiment,
     record: Record,
     requirements: Sequence[Requirement] = (),
     *,

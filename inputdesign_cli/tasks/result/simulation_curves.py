@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
-from inputdesign_cli.plant import ChannelLoop
+from inputdesign_cli.plant import Loop
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import (
     CloudCurves,
-    Entry,
     ErrorBandCurves,
     ErrorBandPanel,
     SignalCurves,
@@ -29,7 +28,7 @@ def error_bands(units: Units, predicted: PredictedError, errors: Array, name: st
     frequency = predicted.w / units.frequency
     r_u = predicted.r_u if name == "design" else None
 
-    def panel(own: Array, entry: Entry) -> ErrorBandPanel:
+    def panel(own: Array, entry: tuple[int, int] | None) -> ErrorBandPanel:
         return ErrorBandPanel(
             frequency=frequency[own],
             quantiles={q: np.quantile(errors[:, own], q, axis=0) for q in QUANTILES},
@@ -62,7 +61,7 @@ def cloud(trials: Trials, covariance: Array | None) -> CloudCurves | None:
     )
 
 
-def disturbance(units: Units, loop: ChannelLoop, excitation: Array) -> tuple[Table, SignalCurves]:
+def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, SignalCurves]:
     """r, u_r and y_r of an excitation (n, r) of the true loop, until they have faded."""
     slowest = float(np.abs(loop.closed_poles).max(initial=0.0))
     tail = min(int(np.ceil(_FADED / (1.0 - slowest))), len(excitation))

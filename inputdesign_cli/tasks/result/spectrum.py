@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import MatrixSpectrumCurves, OptimalityCurves, Table
+from inputdesign_cli.runs.results import OptimalityCurves, SpectrumCurves, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum, best_directions, matrices
 
@@ -57,7 +57,7 @@ def spectrum_curves(
     band: tuple[float, float],
     *,
     white: float | None = None,
-) -> tuple[Table, MatrixSpectrumCurves]:
+) -> tuple[Table, SpectrumCurves]:
     """spectrum.csv and its plot: a density over the band, or sinusoids with their powers.
 
     Args:
@@ -72,15 +72,20 @@ def spectrum_curves(
         symbol = "power"
     frequency = w / units.frequency
     table = Table({units.frequency_header: frequency, **hermitian_columns(values, symbol)})
-    curves = MatrixSpectrumCurves(
-        frequency, values, white=white, lines=not basis.has_density, symbol=units.excitation
+    curves = SpectrumCurves(
+        frequency,
+        values,
+        white=white,
+        lines=not basis.has_density,
+        symbol=units.excitation,
+        band=(band[0] / units.frequency, band[1] / units.frequency),
     )
     return table, curves
 
 
 def with_periodogram(
-    units: Units, table: Table, curves: MatrixSpectrumCurves, samples: Array
-) -> tuple[Table, MatrixSpectrumCurves]:
+    units: Units, table: Table, curves: SpectrumCurves, samples: Array
+) -> tuple[Table, SpectrumCurves]:
     """The spectrum with the smoothed periodogram of each channel of the record (n, r) over it.
 
     Lines are left as they are.
@@ -106,10 +111,11 @@ def _smoothed_periodogram(samples: Array, step: float) -> tuple[Array, Array]:
     return 2 * np.pi * np.arange(periodogram.size) / samples.size / step, smooth
 
 
-def optimality_curves(units: Units, design: Design) -> OptimalityCurves | None:
-    """The worth of the best direction at each frequency over its price, by the bound over every spectrum.
+def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCurves] | None:
+    """optimality.csv and its plot: the worth of the best direction at each frequency over its price.
 
-    At most one everywhere, and one where power pays; None where there is no such bound.
+    By the bound over every spectrum: at most one everywhere, and one where power pays. None where there is
+    no such bound.
     """
     anything = design.any_spectrum
     price, value = anything.certificate.price, anything.certificate.value
@@ -125,7 +131,9 @@ def optimality_curves(units: Units, design: Design) -> OptimalityCurves | None:
     seen = size > _PRICED * size.max()
     ratio, _ = best_directions(costs[seen], value.density(w)[seen])
     marks = distinct(np.maximum(support, w[0]))
-    return OptimalityCurves(w[seen] / units.frequency, ratio, marks / units.frequency)
+    frequency = w[seen] / units.frequency
+    table = Table({units.frequency_header: frequency, "ratio": ratio})
+    return table, OptimalityCurves(frequency, ratio, marks / units.frequency)
 
 
 def spectrum_entry(units: Units, basis: Basis, x: Array) -> dict[str, Any]:

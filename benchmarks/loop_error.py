@@ -1,6 +1,6 @@
 """The figures of the closed-loop design: accuracy, the dual against the grid program, the Monte Carlo.
 
-    python benchmarks/asymptotic.py [--json FILE]
+    python benchmarks/loop_error.py [--json FILE]
 
 Only ratios of times taken in one process mean anything.
 """
@@ -20,21 +20,24 @@ from typing import TypeVar
 
 import numpy as np
 import scipy.signal
-from inputdesign_cli.tasks.loop_error_design import ClosedLoopDesign, design_closed_loop
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.design.loop_error import (
-    ClosedLoopProblem,
     LimitedDesign,
-    MatrixTransfer,
+    LoopErrorDesign,
+    LoopErrorProblem,
     ModelReference,
+    design_loop_error,
     design_within,
 )
 from inputdesign_cli.design.loop_error.closed_form import power_of
-from inputdesign_cli.design.loop_error.laws import sensitivity
-from inputdesign_cli.design.loop_error.weight import adjoint, general_weight, reference_weight
-from inputdesign_cli.monte_carlo.loop_error import closed_loop_study
+from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
+from inputdesign_cli.design.loop_error.weight import adjoint, weight
+from inputdesign_cli.monte_carlo.loop_error import study_losses
+from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
+from inputdesign_cli.tasks.loop_error_signal import design_lines, white_lines
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "distillation_column.yaml"
@@ -59,25 +62,27 @@ def complex_normal(rng: np.random.Generator, *shape: int) -> ComplexArray:
 
 
 def formula_error() -> float:
-    """The largest relative difference of (13), (17) and (19) on random complex plants of size 2 and 3."""
+    """The largest relative difference of (17) and (19) on random complex plants of size 2 and 3."""
     worst = 0.0
     w = np.linspace(0.05, 3.1, 200)
     for n in (2, 3):
         for seed in range(10):
             rng = np.random.default_rng(seed)
             rows = [[[0.0, *(0.3 * rng.standard_normal(2))] for _ in range(n)] for _ in range(n)]
-            law = ModelReference(MatrixTransfer.build(rows, [[[1.0, -0.6]] * n] * n))
+            law = ModelReference(TransferMatrix.build(rows, [[[1.0, -0.6]] * n] * n))
             G, X, Y = (complex_normal(rng, w.size, n, n) for _ in range(3))
             entering, noise = X @ adjoint(X), Y @ adjoint(Y)
             S = sensitivity(law.complementary(w))
-            exact = reference_weight(S, law.controller(G, w) @ S, entering, noise)
-            general = general_weight(S, G, law.jacobian(G, w), entering, noise)
+            CS = law.controller(G, w) @ S
+            power = np.trace(S @ noise @ adjoint(S), axis1=1, axis2=2).real
+            exact = power[:, None, None] * np.conj(CS @ entering @ adjoint(CS))
+            general = weight(propagation(law, G, w), entering, noise)
             size = np.abs(exact).max(axis=(1, 2))
             worst = max(worst, float((np.abs(general - exact).max(axis=(1, 2)) / size).max()))
     return worst
 
 
-def grid_data(problem: ClosedLoopProblem) -> tuple[ComplexArray, ComplexArray, Array, Array]:
+def grid_data(problem: LoopErrorProblem) -> tuple[ComplexArray, ComplexArray, Array, Array]:
     """A, the metrics, the limits and even weights at the midpoints of FREQUENCIES equal intervals."""
     w = np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES
     return problem.target(w), problem.metrics(w), problem.most, np.full(FREQUENCIES, 1 / FREQUENCIES)
@@ -107,9 +112,8 @@ def grid_program(A: ComplexArray, metrics: ComplexArray, limits: Array, weights:
 def race(repetitions: int = 3) -> dict[str, float | str]:
     """The dual and the grid program in turn on the column with a limit for each input and output."""
     import cvxpy  # noqa: F401 (its import is not what is compared)
-    from inputdesign_cli.tasks.build.loop_error_problem import build_problem
 
-    data = grid_data(build_problem(load_spec(SPEC, [PER_CHANNEL])))
+    data = grid_data(build_loop_error_task(load_spec(SPEC, [PER_CHANNEL])).problem)
     quick, slow = [], []
     for _ in range(repetitions):
         for _ in range(5):
@@ -134,22 +138,11 @@ def bare_passes(repetitions: int = 4) -> list[float]:
     return [timed(lambda: scipy.signal.lfilter([0.0, 0.02], [1.0, -0.97], x))[1] for _ in range(repetitions)]
 
 
-def monte_carlo(design: ClosedLoopDesign) -> dict[str, float]:
+def monte_carlo(design: LoopErrorDesign) -> dict[str, float]:
     """2 x 1000 runs of 10000 samples over one lfilter pass through as many samples."""
-    target = design.problem.law
-    assert isinstance(target, ModelReference)
-    inputs = {"design": design.masses(SAMPLES), "white": design.white_masses(SAMPLES)}
+    inputs = {"design": design_lines(design, SAMPLES), "white": white_lines(design, SAMPLES)}
     before = bare_passes()
-    studies, seconds = timed(
-        lambda: closed_loop_study(
-            design.problem,
-            target.target,
-            inputs,
-            samples=SAMPLES,
-            runs=RUNS,
-            seed=1,
-        )
-    )
+    studies, seconds = timed(lambda: study_losses(design.problem, inputs, samples=SAMPLES, runs=RUNS, seed=1))
     passes = [*before, *bare_passes()]
     return {
         "ratio": seconds / statistics.median(passes),
@@ -162,9 +155,10 @@ def monte_carlo(design: ClosedLoopDesign) -> dict[str, float]:
 def main() -> int:
     """Print the table and write it as JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--json", type=Path, default=ROOT / "benchmarks" / "asymptotic.json")
+    parser.add_argument("--json", type=Path, default=ROOT / "benchmarks" / "loop_error.json")
     arguments = parser.parse_args()
-    study = monte_carlo(design_closed_loop(load_spec(SPEC)))
+    task = build_loop_error_task(load_spec(SPEC))
+    study = monte_carlo(design_loop_error(task.problem, "asymptotic", tolerance=task.terms.tolerance))
     dual = race()
     error = formula_error()
     rows = [

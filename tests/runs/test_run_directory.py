@@ -12,28 +12,30 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.runs import run_directory as record
 from inputdesign_cli.runs.results import OptimalityCurves, Results, SignalCurves, Table
+from inputdesign_cli.runs.run_directory import read_run, write_run
 
 
-def outcome(mark: str, *, optimality: bool = False) -> Results:
+def a_run(mark: str, *, optimality: bool = False) -> Results:
     """A small run whose every file tells which run it is of."""
     number = float(len(mark))
     curves = {"signal": SignalCurves(np.arange(4.0), {"u1": np.array([1.0, -1.0, 1.0, -1.0]) * number})}
+    tables = {"signal": Table({"time_s": np.arange(4.0), "u1": np.full(4, number)})}
     if optimality:
         w = np.array([0.1, 1.0, 3.0])
         curves["optimality"] = OptimalityCurves(w, np.array([0.5, 1.0, 0.5]), np.array([1.0]))
+        tables["optimality"] = Table({"frequency_rad_per_s": w, "ratio": curves["optimality"].ratio})
     return Results(
         result={"format": 1, "title": mark, "objective": {"value": np.float64(number)}},
         resolved_spec=f"title: {mark}\n",
-        tables={"signal": Table({"time_s": np.arange(4.0), "u1": np.full(4, number)})},
+        tables=tables,
         curves=curves,
     )
 
 
 def write_with_figures(results, directory):
     """A run with what passes for figures."""
-    return record.write_run(results, directory, {f"{stem}.png": b"drawn" for stem in results.curves})
+    return write_run(results, directory, {f"{stem}.png": b"drawn" for stem in results.curves})
 
 
 def marks(directory) -> set[str]:
@@ -51,7 +53,7 @@ def names(directory) -> set[str]:
 
 
 def test_the_files_of_a_run(tmp_path):
-    paths = write_with_figures(outcome("first", optimality=True), tmp_path / "runs" / "a")
+    paths = write_with_figures(a_run("first", optimality=True), tmp_path / "runs" / "a")
     assert [path.name for path in paths] == [
         "spec.yaml",
         "signal.csv",
@@ -66,12 +68,12 @@ def test_the_files_of_a_run(tmp_path):
 
 
 def test_figures_can_be_left_out(tmp_path):
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_run(a_run("first"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "result.json"}
 
 
 def test_the_result_names_its_software_and_its_spec(tmp_path):
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_run(a_run("first"), tmp_path / "a")
     result = json.loads((tmp_path / "a" / "result.json").read_text())
     assert result["spec_sha256"] == hashlib.sha256((tmp_path / "a" / "spec.yaml").read_bytes()).hexdigest()
     assert result["environment"]["python"] == platform.python_version()
@@ -80,26 +82,26 @@ def test_the_result_names_its_software_and_its_spec(tmp_path):
 
 
 def test_read_run_returns_what_was_written(tmp_path):
-    write_with_figures(outcome("first"), tmp_path / "a")
-    result = record.read_run(tmp_path / "a")
+    write_with_figures(a_run("first"), tmp_path / "a")
+    result = read_run(tmp_path / "a")
     assert result["title"] == "first"
     assert result["objective"] == {"value": 5.0}
     assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png"}
 
 
 def test_a_later_run_replaces_an_earlier_one_and_its_stale_figure(tmp_path):
-    write_with_figures(outcome("first", optimality=True), tmp_path / "a")
-    write_with_figures(outcome("second"), tmp_path / "a")
+    write_with_figures(a_run("first", optimality=True), tmp_path / "a")
+    write_with_figures(a_run("second"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "result.json"}
     assert marks(tmp_path / "a") == {"second"}
 
 
 def test_files_of_the_user_survive(tmp_path):
-    write_with_figures(outcome("first", optimality=True), tmp_path / "a")
+    write_with_figures(a_run("first", optimality=True), tmp_path / "a")
     (tmp_path / "a" / "notes.txt").write_text("mine")
     (tmp_path / "a" / "photo.png").write_text("mine")
     (tmp_path / "a" / "data").mkdir()
-    write_with_figures(outcome("second"), tmp_path / "a")
+    write_with_figures(a_run("second"), tmp_path / "a")
     assert (tmp_path / "a" / "notes.txt").read_text() == "mine"
     assert (tmp_path / "a" / "photo.png").read_text() == "mine"
     assert (tmp_path / "a" / "data").is_dir()
@@ -108,7 +110,7 @@ def test_files_of_the_user_survive(tmp_path):
 def test_a_file_of_the_user_is_never_overwritten(tmp_path):
     (tmp_path / "spec.yaml").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        write_with_figures(outcome("first"), tmp_path)
+        write_with_figures(a_run("first"), tmp_path)
     assert caught.value.diagnostics[0].code == "output-not-a-run"
     assert "spec.yaml" in caught.value.diagnostics[0].message
     assert names(tmp_path) == {"spec.yaml"}
@@ -117,14 +119,14 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path):
 
 def test_a_run_into_an_empty_directory(tmp_path):
     (tmp_path / "a").mkdir()
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_run(a_run("first"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "result.json"}
 
 
 def test_a_link_to_a_directory_stays_a_link(tmp_path):
     (tmp_path / "disc").mkdir()
     (tmp_path / "a").symlink_to(tmp_path / "disc")
-    record.write_run(outcome("first"), tmp_path / "a")
+    write_run(a_run("first"), tmp_path / "a")
     assert (tmp_path / "a").is_symlink()
     assert (tmp_path / "disc" / "result.json").is_file()
 
@@ -132,7 +134,7 @@ def test_a_link_to_a_directory_stays_a_link(tmp_path):
 def test_a_destination_that_is_a_file(tmp_path):
     (tmp_path / "a").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        write_with_figures(outcome("first"), tmp_path / "a")
+        write_with_figures(a_run("first"), tmp_path / "a")
     assert caught.value.diagnostics[0].code == "output-not-a-directory"
     assert (tmp_path / "a").read_text() == "mine"
 
@@ -140,12 +142,12 @@ def test_a_destination_that_is_a_file(tmp_path):
 def test_a_destination_below_a_file(tmp_path):
     (tmp_path / "a").write_text("mine")
     with pytest.raises(OutputError) as caught:
-        write_with_figures(outcome("first"), tmp_path / "a" / "b")
+        write_with_figures(a_run("first"), tmp_path / "a" / "b")
     assert caught.value.diagnostics[0].code == "output-not-writable"
 
 
 class Saboteur:
-    """Makes the n-th of the file operations of the record fail, and every operation before it work."""
+    """Makes the n-th of the file operations of the run fail, and every operation before it work."""
 
     def __init__(self, monkeypatch, failing: int, error: BaseException):
         self.count, self.failing, self.error = 0, failing, error
@@ -184,7 +186,7 @@ ERRORS = [
 
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
 def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch, error, raised):
-    steps = count_operations(monkeypatch, lambda: record.write_run(outcome("first"), tmp_path / "probe"))
+    steps = count_operations(monkeypatch, lambda: write_run(a_run("first"), tmp_path / "probe"))
     assert steps > 6
     for step in range(1, steps):
         place = tmp_path / f"step{step}"
@@ -192,30 +194,30 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch
         with monkeypatch.context() as patch:
             Saboteur(patch, step, error)
             with pytest.raises(raised):
-                record.write_run(outcome("first"), place / "a")
+                write_run(a_run("first"), place / "a")
         assert names(place) == set(), step
 
 
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
 def test_a_failure_at_any_step_of_a_replacement_keeps_the_old_run(tmp_path, monkeypatch, error, raised):
-    write_with_figures(outcome("first", optimality=True), tmp_path / "probe")
-    steps = count_operations(monkeypatch, lambda: record.write_run(outcome("second"), tmp_path / "probe"))
+    write_with_figures(a_run("first", optimality=True), tmp_path / "probe")
+    steps = count_operations(monkeypatch, lambda: write_run(a_run("second"), tmp_path / "probe"))
     assert steps > 12
     old = tmp_path / "a"
-    write_with_figures(outcome("first", optimality=True), old)
+    write_with_figures(a_run("first", optimality=True), old)
     (old / "notes.txt").write_text("mine")
     before = {path.name: path.read_bytes() for path in old.iterdir()}
     for step in range(1, steps + 1):
         with monkeypatch.context() as patch:
             Saboteur(patch, step, error)
             with pytest.raises(raised):
-                record.write_run(outcome("second"), old)
+                write_run(a_run("second"), old)
         assert {path.name: path.read_bytes() for path in old.iterdir()} == before, step
 
 
 def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch):
     """The state of the directory before each single move: with a result.json, all files are of its run."""
-    write_with_figures(outcome("first"), tmp_path / "a")
+    write_with_figures(a_run("first"), tmp_path / "a")
     seen = []
 
     def observe(original):
@@ -229,7 +231,7 @@ def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch)
     with monkeypatch.context() as patch:
         for name in ("rename", "replace"):
             patch.setattr(pathlib.Path, name, observe(getattr(pathlib.Path, name)))
-        write_with_figures(outcome("second"), tmp_path / "a")
+        write_with_figures(a_run("second"), tmp_path / "a")
     seen.append(marks(tmp_path / "a"))
     assert all(len(found) == 1 for found in seen)
     assert seen[0] == {"first"}
@@ -237,7 +239,7 @@ def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch)
 
 
 def test_a_run_after_a_power_cut_in_the_middle_of_a_replacement(tmp_path, monkeypatch):
-    write_with_figures(outcome("first"), tmp_path / "a")
+    write_with_figures(a_run("first"), tmp_path / "a")
 
     class PowerCut(BaseException):
         pass
@@ -255,9 +257,9 @@ def test_a_run_after_a_power_cut_in_the_middle_of_a_replacement(tmp_path, monkey
         patch.setattr(pathlib.Path, "rename", cut)
         patch.setattr(pathlib.Path, "unlink", lambda self, missing_ok=False: None)
         with pytest.raises(PowerCut):
-            write_with_figures(outcome("second"), tmp_path / "a")
+            write_with_figures(a_run("second"), tmp_path / "a")
     assert not (tmp_path / "a" / "result.json").exists()
-    write_with_figures(outcome("second"), tmp_path / "a")
+    write_with_figures(a_run("second"), tmp_path / "a")
     assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "result.json"}
 
 
@@ -286,7 +288,7 @@ def test_a_disc_that_fills_up_while_writing(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(pathlib.Path, "open", open_full)
         with pytest.raises(OutputError) as caught:
-            record.write_run(outcome("first"), tmp_path / "a")
+            write_run(a_run("first"), tmp_path / "a")
     assert caught.value.diagnostics[0].code == "output-full"
     assert names(tmp_path) == set()
 
@@ -311,11 +313,11 @@ def test_read_run_explains_what_is_wrong(tmp_path, files, code):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     with pytest.raises(DataError) as caught:
-        record.read_run(tmp_path)
+        read_run(tmp_path)
     assert caught.value.diagnostics[0].code == code
 
 
 def test_read_run_of_no_directory(tmp_path):
     with pytest.raises(DataError) as caught:
-        record.read_run(tmp_path / "nowhere")
+        read_run(tmp_path / "nowhere")
     assert caught.value.diagnostics[0].code == "run-missing"

@@ -1,6 +1,6 @@
 """Mean-squared-error designs with Toeplitz moments: the gap that is proved, its time, how good the design is.
 
-    python benchmarks/mse.py            # prints a table and writes benchmarks/mse.json
+    python benchmarks/regression.py     # prints a table and writes benchmarks/regression.json
 
 A "bare solve" is one call of the solver on the lift of the whole box of the same problem, assembled
 beforehand. The general optimiser is SciPy's L-BFGS-B on the reflection coefficients, which map the cube
@@ -19,9 +19,9 @@ import scipy.optimize
 
 from inputdesign_cli.design.conic import solve_conic
 from inputdesign_cli.design.regression import OutOfReachError, Regression, design_toeplitz
-from inputdesign_cli.design.regression.branch import Search
-from inputdesign_cli.design.regression.limits import reach
-from inputdesign_cli.design.regression.structured import Units
+from inputdesign_cli.design.regression.branch import BranchAndBound
+from inputdesign_cli.design.regression.limits import box_limits
+from inputdesign_cli.design.regression.structured import Normalisation
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 
 CASES = {(2, 4): 15, (2, 5): 15, (3, 6): 5, (3, 7): 5, (4, 8): 5}
@@ -73,11 +73,11 @@ def general(regression: Regression, goal: dict[str, float], rng: np.random.Gener
 def bare_solve(regression: Regression, energy: float) -> float:
     """Seconds of one solver call on the lift of the whole box (median of seven)."""
     problem = ToeplitzProblem.of(regression)
-    search = Search.start(problem)
-    box = search.open[0].box
-    scaling = reach(problem, box, 10.0).scaling
-    blocks = search.lift.blocks(box, scaling)
-    q, _ = search.lift.cost(Units(regression).kappa(energy), scaling)
+    tree = BranchAndBound.start(problem)
+    box = tree.open[0].box
+    scaling = box_limits(problem, box, 10.0).scaling
+    blocks = tree.lift.blocks(box, scaling)
+    q, _ = tree.lift.cost(Normalisation(regression).kappa(energy), scaling)
     times = []
     for _ in range(7):
         started = time.perf_counter()
@@ -99,7 +99,7 @@ def run_case(seed: int, m: int, n: int) -> dict[str, float | str]:
             "n": n,
             "seed": seed,
             "status": "out of reach",
-            "reach": error.reach,
+            "reach": error.proved,
             "seconds": spent,
         }
     spent = time.perf_counter() - started

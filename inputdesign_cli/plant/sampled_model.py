@@ -8,25 +8,24 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_model import WhiteNoise
-from inputdesign_cli.plant.continuous import ContinuousChannels
+from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.intersample import Intersample
-from inputdesign_cli.plant.model import Fraction
+from inputdesign_cli.plant.model import Fraction, WhiteNoise
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.state_space import StateSpace
 
 
 @dataclass(frozen=True)
-class SampledChannels(WhiteNoise):
+class SampledModel(WhiteNoise):
     """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay those of s.
 
     Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
     dG/da_k = -s^k b / a^2: each entry needs one state-space model of a^2, exact through one exponential.
     """
 
-    continuous_plant: ContinuousChannels
+    continuous_plant: ContinuousModel
     sample_time: float
 
     continuous = False
@@ -59,9 +58,9 @@ class SampledChannels(WhiteNoise):
             for i, j in plant.active
         }
 
-    def at(self, theta: ArrayLike, covariance: Array | None = None) -> SampledChannels:
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> SampledModel:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
-        return SampledChannels(self.continuous_plant.at(theta, covariance), self.sample_time)
+        return SampledModel(self.continuous_plant.at(theta, covariance), self.sample_time)
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """What u (.., n, r), held between samples, causes at the outputs (.., n, p), and e itself."""

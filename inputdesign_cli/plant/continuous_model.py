@@ -12,16 +12,15 @@ import numpy as np
 from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.plant.channel_model import Parameter, Parametrised, WhiteNoise, entry_label
-from inputdesign_cli.plant.channels import Rows
 from inputdesign_cli.plant.held import polynomial_roots
 from inputdesign_cli.plant.intersample import Intersample
-from inputdesign_cli.plant.model import Fraction
+from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, WhiteNoise, entry_label
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.polynomial_model import Rows
 
 
 @dataclass(frozen=True)
-class ContinuousChannels(Parametrised, WhiteNoise):
+class ContinuousModel(Parametrised, WhiteNoise):
     """A stable transfer matrix in s with white noise of a full covariance (p, p) on its sampled outputs.
 
     `numerator` and `denominator` hold ascending coefficients, those of s^0 first; denominators are
@@ -43,7 +42,7 @@ class ContinuousChannels(Parametrised, WhiteNoise):
     @classmethod
     def monic(
         cls, numerator: Rows, denominator: Rows, covariance: Array, *, common: bool = False
-    ) -> ContinuousChannels:
+    ) -> ContinuousModel:
         """From any coefficients: trailing zeros dropped, each entry divided by its leading coefficient."""
         low, high = [], []
         for top, bottom in zip(numerator, denominator, strict=True):
@@ -90,14 +89,14 @@ class ContinuousChannels(Parametrised, WhiteNoise):
             ]
         return tuple(found)
 
-    def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousChannels:
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousModel:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         above = [[entry.copy() for entry in row] for row in self.numerator]
         below = [[entry.copy() for entry in row] for row in self.denominator]
         for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):
             for i, j in parameter.places:
                 (above if parameter.letter == "b" else below)[i][j][parameter.power] = value
-        return ContinuousChannels(
+        return ContinuousModel(
             tuple(map(tuple, above)),
             tuple(map(tuple, below)),
             self.covariance if covariance is None else covariance,

@@ -12,9 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.channel_model import Parameter, Parametrised, entry_label
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Fraction
+from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -29,7 +28,7 @@ Rows = tuple[tuple[Array, ...], ...]
 
 
 @dataclass(frozen=True)
-class PolynomialChannels(Parametrised):
+class PolynomialModel(Parametrised):
     """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. An
@@ -45,6 +44,21 @@ class PolynomialChannels(Parametrised):
     covariance: Array
 
     continuous = False
+
+    @classmethod
+    def single(
+        cls,
+        B: ArrayLike,
+        *,
+        A: ArrayLike = (1.0,),
+        C: ArrayLike = (1.0,),
+        D: ArrayLike = (1.0,),
+        F: ArrayLike = (1.0,),
+        variance: float = 1.0,
+    ) -> PolynomialModel:
+        """One input and one output."""
+        a, b, c, d, f = (np.asarray(p, dtype=float) for p in (A, B, C, D, F))
+        return cls(((b,),), (a,), ((f,),), (c,), (d,), np.array([[variance]], dtype=float))
 
     @property
     def outputs(self) -> int:
@@ -189,7 +203,7 @@ class PolynomialChannels(Parametrised):
         return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """(n, k, p, m), see `ChannelModel`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j).
+        """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j).
 
         Written with the polynomials of the predictor alone, as `PolynomialModel.prediction_gradient`.
         """
@@ -221,7 +235,7 @@ class PolynomialChannels(Parametrised):
                 gradient[:, index, i] = shift * noise[parameter.letter, i]
         return gradient
 
-    def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialChannels:
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialModel:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
         B, F = ([[entry.copy() for entry in row] for row in rows] for rows in (self.B, self.F))
         common = {"a": self.A, "c": self.C, "d": self.D}
@@ -233,7 +247,7 @@ class PolynomialChannels(Parametrised):
                     own[0 if len(own) == 1 else i][parameter.power] = value
                 else:
                     (B if parameter.letter == "b" else F)[i][j][parameter.power] = value
-        return PolynomialChannels(
+        return PolynomialModel(
             tuple(tuple(row) for row in B),
             tuple(rows["a"]),
             tuple(tuple(row) for row in F),

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, TypeVar
+from itertools import product
+from typing import Protocol, TypeVar
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all
-from inputdesign_cli.runs.results import Array, Entry
+from inputdesign_cli.runs.results import Array
 
 
 class Panel(Protocol):
@@ -23,7 +23,7 @@ class Panel(Protocol):
         ...
 
     @property
-    def entry(self) -> Entry:
+    def entry(self) -> tuple[int, int] | None:
         """Output and input from zero; None: the only entry, or all of them together."""
         ...
 
@@ -31,7 +31,7 @@ class Panel(Protocol):
 P = TypeVar("P", bound=Panel)
 
 
-def draw_entries(
+def draw_panels(
     page: Figure,
     panels: Sequence[P],
     plot: Callable[[Axes, P], list[Artist]],
@@ -62,17 +62,17 @@ def draw_entries(
         return
     places = [panel.entry or (0, 0) for panel in panels]
     rows, columns = (1 + max(place[side] for place in places) for side in (0, 1))
-    grid: Any = page.subplots(rows, columns, sharex=True, squeeze=False)
+    grid = page.subplots(rows, columns, sharex=True, squeeze=False)
     longest: list[Artist] = []
     for panel, (i, j) in zip(panels, places, strict=True):
-        axes = grid[i][j]
+        axes = grid[i, j]
         longest = max(longest, plot(axes, panel), key=len)
         axes.set_xscale("log")
         axes.set_xlim(float(panel.frequency.min()), float(panel.frequency.max()))
         axes.set_title(f"$G_{{{i + 1}{j + 1}}}$", loc="left", color=GREY)
-    for i, j in np.ndindex(rows, columns):
+    for i, j in product(range(rows), range(columns)):
         if (i, j) not in places:
-            grid[i][j].set_axis_off()
+            grid[i, j].set_axis_off()
     for axes in grid[-1]:
         axes.set_xlabel(rf"$\omega$ (rad/{time_unit})")
     legend_over_all(page, longest, title)

@@ -1,0 +1,98 @@
+"""Do controllers and desired loops fit the channels of the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from inputdesign_cli.specification.models.controller import ControllerMatrix
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.plant import Plant
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.transfer import DiscreteTransfer
+from inputdesign_cli.specification.wording import count
+
+
+def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """A controller works in discrete time and has a row an input and a column an output of the plant."""
+    controller, path = spec.experiment.controller, ("experiment", "controller")
+    if controller is not None and spec.plant.kind == "regression":
+        message = "{key} does not go with a regression"
+        yield PathDiagnostic("unsuitable-key", message, "remove the controller", path)
+    elif controller is not None:
+        yield from _controller(spec.plant, controller, *path)
+
+
+def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """So has the controller of a sensitivity that is to be kept."""
+    error = spec.accuracy.model_error
+    sensitivity = error.sensitivity if error is not None else None
+    if sensitivity is not None and sensitivity.controller is not None and spec.plant.kind != "regression":
+        path = ("accuracy", "model_error", "sensitivity", "controller")
+        yield from _controller(spec.plant, sensitivity.controller, *path)
+
+
+def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
+    """A sensitivity is that of a loop."""
+    error = spec.accuracy.model_error
+    if error is None or error.sensitivity is None or error.sensitivity.controller is not None:
+        return
+    if not spec.closed_loop:
+        message = "{key} is that of a control loop, but there is no controller"
+        hint = "add experiment.controller, or a controller beside it for the loop to be kept"
+        path = ("accuracy", "model_error", "sensitivity")
+        yield PathDiagnostic("needs-controller", message, hint, path)
+
+
+def _controller(
+    plant: Plant, controller: DiscreteTransfer | ControllerMatrix, *path: str
+) -> Iterator[PathDiagnostic]:
+    if not plant.sampled:
+        message = "{key} works in discrete time, but the plant is not sampled"
+        yield PathDiagnostic("unsuitable-key", message, "add sample: zoh to the plant", path)
+    channels = (plant.inputs, plant.outputs)
+    has = f"but the plant has {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
+    if controller.kind == "discrete":
+        if channels != (1, 1):
+            message = f"{{key}} is a single transfer function, {has}"
+            hint = (
+                "write numerator as rows (inputs) of columns (outputs) of coefficients, and "
+                "denominator likewise or as one for all entries"
+            )
+            yield PathDiagnostic("wrong-shape", message, hint, path)
+        return
+    shape = (len(controller.numerator), len(controller.numerator[0]))
+    if channels == (1, 1):
+        message = "{key} is a matrix, but the plant has one input and one output"
+        hint = "write numerator: [..] and denominator: [..]"
+        yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
+    elif shape != channels:
+        message = f"{{key}} is {shape[0]} x {shape[1]}, {has}"
+        hint = "write a row for each input u and in it a column for each output y"
+        yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
+
+
+def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """The controller inverts the plant, so that plant and desired loop are square and of one size."""
+    error, plant = spec.accuracy.closed_loop_error, spec.plant
+    if error is None or plant.kind == "regression":
+        return
+    path = ("accuracy", "closed_loop_error", "control")
+    if plant.inputs != plant.outputs:
+        message = (
+            f"{{key}} designs a controller that inverts the plant, but the plant has "
+            f"{count(plant.outputs, 'output')} and {count(plant.inputs, 'input')}"
+        )
+        yield PathDiagnostic("not-square", message, "choose as many inputs as outputs", path)
+        return
+    target = error.control.model_reference
+    if target is None or target.kind == "discrete" or target.kind == "continuous":
+        return
+    rows = target.numerator if target.kind == "discrete_matrix" else target.continuous.numerator
+    if (len(rows), len(rows[0])) != (plant.outputs, plant.outputs):
+        step = ("continuous",) if target.kind == "continuous_matrix" else ()
+        message = (
+            f"{{key}} is {len(rows)} x {len(rows[0])}: the loop from reference to output is square, "
+            f"{plant.outputs} x {plant.outputs}"
+        )
+        hint = "write one transfer function t for t I, or a square matrix"
+        yield PathDiagnostic("not-square", message, hint, (*path, "model_reference", *step, "numerator"))
