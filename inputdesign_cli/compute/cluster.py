@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from inputdesign_cli import __version__
 from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
 from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.version import __version__
 
 _AHEAD = 2  # jobs on their way for each thread of the cluster
 

@@ -108,7 +108,7 @@ def test_proofs_are_tight_at_the_optimum(name):
 def test_moved_cuts_describe_the_same_set(name):
     cut, _ = CUTS[name]
     M, congruence = random_matrix(), RNG.normal(size=(K, K))
-    moved, _ = least_scale(cut.moved(congruence), congruence @ M @ congruence.T)
+    moved, _ = least_scale(cut.transformed(congruence), congruence @ M @ congruence.T)
     assert moved == pytest.approx(least_scale(cut, M)[0], rel=1e-6)
 
 

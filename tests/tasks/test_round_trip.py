@@ -1,7 +1,5 @@
 """What was written is what was designed: an analysis of the written spectrum agrees with the design."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
