@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.special
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import (
     Absolute,
@@ -131,8 +132,8 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
         if point.imag > _ON_THE_CIRCLE or not lo <= at <= hi:
             continue
         near = at + np.array([1e-5, 1e-6]) * hi * (1.0 if at + 1e-5 * hi <= hi else -1.0)
-        far, close = np.abs(requirement.rows(near)).max(axis=(1, 2))
-        if not np.isfinite(close) or close > _GROWS * far:
+        # A zero of G makes relative rows grow, and a weight may hide a pole: both must grow.
+        if all(_grows(rows) for rows in (requirement.plant_rows(near), requirement.rows(near))):
             where = f"{at / units.frequency:.6g} {units.per_time}"
             raise spec.complain(
                 "unbounded-error",
@@ -142,6 +143,12 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
                 f"{key}.band: [{_beside(at, lo, hi, units.frequency)}]",
                 key=key,
             )
+
+
+def _grows(rows: NDArray[np.float64]) -> bool:
+    """Whether the second of two rows (2, q, k), ten times nearer to a point, is far larger than the first."""
+    far, close = np.abs(rows).max(axis=(1, 2))
+    return not np.isfinite(close) or bool(close > _GROWS * far)
 
 
 def _beside(at: float, lo: float, hi: float, unit: float) -> str:
