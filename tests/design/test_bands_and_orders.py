@@ -31,11 +31,10 @@ def solved(model, band, order, criterion, *, hermitian=False):
         "factor",
         [lambda experiment: Criterion(criterion, experiment.factor)],
         limits=[PowerLimit("input", 1000.0), PowerLimit("output", 1000.0)],
-        band=band,
     )
     power = white_power(question)
-    problem = whitened_problem(question, power)
-    return problem, exchange(problem, power * problem.basis.white, tolerance=1e-7)
+    problem = whitened_problem(question, np.full(2, power / 2))
+    return problem, exchange(problem, power * problem.basis.even, tolerance=1e-7)
 
 
 def test_order_40_is_proved_and_no_worse_than_order_13():

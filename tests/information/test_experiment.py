@@ -26,7 +26,9 @@ def as_matrices(density, inputs):
     return density[..., None, None] if inputs == 1 else density
 
 
-@pytest.mark.parametrize("experiment", [paper_experiment(), Experiment(box_jenkins(), 10).whitened(1.0), single().whitened(2.0)])
+@pytest.mark.parametrize(
+    "experiment", [paper_experiment(), Experiment(box_jenkins(), 10).whitened(1.0), single().whitened(2.0)]
+)
 def test_densities_are_the_definition(experiment):
     """(3) of the spectral design paper, for a random Hermitian spectrum at each frequency."""
     rng = np.random.default_rng(0)
