@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli import load_spec, solve
-from inputdesign_cli.signal import Sinusoids, crest_factor, line_powers, optimise_phases
+from inputdesign_cli.signal import Sinusoids, crest_factor, grid_lines, optimise_phases
 from inputdesign_cli.signal.constraints import compressed
 from inputdesign_cli.spectrum import FirBasis
 
@@ -99,7 +99,8 @@ def first_order(samples: int) -> Sinusoids:
     design = solve(load_spec(ROOT / "specs" / "first_order.yaml"))
     c = np.array(design.result["spectrum"]["coefficients"])
     w = 2 * np.pi * np.arange(samples // 2 + 1) / samples
-    return Sinusoids.on_grid(line_powers(FirBasis(c.size - 1).density(c, w), samples), samples)
+    lines = grid_lines(FirBasis(c.size - 1).density(c, w), samples, 1.0)
+    return Sinusoids.on_grid(lines.dense(samples)[:, 0, 0].real, samples)
 
 
 def costs(samples: int, example: str = "first_order") -> dict[str, float]:

@@ -16,7 +16,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from multiprocessing.context import SpawnProcess
+from typing import Generic
 
 from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
 from inputdesign_cli.compute.threads import ONE_THREAD
@@ -25,10 +26,10 @@ _ATTEMPTS = 2
 
 
 @dataclass
-class _Worker:
-    process: Any
+class _Worker(Generic[Job]):
+    process: SpawnProcess
     pipe: Connection
-    work: Any = None  # (job, attempts so far) while it is at work
+    work: tuple[Job, int] | None = None  # with the attempts so far, while it is at work
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Processes:
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer, in the order in which they are finished."""
-        workers: list[_Worker] = []
+        workers: list[_Worker[Job]] = []
         again: list[tuple[Job, int]] = []
         source = iter(jobs)
         try:
@@ -51,6 +52,7 @@ class Processes:
                     return
                 ready = wait([worker.pipe for worker in busy])
                 for worker in [w for w in busy if w.pipe in ready]:
+                    assert worker.work is not None  # it is busy
                     job, attempts = worker.work
                     worker.work = None
                     try:
@@ -61,17 +63,19 @@ class Processes:
                         if attempts < _ATTEMPTS:
                             again.append((job, attempts))
                             continue
-                        answer, error = (
-                            None,
-                            WorkerLostError(f"{_ATTEMPTS} processes ended in the middle of it"),
-                        )
+                        lost = f"{_ATTEMPTS} processes ended in the middle of it"
+                        answer, error = None, WorkerLostError(lost)
                     yield Finished(job, answer, error)
         finally:
             for worker in workers:
                 _end(worker)
 
     def _feed(
-        self, workers: list[_Worker], function: Any, again: list[tuple[Any, int]], source: Iterator[Any]
+        self,
+        workers: list[_Worker[Job]],
+        function: Callable[[Job], object],
+        again: list[tuple[Job, int]],
+        source: Iterator[Job],
     ) -> None:
         """Give every free process a job, and start processes while there are jobs for them."""
         while True:
@@ -94,7 +98,7 @@ class Processes:
                 free.pipe.send((function, job))
 
 
-def _start() -> _Worker:
+def _start() -> _Worker[Job]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs,), daemon=True)
@@ -131,7 +135,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _end(worker: _Worker) -> None:
+def _end(worker: _Worker[Job]) -> None:
     worker.pipe.close()
     worker.process.terminate()
     worker.process.join()
@@ -146,7 +150,7 @@ def _serve(pipe: Connection) -> None:
         except (EOFError, OSError):
             return
         try:
-            reply: tuple[Any, Exception | None] = (function(job), None)
+            reply: tuple[object, Exception | None] = (function(job), None)
         except Exception as error:
             reply = (None, _portable(error))
         try:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -28,10 +30,10 @@ def key_label(key: str) -> str:
     return _NAMES.get(key, key)
 
 
-def curve(axes: Axes, x: Array, y: Array, **style: object) -> list[Artist]:
+def curve(axes: Axes, x: Array, y: Array, **style: Any) -> list[Artist]:
     """A curve through the points in the order of x."""
     order = np.argsort(x, kind="stable")
-    return list(axes.plot(x[order], y[order], **style))  # type: ignore[arg-type]
+    return list(axes.plot(x[order], y[order], **style))
 
 
 def mark_failures(axes: Axes, where: Array) -> None:

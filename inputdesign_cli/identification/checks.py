@@ -20,8 +20,8 @@ _COMBINED = 1e-13
 _SAMPLES_A_PARAMETER = 3
 
 
-def channel_name(letter: str, channel: int, channels: int) -> str:
-    """How a channel is called in messages: `u2`, or `u` where it is the only one."""
+def signal_name(letter: str, channel: int, channels: int) -> str:
+    """How the signal of a channel is called in messages: `u2`, or `u` where it is the only one."""
     return letter if channels == 1 else f"{letter}{channel + 1}"
 
 
@@ -55,7 +55,7 @@ def check_varying(names: Sequence[str], u: Array, y: Array) -> None:
         for index, signal in enumerate(signals.T):
             if np.ptp(signal) > 1e-12 * max(float(np.abs(signal).max()), 1e-300):
                 continue
-            name = channel_name(letter, index, signals.shape[1])
+            name = signal_name(letter, index, signals.shape[1])
             raise bad_spec(
                 "constant-input" if letter == "u" else "constant-output",
                 f"{name} has the same value {signal[0]:g} in every sample: "
@@ -78,7 +78,7 @@ def check_noisy(variances: Array, y: Array) -> None:
     for index, power in enumerate(np.mean(y**2, axis=0)):
         if variances[index] > _EXACT * power:
             continue
-        name = channel_name("y", index, y.shape[1])
+        name = signal_name("y", index, y.shape[1])
         which = "the output" if y.shape[1] == 1 else name
         raise bad_spec(
             "noise-free-data",

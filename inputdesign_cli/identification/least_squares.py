@@ -1,6 +1,6 @@
 """ARX models of many records at once by linear least squares, [ljung-1999] Section 4.2.
 
-The estimate is that of `fit_channel_batch` with the covariance of e known, in a tenth of the time or less.
+The estimate is that of `fit_batch` with the covariance of e known, in a tenth of the time or less.
 """
 
 from __future__ import annotations

@@ -78,11 +78,11 @@ def png_chart(path: Path) -> Chart:
     """A figure of the run as it is."""
     data = base64.b64encode(path.read_bytes()).decode()
     name = path.stem.replace("_", " ")
-    caption = _CAPTIONS.get(path.stem) or _study_caption(path.stem) or f"The figure {name} of the run."
+    caption = _CAPTIONS.get(path.stem) or _caption_by_kind(path.stem) or f"The figure {name} of the run."
     return Chart(f"data:image/png;base64,{data}", caption, caption)
 
 
-def _study_caption(stem: str) -> str | None:
+def _caption_by_kind(stem: str) -> str | None:
     """What a figure of data or of simulated runs shows; None for other figures."""
     kind, _, name = stem.partition("_")
     if kind in ("errors", "cloud", "disturbance") and name:

@@ -55,7 +55,7 @@ def estimate_answer(result: Result) -> str:
     )
 
 
-def verdict_table(result: Result, time_unit: str) -> Rows | None:
+def requirement_table(result: Result, time_unit: str) -> Rows | None:
     """Each requirement with what the data give."""
     assessment = result.get("assessment")
     if assessment is None:

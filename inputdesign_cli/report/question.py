@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from inputdesign_cli.report.numbers import spoken
-from inputdesign_cli.specification import PolynomialPlant, RegressionPlant, Spec, parse_spec
+from inputdesign_cli.specification import PolynomialPlant, Spec, parse_spec
+from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
 
 _SPECTRA = {
@@ -53,7 +54,7 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
         sentences=tuple(sentences),
         time_unit=spec.time_unit,
         closed_loop=spec.closed_loop,
-        regression=isinstance(spec.plant, RegressionPlant),
+        regression=spec.plant.kind == "regression",
         linearised=error is None or error.region != "ellipsoid",
         asked=frozenset(name for name, value in spec.accuracy if value is not None),
         family=_family(spec),
@@ -68,22 +69,20 @@ def _family(spec: Spec) -> str:
 
 def _system(spec: Spec) -> str:
     plant = spec.plant
-    if isinstance(plant, RegressionPlant):
+    if plant.kind == "regression":
         return "The system is a linear regression with neglected regressors."
     size = f"{_count(plant.inputs, 'input')} and {_count(plant.outputs, 'output')}"
-    kind = _structure(spec) if isinstance(plant, PolynomialPlant) else "continuous-time"
+    kind = _structure(plant, spec.noise) if plant.kind == "polynomial" else "continuous-time"
     clock = f", sampled every {spec.sample_time:g} {spec.time_unit}" if plant.sampled else ""
     article = "an" if kind[0] in "AEFIO" else "a"
     return f"The system is {article} {kind} system with {size}{clock}."
 
 
-def _structure(spec: Spec) -> str:
-    plant = spec.plant
-    assert isinstance(plant, PolynomialPlant)
+def _structure(plant: PolynomialPlant, noise: Noise) -> str:
     dynamic = {
         "A": plant.A != (1.0,),
-        "C": spec.noise.C != (1.0,),
-        "D": spec.noise.D != (1.0,),
+        "C": noise.C != (1.0,),
+        "D": noise.D != (1.0,),
         "F": plant.F is not None,
     }
     present = "".join(name for name, there in dynamic.items() if there)
@@ -97,7 +96,7 @@ def _structure(spec: Spec) -> str:
 def _experiment(spec: Spec) -> str:
     samples = spec.experiment.samples
     length = f"{samples} samples" if samples > 1 else "one sample, so that figures are per sample"
-    if isinstance(spec.plant, RegressionPlant):
+    if spec.plant.kind == "regression":
         return f"The experiment has {length}; the moments of its regressors are summed over all samples."
     loop = "in closed loop, with the controller in operation" if spec.closed_loop else "in open loop"
     if spec.designs and spec.goal == "shortest_experiment":
@@ -169,7 +168,7 @@ def _goal(spec: Spec, verb: str) -> str:
         return f"Asked: {_best(spec)}{among}."
     if spec.goal == "shortest_experiment":
         return f"Asked: the shortest experiment that does it{among}."
-    if isinstance(spec.plant, RegressionPlant):
+    if spec.plant.kind == "regression":
         return f"Asked: the least energy that does it{among}; the energy is their trace."
     weights = {"input": spec.cost.input_power, "output": spec.cost.output_power}
     weights["excitation"] = spec.cost.excitation_power

@@ -11,8 +11,8 @@ from inputdesign_cli.report.evidence import (
     estimate_answer,
     estimate_facts,
     estimate_table,
+    requirement_table,
     simulation_table,
-    verdict_table,
 )
 from inputdesign_cli.report.numbers import Fact, listed, provenance, shown
 from inputdesign_cli.report.question import read_question
@@ -63,7 +63,7 @@ def run_page(run: Path) -> dict[str, Json]:
         "notes": result.get("notes", []),
         "estimate": estimate_table(result),
         "estimate_facts": list(estimate_facts(result)),
-        "verdicts": verdict_table(result, question.time_unit),
+        "verdicts": requirement_table(result, question.time_unit),
         "data_charts": data,
         "facts": list(_facts(result, question.time_unit)),
         "charts": charts,

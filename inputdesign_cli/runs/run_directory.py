@@ -21,16 +21,6 @@ from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.text_formats import csv_text, json_text, plain
 
-__all__ = [
-    "complaining",
-    "environment",
-    "finished_result",
-    "read_run",
-    "replace_text",
-    "write_run",
-    "write_text",
-]
-
 RESULT = "result.json"
 SPEC = "spec.yaml"
 # Every run has some of these; what else it wrote its result lists under `files`.
@@ -79,7 +69,7 @@ def write_run(
     """
     result = finished_result(results)
     target = Path(os.path.realpath(directory))
-    with complaining(directory):
+    with output_errors(directory):
         if target.exists() and not target.is_dir():
             raise OutputError(
                 Diagnostic(
@@ -112,7 +102,7 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         OutputError: `output-not-writable`, `output-full`.
     """
-    with complaining(path):
+    with output_errors(path):
         _write(path, text)
 
 
@@ -124,7 +114,7 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
         OutputError: `output-not-writable`, `output-full`.
     """
     partial = path.with_name(f".{path.name}.partial-{os.getpid()}")
-    with complaining(path):
+    with output_errors(path):
         try:
             with partial.open("w", encoding="utf-8", newline="\n") as file:
                 file.writelines([text] if isinstance(text, str) else text)
@@ -266,7 +256,7 @@ def _sync(path: Path) -> None:
 
 
 @contextmanager
-def complaining(target: Path) -> Iterator[None]:
+def output_errors(target: Path) -> Iterator[None]:
     """Turn what the operating system refuses into an `OutputError`."""
     try:
         yield

@@ -25,7 +25,7 @@ from typing import IO
 
 from inputdesign_cli.errors import Diagnostic, OutputError
 from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import RESULT, complaining, replace_text
+from inputdesign_cli.runs.run_directory import RESULT, output_errors, replace_text
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, WORKERS = ".lock", ".workers"
@@ -64,7 +64,7 @@ class Layout:
     def write_failure(self, key: str, text: str) -> None:
         """Note why a point has no result, in one step."""
         path = self.failure(key)
-        with complaining(path):
+        with output_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
         replace_text(path, text)
 
@@ -72,7 +72,7 @@ class Layout:
         """Put the run of a point, computed elsewhere, in its place in one step."""
         target = self.run(key)
         partial = target.parent / f".{key}.partial-{os.getpid()}"
-        with complaining(target):
+        with output_errors(target):
             shutil.rmtree(partial, ignore_errors=True)
             partial.mkdir(parents=True)
             for name, content in files.items():
@@ -98,7 +98,7 @@ def opened(root: Path) -> Iterator[Layout]:
             in it), `output-not-a-directory`, `output-not-writable`, `output-full`.
     """
     with contextlib.ExitStack() as held:
-        with complaining(root):
+        with output_errors(root):
             if root.exists() and not root.is_dir():
                 message = f"{root} is a file, and a sweep is written into a directory"
                 raise OutputError(

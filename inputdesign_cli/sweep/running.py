@@ -21,7 +21,7 @@ from inputdesign_cli.errors import (
 )
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import complaining, replace_text
+from inputdesign_cli.runs.run_directory import output_errors, replace_text
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.specification.yaml.writer import to_yaml
 from inputdesign_cli.sweep.layout import SPEC, SUMMARY, TABLE, Layout, opened
@@ -166,7 +166,7 @@ class _Run:
     def compute(self) -> None:
         """Compute what is not done yet."""
         points = self.layout.root / "points"
-        with complaining(points):
+        with output_errors(points):
             points.mkdir(exist_ok=True)
         due = time.monotonic() + _REST
         function = run_point if self.executor.shares_files else run_point_elsewhere

@@ -1,7 +1,6 @@
 """The delivered records of random designs: they meet the accuracy by themselves, at little extra power."""
 
 import pytest
-from inputdesign_cli.signal.single import as_channels
 from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError
@@ -28,7 +27,7 @@ def delivered(seed, samples, **settings):
     problem, x = design.problem, design.result.x
     designed = sum(weight * problem.power(kind).at(x) for kind, weight in case.cost.items())
     target = Target(worst_ratio(problem.requirements), True, case.cost, designed)
-    plant = FiniteRecord(as_channels(problem.experiment), samples)
+    plant = FiniteRecord(problem.experiment, samples)
     spectrum = DesignedSpectrum.of(FirBasis(x.size - 1), x)
     record = best_record(SignalGenerator(spectrum, SignalSettings(**settings), samples), plant, target)
     cost = sum(weight * plant.mean_squares(kind, record.samples)[0] for kind, weight in case.cost.items())

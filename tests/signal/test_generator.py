@@ -1,8 +1,9 @@
 """Records of every kind, of one input and of two: periods, hold, ramp, chosen lines, and their spectra."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from inputdesign_cli.signal.single import as_channels
 
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal import (
@@ -14,7 +15,7 @@ from inputdesign_cli.signal import (
     best_record,
 )
 from inputdesign_cli.signal.multisine import gaussian_record
-from inputdesign_cli.spectrum import DirectedLines, FirBasis, LinesBasis
+from inputdesign_cli.spectrum import FirBasis, LinesBasis
 
 COLOURED = autocorrelation(np.array([1.0, 0.9, 0.6, 0.3]))
 KINDS = ["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
@@ -42,9 +43,9 @@ TWO = DesignedSpectrum(2, 13.58, density=density)
 SPECTRA = {
     "moving average": DesignedSpectrum.of(FirBasis(3), COLOURED),
     "density": DesignedSpectrum(1, COLOURED[0], density=one_input),
-    "lines": DesignedSpectrum.of(LinesBasis(LINES), np.ones(2)),
+    "lines": DesignedSpectrum.of(LinesBasis.at(LINES, 1), np.ones(2)),
     "two inputs": TWO,
-    "lines of two inputs": DesignedSpectrum.of(DirectedLines.at(LINES, 2), np.ones(8), inputs=2),
+    "lines of two inputs": DesignedSpectrum.of(LinesBasis.at(LINES, 2), np.ones(8), inputs=2),
 }
 
 
@@ -145,16 +146,16 @@ def record_of(experiment, basis, x, seed=0):
 
 def test_free_lines_that_a_record_cannot_tell_apart_do_not_cancel(first_order):
     """Four sinusoids near w = 0 are one constant of their power; the line at 2.0 keeps its own power."""
-    basis = LinesBasis(np.array([1e-5, 2.0, 1.1e-5, 3e-4, 2.0 + 1e-6, 4e-4]), free=True)
+    basis = replace(LinesBasis.at(np.array([1e-5, 2.0, 1.1e-5, 3e-4, 2.0 + 1e-6, 4e-4]), 1), free=True)
     for seed in range(6):
-        samples = record_of(as_channels(first_order), basis, np.array([1.0, 0.5, 1.0, 1.0, 0.5, 1.0]), seed)
+        samples = record_of(first_order, basis, np.array([1.0, 0.5, 1.0, 1.0, 0.5, 1.0]), seed)
         assert abs(np.mean(samples)) == pytest.approx(2.0, rel=0.01)
         line = 2 * np.abs(np.mean(samples * np.exp(-2.0j * np.arange(500)))) ** 2
         assert line == pytest.approx(1.0, rel=0.05)
 
 
 def test_given_lines_are_made_as_they_are_given(first_order):
-    samples = record_of(as_channels(first_order), LinesBasis(np.array([1.0, 1.001])), np.ones(2))
+    samples = record_of(first_order, LinesBasis.at(np.array([1.0, 1.001]), 1), np.ones(2))
     rows = np.exp(1j * np.outer([1.0, 1.001], np.arange(500)))
     regressors = np.concatenate([rows.real, rows.imag]).T
     fit = np.linalg.lstsq(regressors, samples, rcond=None)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from channel_plants import arx
-from inputdesign_cli.signal.single import as_channels
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import (
@@ -174,7 +173,7 @@ def check(experiment, settings, bounds):
 def experiment(request, first_order):
     """The first-order system, or an ARX system of two inputs and outputs, in white coordinates."""
     if request.param == 1:
-        return as_channels(first_order).whitened(1.0)
+        return first_order.whitened(1.0)
     return Experiment(arx(), 240).whitened(1.0)
 
 
@@ -199,14 +198,14 @@ def test_converters_hold_the_limits_too(experiment, kind, limited):
 @pytest.mark.parametrize("limits", [{"amplitude": 2.0}, {"rate": 2.5}, {"output": 2.5}])
 @pytest.mark.parametrize("kind", ["noise", "optimised", "binary"])
 def test_limits_in_closed_loop_are_those_of_what_r_causes(flexible, kind, limits):
-    check(as_channels(flexible).whitened(1.0), SETTINGS[kind], bounds_of(1, **limits))
+    check(flexible.whitened(1.0), SETTINGS[kind], bounds_of(1, **limits))
 
 
 def test_a_looser_limit_never_costs_more(first_order):
     """The cheapest record within the limit, from 1.0 (clipped hard) to none."""
     costs = []
     for amplitude in (1.0, 1.3, 2.0, np.inf):
-        _, record = made(as_channels(first_order).whitened(1.0), {}, Bounds(np.array([amplitude])), 5)
+        _, record = made(first_order.whitened(1.0), {}, Bounds(np.array([amplitude])), 5)
         assert record.met
         costs.append(record.power)
     assert costs[0] * 1.02 > costs[-1]

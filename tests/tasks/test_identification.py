@@ -9,8 +9,6 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.runs.results import Table
-from inputdesign_cli.runs.text_formats import csv_text
 
 SPEC = "specs/first_order.yaml"
 EASY = ["spectrum.order=5", "accuracy.model_error={relative: 0.03, alpha: 2.45}"]
@@ -23,15 +21,10 @@ def record(u, seed=0):
     return {"time_s": np.arange(u.size, dtype=float), "u1": u, "y1": y}
 
 
-def write(path, columns):
-    path.write_text(csv_text(Table(columns)), encoding="utf-8")
-    return path
-
-
 @pytest.fixture
-def data(tmp_path):
+def data(write):
     u = np.random.default_rng(1).standard_normal(500)
-    return write(tmp_path / "data.csv", record(u))
+    return write(record(u))
 
 
 def test_the_blocks_can_be_pasted(data):
@@ -56,10 +49,10 @@ def test_data_that_suffice_meet_the_target(data):
     assert assessment.outcome.result["status"] == "met"
 
 
-def test_a_top_up_makes_up_for_what_is_missing(tmp_path):
+def test_a_top_up_makes_up_for_what_is_missing(write):
     u = 0.3 * np.random.default_rng(2).standard_normal(500)
     columns = record(u)
-    path = write(tmp_path / "short.csv", columns)
+    path = write(columns)
     spec = load_spec(SPEC, EASY)
     short = assess(spec, path)
     assert not short.met
@@ -88,24 +81,25 @@ def test_the_command_exits_with_one_when_the_target_is_missed(data, tmp_path):
     assert "estimate" in run.stdout
 
 
-def test_offsets_and_outliers_are_told(tmp_path):
+def test_offsets_and_outliers_are_told(write):
     columns = record(np.random.default_rng(3).standard_normal(500))
     columns["y1"] = columns["y1"] + 100.0
     columns["u1"][40] = 60.0
-    outcome = identify(load_spec(SPEC), write(tmp_path / "d.csv", columns))
+    path = write(columns)
+    outcome = identify(load_spec(SPEC), path)
     notes = " ".join(outcome.result["notes"])
     assert "row 42" in notes
     assert "--remove-means" in notes
-    centred = identify(load_spec(SPEC), tmp_path / "d.csv", remove_means=True)
+    centred = identify(load_spec(SPEC), path, remove_means=True)
     assert "--remove-means" not in " ".join(centred.result["notes"])
 
 
 @pytest.mark.parametrize("names", [("u", "y"), ("U_volt", "y1_bar"), ("u1_V", "y")])
-def test_columns_may_carry_units(names, tmp_path):
+def test_columns_may_carry_units(names, write):
     columns = record(np.random.default_rng(3).standard_normal(300))
-    plain = identify(load_spec(SPEC), write(tmp_path / "d.csv", columns)).result["identification"]
+    plain = identify(load_spec(SPEC), write(columns)).result["identification"]
     renamed = {"time_s": columns["time_s"], names[0]: columns["u1"], names[1]: columns["y1"]}
-    found = identify(load_spec(SPEC), write(tmp_path / "e.csv", renamed)).result["identification"]
+    found = identify(load_spec(SPEC), write(renamed)).result["identification"]
     assert found["theta"] == plain["theta"]
 
 
@@ -125,9 +119,9 @@ def _without(name):
         (lambda c: {**c, "y1": scipy.signal.lfilter([0, 3.6], [1, -0.7], c["u1"])}, "noise-free-data"),
     ],
 )
-def test_bad_records_are_refused(change, code, tmp_path):
+def test_bad_records_are_refused(change, code, write):
     columns = change(record(np.random.default_rng(4).standard_normal(500)))
-    path = write(tmp_path / "d.csv", columns)
+    path = write(columns)
     with pytest.raises((SpecError, DataError)) as caught:
         identify(load_spec(SPEC, ["noise={variance: 1}"]), path)
     assert caught.value.diagnostics[0].code == code

@@ -10,8 +10,6 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, identify, load_spec, parse_spec, validate
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
-from inputdesign_cli.runs.results import Table
-from inputdesign_cli.runs.text_formats import csv_text
 from inputdesign_cli.tasks.build.system import build_experiment, build_model
 
 SPEC = "specs/two_by_two_arx.yaml"
@@ -37,21 +35,16 @@ def record(spec, samples=500, power=1.0, seed=0):
     return columns
 
 
-def write(path, columns):
-    path.write_text(csv_text(Table(columns)), encoding="utf-8")
-    return path
-
-
 @pytest.fixture
-def data(tmp_path):
-    return write(tmp_path / "data.csv", record(load_spec(SPEC)))
+def data(write):
+    return write(record(load_spec(SPEC)))
 
 
 @pytest.mark.parametrize("given", ["arx", "jenkins"])
-def test_the_blocks_can_be_pasted(given, tmp_path):
+def test_the_blocks_can_be_pasted(given, write):
     spec = load_spec(SPEC, ["spectrum.order=4"]) if given == "arx" else parse_spec(JENKINS)
     model = build_model(spec)
-    outcome = identify(spec, write(tmp_path / "d.csv", record(spec, 1000)))
+    outcome = identify(spec, write(record(spec, 1000)))
     found = outcome.result["identification"]
     for name, true in zip(model.names, model.theta, strict=True):
         assert abs(found["theta"][name] - true) < 4.5 * found["standard_deviation"][name]
@@ -99,12 +92,12 @@ def recorded_in_s(spec, samples, hold, rng):
 
 @pytest.mark.parametrize("hold", [True, False])
 @pytest.mark.parametrize("denominator", [EACH, "[1, 1.5, 1.5]"])
-def test_plants_in_s_come_back(hold, denominator, tmp_path):
+def test_plants_in_s_come_back(hold, denominator, write):
     overrides = ["plant.sample=zoh"] if hold else []
     spec = parse_spec(IN_S.replace("DENOMINATOR", denominator), overrides=overrides)
     model = build_model(spec)
     columns = recorded_in_s(spec, 1500, hold, np.random.default_rng(1))
-    outcome = identify(spec, write(tmp_path / "d.csv", columns))
+    outcome = identify(spec, write(columns))
     found = outcome.result["identification"]
     for name, true in zip(model.names, model.theta, strict=True):
         assert abs(found["theta"][name] - true) < 4.5 * found["standard_deviation"][name]
@@ -117,19 +110,19 @@ def test_plants_in_s_come_back(hold, denominator, tmp_path):
 
 
 @pytest.mark.parametrize(("relative", "enough"), [(2.0, True), (0.1, False)])
-def test_plants_in_s_are_assessed(relative, enough, tmp_path):
+def test_plants_in_s_are_assessed(relative, enough, write):
     overrides = [f"accuracy.model_error.relative={relative}", "plant.sample=zoh"]
     spec = parse_spec(IN_S.replace("DENOMINATOR", "[1, 1.5, 1.5]"), overrides=overrides)
-    data = write(tmp_path / "d.csv", recorded_in_s(spec, 500, True, np.random.default_rng(1)))
+    data = write(recorded_in_s(spec, 500, True, np.random.default_rng(1)))
     found = assess(spec, data)
     assert found.met == enough
     if not enough:
         assert found.outcome.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_held_input_taken_for_its_interpolation_is_told(tmp_path):
+def test_a_held_input_taken_for_its_interpolation_is_told(write):
     spec = parse_spec(IN_S.replace("DENOMINATOR", EACH))
-    data = write(tmp_path / "d.csv", recorded_in_s(spec, 1500, True, np.random.default_rng(1)))
+    data = write(recorded_in_s(spec, 1500, True, np.random.default_rng(1)))
     assert any("plant.sample: zoh" in note for note in identify(spec, data).result["notes"])
 
 
@@ -141,9 +134,9 @@ def recorded_in_loop(spec, samples, rng):
     return {"time_s": np.arange(samples), "u1": u[:, 0], "u2": u[:, 1], "y1": y[:, 0], "y2": y[:, 1]}
 
 
-def test_a_loop_is_identified_directly_and_topped_up(tmp_path):
+def test_a_loop_is_identified_directly_and_topped_up(write):
     spec = load_spec("specs/two_by_two_loop.yaml", ["spectrum.order=4", "experiment.samples=1000"])
-    data = write(tmp_path / "d.csv", recorded_in_loop(spec, 1000, np.random.default_rng(1)))
+    data = write(recorded_in_loop(spec, 1000, np.random.default_rng(1)))
     outcome = identify(spec, data)
     model, found = build_model(spec), outcome.result["identification"]
     for name, true in zip(model.names, model.theta, strict=True):
@@ -218,11 +211,11 @@ def test_data_of_another_structure_are_told(data):
     assert "past inputs explain residuals" in notes
 
 
-def test_offsets_and_outliers_name_the_channel(tmp_path):
+def test_offsets_and_outliers_name_the_channel(write):
     columns = record(load_spec(SPEC))
     columns["y2"] = columns["y2"] + 100.0
     columns["u2"][40] = 60.0
-    path = write(tmp_path / "d.csv", columns)
+    path = write(columns)
     notes = " ".join(identify(load_spec(SPEC), path).result["notes"])
     assert "u2 has 1 outlying value (row 42)" in notes
     assert "y2 varies" in notes
@@ -250,8 +243,8 @@ def test_offsets_and_outliers_name_the_channel(tmp_path):
         (lambda c: {"time_ms": c.pop("time_s"), **c}, "data-wrong-unit", "ms"),
     ],
 )
-def test_bad_records_are_refused(change, code, named, tmp_path):
-    path = write(tmp_path / "d.csv", change(record(load_spec(SPEC))))
+def test_bad_records_are_refused(change, code, named, write):
+    path = write(change(record(load_spec(SPEC))))
     with pytest.raises((SpecError, DataError)) as caught:
         identify(load_spec(SPEC), path)
     assert caught.value.diagnostics[0].code == code

@@ -11,6 +11,7 @@ from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, roots_in_z
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate, stack
 from inputdesign_cli.plant.polynomial_model import PolynomialModel
+from inputdesign_cli.plant.transfer import product_of
 
 
 class MatrixPlant(PolynomialModel):
@@ -29,15 +30,10 @@ class MatrixPlant(PolynomialModel):
     @cached_property
     def numerator(self) -> Array:
         """N (outputs, inputs, l): G = R^-1 N with R diagonal, R_i = A_i prod_j F_ij."""
-        rows = []
-        for above, below in zip(self.B, self.F, strict=True):
-            row = []
-            for j, b in enumerate(above):
-                product = b
-                for other, f in enumerate(below):
-                    product = np.convolve(product, f) if other != j else product
-                row.append(product.tolist())
-            rows.append(row)
+        rows = [
+            [product_of([b, *below[:j], *below[j + 1 :]]).tolist() for j, b in enumerate(above)]
+            for above, below in zip(self.B, self.F, strict=True)
+        ]
         return stack(rows)
 
     @cached_property

@@ -15,10 +15,9 @@ from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
 
-# Noise happens to fit badly now and then: many are tried, and more while the best costs much.
-_NOISE, _MOST_NOISE = 20, 80
-# Sinusoids, and levels that come near their powers, vary little from one to the next.
-_OTHERS, _MOST_OTHERS = 8, 20
+# Shared by the inputs: each adds a period to a record, which varies the less and takes the longer.
+_CANDIDATES, _FEWEST = 20, 4
+_PATIENCE = 4  # times as many at most, where noise happens to fit badly
 # Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
 _OPTIMISED = 4
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
@@ -63,10 +62,9 @@ def build_signal_settings(spec: Spec) -> SignalSettings:
     limited = spec.limits.amplitude is not None or spec.limits.rate is not None
     uniform: Phases = "orthogonal" if inputs > 1 else "random"
     phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else uniform)
-    noise = method in ("filtered_noise", "white")
-    candidates, most = (_NOISE, _MOST_NOISE) if noise else (_OTHERS, _MOST_OTHERS)
-    if method == "multisine" and phases == "optimised":
-        candidates = most = _OPTIMISED
+    optimised = method == "multisine" and phases == "optimised"
+    candidates = _OPTIMISED if optimised else max(_CANDIDATES // inputs, _FEWEST)
+    most = _PATIENCE * candidates if method == "filtered_noise" else candidates
     return SignalSettings(
         method=method,
         phases=phases,
