@@ -11,12 +11,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from inputdesign_cli.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from inputdesign_cli.specification import load_spec, parse_spec
     from inputdesign_cli.sweep.running import sweep
     from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, validate
-
-__version__ = "0.1.0"
 
 __all__ = [
     "__version__",
