@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.signal
 import scipy.stats
-from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
@@ -55,7 +54,7 @@ plant:
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=list(overrides))
-    return by_exchange(spec, build_convex(spec))[0].result
+    return build_convex(spec).designed()[0].design.result
 
 
 @pytest.mark.parametrize(
@@ -82,7 +81,7 @@ def motor(theta, w):
 def test_the_motor_against_a_plain_program():
     """The least cost of r of order 3: relative parameters, sums over a circle, LMIs at 180 frequencies."""
     spec = load_spec(MOTOR, ["spectrum.order=3"])
-    found = by_exchange(spec, build_convex(spec))[0].result
+    found = build_convex(spec).designed()[0].design.result
     theta, samples, variance, order = np.array([2.0, 20.02, 12.0]), 600, 2.5e-5, 3
 
     def gradient(w):

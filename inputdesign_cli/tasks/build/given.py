@@ -40,6 +40,8 @@ from inputdesign_cli.tasks.result.given_limits import StatedLimits
 _NEGATIVE = -1e-9
 _TABLE = "spectrum.given.file"
 _REFUSED = ("spectrum", "energy")
+# Keys of signals that mean something for a record that the tool makes.
+_MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
 
 
 def build_given(spec: Spec) -> GivenTask:
@@ -56,14 +58,14 @@ def build_given(spec: Spec) -> GivenTask:
             key="spectrum",
         )
     check_supported(spec)
-    stated = spec.limits.model_dump(include=set(_REFUSED), exclude_none=True)
-    for name in stated:
+    for name in spec.limits.stated(*_REFUSED):
         raise spec.complain(
             "not-supported",
             f"this version does not compare a given excitation with limits.{name}",
             hint="remove it",
             key=f"limits.{name}",
         )
+    _check_signal_is_open(spec, spec.spectrum)
     check_signal(spec)
     experiment = build_experiment(spec)
     requirements = build_requirements(spec, experiment)
@@ -82,6 +84,31 @@ def build_given(spec: Spec) -> GivenTask:
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
     )
+
+
+def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
+    """Refuse settings of the signal where the excitation leaves nothing to choose.
+
+    That is a record, and sinusoids in phase over several inputs.
+
+    Raises:
+        SpecError: `not-supported`.
+    """
+    fixed = isinstance(stated.given, GivenSignal) or (
+        isinstance(stated.given, GivenMultisine) and spec.plant.inputs > 1
+    )
+    for name in spec.signal.stated(*_MADE) if fixed else ():
+        if (name, spec.signal.type) == ("type", "multisine") or (name, spec.signal.phases) == (
+            "phases",
+            "random",
+        ):
+            continue
+        raise spec.complain(
+            "not-supported",
+            f"this version does not apply signal.{name} to this given excitation: its samples are settled",
+            hint="remove it",
+            key=f"signal.{name}",
+        )
 
 
 def _limits(spec: Spec) -> StatedLimits:

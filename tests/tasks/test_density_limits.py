@@ -5,7 +5,6 @@ import warnings
 import cvxpy as cp
 import numpy as np
 import pytest
-from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.specification import parse_spec
@@ -25,7 +24,7 @@ GRID = np.linspace(0.0, np.pi, 801)
 
 def designed(text, *overrides):
     spec = parse_spec(text, overrides=list(overrides))
-    return by_exchange(spec, build_convex(spec))[0]
+    return build_convex(spec).designed()[0].design
 
 
 def plain_program(design, order, upper, lower, power):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from inputdesign_cli.tasks.design import by_exchange
 
 from inputdesign_cli import solve
 from inputdesign_cli.errors import SpecError
@@ -10,7 +9,6 @@ from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.system import build_experiment
-from inputdesign_cli.tasks.build.task import build_task
 
 SPEC = """
 plant:
@@ -66,11 +64,11 @@ def test_decoupled_loops_cost_as_much_as_each_alone():
         "plant: {A: [1, -0.6], B: [0, 0.7]}\nnoise: {variance: 0.5}\n"
         "experiment: {samples: 500, controller: {numerator: [0.3], denominator: [1, -0.5]}}\n",
     ]
-    design = by_exchange(both, build_convex(both))[0].result
+    design = build_convex(both).designed()[0].design.result
     costs = []
     for text in alone:
         spec = parse_spec(text + common)
-        costs.append(by_exchange(spec, build_task(spec))[0].result.objective)
+        costs.append(build_convex(spec).designed()[0].design.result.objective)
     assert design.gap < 1e-6
     assert design.objective == pytest.approx(sum(costs), rel=2e-6)
 
