@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from channel_plants import arrays, arx, box_jenkins, paper_experiment, two_by_two
-from plants import random_case
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel
 from inputdesign_cli.spectrum import FirBasis, FlatBasis, MatrixFirBasis
+from tests.support.plants import arrays, arx, box_jenkins, paper_experiment, two_by_two
+from tests.support.random_plants import random_case
 
 W = np.array([0.1, 0.9, 2.2])
 

@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays, arx, paper_experiment
-from plants import random_case
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.information.record_transforms import RecordTransforms
 from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix
 from inputdesign_cli.signal import grid_lines, multisine_record
+from tests.support.plants import arrays, arx, paper_experiment
+from tests.support.random_plants import random_case
 
 
 @pytest.mark.parametrize("seed", [1, 5, 7, 9, 15])

@@ -6,9 +6,9 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays, arx, box_jenkins, descending, two_by_two
 
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
+from tests.support.plants import arrays, arx, box_jenkins, descending, two_by_two
 
 W = np.array([0.05, 0.4, 1.3, 2.9])
 COMMON = ContinuousModel.monic(

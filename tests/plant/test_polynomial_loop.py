@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays
-from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix, close_loop
 from inputdesign_cli.spectrum import MatrixFirBasis
+from tests.support.loop_checks import check_information, check_signals
+from tests.support.plants import arrays
 
 LONG = 400
 STEP = 1e-6

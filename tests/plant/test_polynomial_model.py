@@ -1,10 +1,10 @@
-"""Single-channel models: gradients against finite differences, the predictor form against the paper's formulas."""
+"""Gradients of one channel against finite differences, the predictor form against the formulas of the paper."""
 
 import numpy as np
 import pytest
-from plants import STRUCTURES, random_loop, random_model
 
 from inputdesign_cli.plant import PolynomialModel
+from tests.support.random_plants import STRUCTURES, random_loop, random_model
 
 W = np.array([0.0, 0.01, 0.3, 1.0, 2.5, np.pi])
 

@@ -1,13 +1,13 @@
 """The delivered records of random designs: they meet the accuracy by themselves, at little extra power."""
 
 import pytest
-from plants import random_case
 
 from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
 from inputdesign_cli.spectrum import FirBasis
 from inputdesign_cli.tasks.record import worst_ratio
+from tests.support.random_plants import random_case
 
 EXTRA = {500: 0.10, 5000: 0.03}
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from channel_plants import arx, paper_experiment
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, graded_grid
@@ -16,6 +15,7 @@ from inputdesign_cli.spectrum import (
     hvec,
     svec,
 )
+from tests.support.plants import arx, paper_experiment
 
 DISCRETE = Experiment(arx(), 20).whitened(1.0)
 PAPER = paper_experiment()

@@ -48,7 +48,7 @@ def random_model(rng: np.random.Generator, structure: str, order: int) -> Polyno
 
 
 def random_loop(rng: np.random.Generator, model: PolynomialModel, *, closed: bool) -> Loop | None:
-    """None for open loop, or a random low-order controller at a gain that keeps the loop well inside stability."""
+    """None for open loop, or a random low-order controller at a gain well inside stability."""
     if not closed:
         return None
     pole = rng.uniform(0.2, 0.995)

@@ -6,7 +6,6 @@ import itertools
 import cvxpy as cp
 import numpy as np
 import pytest
-from on_grid import OnGrid
 
 from inputdesign_cli.accuracy import (
     Criterion,
@@ -24,6 +23,7 @@ from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, zero_order_hold
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from tests.support.on_grid import OnGrid
 
 GRID = np.unique(np.concatenate([np.linspace(0.0, np.pi, 4001), np.geomspace(1e-4, np.pi, 4001)]))
 ORDER = 8

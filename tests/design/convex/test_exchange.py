@@ -4,8 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from on_grid import OnGrid
-from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError, Relative
 from inputdesign_cli.design.convex.designs import Question, solve_design
@@ -13,6 +11,8 @@ from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import FirBasis
+from tests.support.on_grid import OnGrid
+from tests.support.random_plants import random_case
 
 DENSE = np.unique(np.concatenate([np.linspace(0.0, np.pi, 50001), np.geomspace(1e-5, np.pi, 50001)]))
 

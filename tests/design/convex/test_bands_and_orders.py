@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from channel_plants import arrays, two_by_two
 
 from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.design.convex.designs import Question, white_power, whitened_problem
@@ -11,6 +10,7 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.spectrum import PolynomialBasis
+from tests.support.plants import arrays, two_by_two
 
 
 def random_plant(rng):
