@@ -10,6 +10,7 @@ from inputdesign_cli.accuracy.model_error import check_positive
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, Rational
+from tests.support.plants import arx
 
 
 def random_information(size, seed):
@@ -26,15 +27,28 @@ def plant_gradient(model, w):
     return model.plant_gradient(w)[:, :, 0, 0]
 
 
-def test_error_bound_is_the_definition(first_order):
-    """alpha sqrt(lambda_max(T P T^T)) of (6), by plain matrices."""
-    M = random_information(3, 1)
+SINGLE = PolynomialModel.single([0, 3.6], F=[1, -0.7], C=[1, -0.9], D=[1, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("model", "entry"), [(SINGLE, (0, 0)), (SINGLE, None), (arx(), (1, 0)), (arx(), None)]
+)
+def test_error_bound_is_the_definition(model, entry):
+    """alpha sqrt(lambda_max(T P T^T)) of (6), by plain matrices, of an entry or of the norm of G."""
+    M = random_information(model.theta.size, 1)
     P = np.linalg.inv(M)
-    requirement = first_order_error(first_order, Absolute(1.0), 2.45)
+    requirement = ModelError(
+        experiment=Experiment(model, 500),
+        band=(0.0, np.pi),
+        entry=entry,
+        admissible=Absolute(1.0),
+        alpha=2.45,
+    )
     w = np.array([0.0, 0.2, 1.0, np.pi])
     expected = []
-    for gradient in plant_gradient(first_order.model, w):
-        T = np.stack([gradient.real, gradient.imag])
+    for gradient in model.plant_gradient(w):  # (k, p, r)
+        entries = np.ndindex(gradient.shape[1:]) if entry is None else [entry]
+        T = np.array([part for i, j in entries for part in (gradient[:, i, j].real, gradient[:, i, j].imag)])
         expected.append(2.45 * np.sqrt(np.linalg.eigvalsh(T @ P @ T.T)[-1]))
     np.testing.assert_allclose(requirement.error_bound(M, w), expected, rtol=1e-12)
     np.testing.assert_allclose(requirement.ratios(M, w), expected, rtol=1e-12)

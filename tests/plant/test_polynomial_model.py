@@ -1,4 +1,4 @@
-"""Gradients of one channel against finite differences, the predictor form against the formulas of the paper."""
+"""Gradients of one channel against finite differences, the predictor form against formulas of the paper."""
 
 import numpy as np
 import pytest
