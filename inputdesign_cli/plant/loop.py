@@ -117,8 +117,11 @@ class Loop(ABC):
         """
         left, noise = self.left_at(w), self.noise_at(w)
         n, p, r = len(left), self.model.outputs, self.model.inputs
+        if p == r == 1:
+            return _single_responses(left, noise)
+        inputs = p + np.arange(r)
         right = np.zeros((n, p + r, r + p), dtype=complex)
-        right[:, p + np.arange(r), np.arange(r)] = self.controller.fraction_at(w)[1]
+        right[:, inputs, np.arange(r)] = left[:, inputs, inputs]
         right[:, :p, r:] = noise
         solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
         return LoopResponse(
@@ -143,6 +146,15 @@ class Loop(ABC):
         t = self.responses(w)
         e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), t.y_e.shape)
         return self.model.prediction_gradient(w, t.y_e, t.u_e, e)
+
+
+def _single_responses(left: ComplexArray, noise: ComplexArray) -> LoopResponse:
+    """One input and one output, by Cramer's rule from the matrix on the left (n, 2, 2) and R H (n, 1, 1)."""
+    R, minus_N, P, Q = (left[:, i : i + 1, j : j + 1] for i in (0, 1) for j in (0, 1))
+    below = R * Q - minus_N * P
+    return LoopResponse(
+        y_x=-minus_N * Q / below, u_x=R * Q / below, y_e=Q * noise / below, u_e=-P * noise / below
+    )
 
 
 @singledispatch

@@ -21,9 +21,11 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    return np.asarray(
-        np.polynomial.polynomial.polyval(q, np.asarray(coefficients, dtype=float)), dtype=complex
-    )
+    c = np.asarray(coefficients, dtype=float)
+    value: ComplexArray = np.full(np.shape(q), c[-1], dtype=complex)
+    for coefficient in c[-2::-1]:  # Horner
+        value = value * q + coefficient
+    return value
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:

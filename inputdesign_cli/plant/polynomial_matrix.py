@@ -24,8 +24,10 @@ def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
 
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
     """(K, rows, columns): the values at `q` (K,), which stands for q^-1."""
-    powers = q[:, None] ** np.arange(matrix.shape[-1])
-    return np.einsum("kl,ijl->kij", powers, matrix)
+    value = np.broadcast_to(matrix[..., -1].astype(complex), (q.size, *matrix.shape[:-1]))
+    for lag in range(matrix.shape[-1] - 2, -1, -1):
+        value = value * q[:, None, None] + matrix[..., lag]
+    return value
 
 
 def multiply(left: Array, right: Array) -> Array:
