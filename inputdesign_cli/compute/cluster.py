@@ -105,9 +105,7 @@ class Cluster:
 
 
 def _version() -> str:
-    import inputdesign_cli
-
-    return inputdesign_cli.__version__
+    return __version__
 
 
 def _threads(client: Any) -> int:
