@@ -88,6 +88,8 @@ class Experiment(Coordinates):
     def _whiten(self, gradient: ComplexArray) -> ComplexArray:
         if self.factor is None:
             return gradient
+        if gradient.shape[2:] == (1, 1):
+            return (gradient[:, :, 0, 0] @ self._inverse_factor.T)[:, :, None, None]
         return np.tensordot(gradient, self._inverse_factor, axes=(1, 1)).transpose(0, 3, 1, 2)
 
     def information_density(self, w: ArrayLike) -> NDArray:

@@ -5,7 +5,7 @@ The five-polynomial form A y = (B/F) u + (C/D) e ([ljung-1999], Section 4.2) wit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -143,7 +143,10 @@ class PolynomialModel(Parametrised):
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         q = unit_circle(w)
-        return self._entries(q, lambda i, j: evaluate(self.B[i][j], q) / self._denominator(q, i, j))
+        G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
+        for i, j in self.active:
+            G[:, i, j] = evaluate(self.B[i][j], q) / self._denominator(q, i, j)
+        return G
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """H (n, p, p), diagonal and monic, at normalised frequencies `w`."""
@@ -171,10 +174,6 @@ class PolynomialModel(Parametrised):
 
     def _denominator(self, q: ComplexArray, i: int, j: int) -> ComplexArray:
         return evaluate(self._row(self.A, i), q) * evaluate(self.F[i][j], q)
-
-    def _entries(self, q: ComplexArray, entry: Callable[[int, int], ComplexArray]) -> ComplexArray:
-        rows = [[entry(i, j) for j in range(self.inputs)] for i in range(self.outputs)]
-        return np.moveaxis(np.array(rows, dtype=complex), -1, 0)
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         q = unit_circle(w)
