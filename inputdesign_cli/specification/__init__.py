@@ -2,11 +2,7 @@
 
 from inputdesign_cli.specification.loading import load_spec, parse_spec
 from inputdesign_cli.specification.models.accuracy import ModelError
-from inputdesign_cli.specification.models.control import (
-    ClosedLoopError,
-    ContinuousMatrixTransfer,
-    DiscreteMatrix,
-)
+from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
 from inputdesign_cli.specification.models.plant import (
     ContinuousPlant,
@@ -23,7 +19,12 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
 )
 from inputdesign_cli.specification.models.sweep import Sweep
-from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
+from inputdesign_cli.specification.models.transfer import (
+    ContinuousMatrixTransfer,
+    ContinuousTransfer,
+    DiscreteMatrix,
+    DiscreteTransfer,
+)
 from inputdesign_cli.specification.schema import json_schema
 from inputdesign_cli.specification.template import SpecTemplate, read_template
 

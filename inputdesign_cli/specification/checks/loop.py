@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.transfer import DiscreteTransfer
+from inputdesign_cli.specification.models.transfer import DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.wording import count
 
 
@@ -44,7 +43,7 @@ def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
 
 
 def _controller(
-    plant: Plant, controller: DiscreteTransfer | ControllerMatrix, *path: str
+    plant: Plant, controller: DiscreteTransfer | DiscreteMatrix, *path: str
 ) -> Iterator[PathDiagnostic]:
     if not plant.sampled:
         message = "{key} works in discrete time, but the plant is not sampled"

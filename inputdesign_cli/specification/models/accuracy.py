@@ -9,8 +9,7 @@ from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.control import ClosedLoopError
-from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.specification.models.experiment import check_names, exactly_one
+from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
     Band,
     Denominator,
@@ -27,7 +26,7 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
-from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
+from inputdesign_cli.specification.models.transfer import Controller, DiscreteTransfer, Transfer
 
 DEFAULT_CONFIDENCE = 0.95
 
@@ -46,7 +45,7 @@ class Sensitivity(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """W is given once, and whole."""
-        yield from exactly_one(self, "numerator", "max_db")
+        yield from self.exactly_one("numerator", "max_db")
         if self.denominator is not None and self.numerator is None:
             message = "{key} stands without a numerator"
             yield PathDiagnostic("missing-key", message, 'add "numerator: [..]"', ("denominator",))
@@ -86,7 +85,7 @@ class ModelError(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """r_adm and the size of the confidence region are given once."""
-        yield from exactly_one(self, "relative", "absolute", "table", "sensitivity")
+        yield from self.exactly_one("relative", "absolute", "table", "sensitivity")
         if self.confidence is not None and self.alpha is not None:
             yield PathDiagnostic(
                 "conflicting-keys",

@@ -8,7 +8,6 @@ from typing import Annotated
 import numpy as np
 from pydantic import Discriminator, Field
 
-from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
     FileName,
@@ -21,9 +20,9 @@ from inputdesign_cli.specification.models.fields import (
     Variance,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import Polynomial
 from inputdesign_cli.specification.models.section import TAG, Section, tag
 from inputdesign_cli.specification.models.shapes import per_output
+from inputdesign_cli.specification.models.transfer import Controller
 from inputdesign_cli.specification.models.values import Matrix
 
 InformationSource = Annotated[
@@ -38,19 +37,11 @@ class NoiseShape(Section):
     C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
     D: StablePerOutput = Field(default=(1.0,), description="Monic, stable denominator in q^-1 (default 1).")
 
-    def C_per_output(self, outputs: int) -> tuple[Polynomial, ...]:  # noqa: N802 (the paper's symbol)
-        """One polynomial C for each output."""
-        return per_output(self.C, outputs)
-
     @property
     def filters(self) -> tuple[str, ...]:
         """Which of C and D are not 1."""
         stated = {"C": per_output(self.C, 1), "D": per_output(self.D, 1)}
         return tuple(name for name, rows in stated.items() if any(any(p[1:]) for p in rows))
-
-    def D_per_output(self, outputs: int) -> tuple[Polynomial, ...]:  # noqa: N802
-        """One polynomial D for each output."""
-        return per_output(self.D, outputs)
 
 
 def covariance_of(variance: float | Matrix, outputs: int) -> np.ndarray:
@@ -80,7 +71,7 @@ class SimulationNoise(NoiseShape):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Its size is given once."""
-        yield from exactly_one(self, "variance", "relative_std")
+        yield from self.exactly_one("variance", "relative_std")
 
 
 class Prior(Section):
@@ -129,23 +120,6 @@ class Cost(Section):
         if not any(np.any(w) for w in (self.input_power, self.output_power, self.excitation_power)):
             message = "all weights of {key} are zero: every experiment would be free"
             yield PathDiagnostic("no-cost", message, "write input_power: 1")
-
-
-def exactly_one(model: Section, *keys: str) -> Iterator[PathDiagnostic]:
-    """Exactly one of the keys is given."""
-    given = model.stated(*keys)
-    alternatives = ", ".join(keys[:-1]) + " or " + keys[-1]
-    if not given:
-        needs = f"{{key}} needs one of {alternatives}"
-        yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
-    for extra in given[1:]:
-        yield PathDiagnostic(
-            "conflicting-keys",
-            f"{{key}} stands beside {given[0]}; give only one of {alternatives}",
-            "remove one of the two",
-            (extra,),
-            at_key=True,
-        )
 
 
 def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> Iterator[PathDiagnostic]:

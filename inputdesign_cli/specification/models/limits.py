@@ -53,10 +53,7 @@ def _kind(value: dict[str, Any]) -> str:
 
 
 Curve = Annotated[
-    Annotated[NonNegative, tag("number")]
-    | Annotated[TableFile, tag(TableFile.phrase)]
-    | Annotated[DiscreteTransfer, tag(DiscreteTransfer.phrase)]
-    | Annotated[ContinuousTransfer, tag(ContinuousTransfer.phrase)],
+    Annotated[NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer,
     pick(_kind, plain="number"),
 ]
 """A level, a tabulated curve, or |numerator/denominator|^2."""

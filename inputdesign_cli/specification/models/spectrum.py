@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, Literal, cast
 from pydantic import Discriminator, Field
 
 from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.experiment import exactly_one
 from inputdesign_cli.specification.models.fields import (
     Band,
     Count,
@@ -53,7 +52,7 @@ class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The lines are given once."""
-        yield from exactly_one(self, "lines", "frequencies")
+        yield from self.exactly_one("lines", "frequencies")
 
 
 class FreeSpectrum(Section, family="spectrum", phrase="type: free"):
@@ -155,10 +154,7 @@ class GivenSignal(Section, family="given", phrase="signal"):
 
 
 Given = Annotated[
-    Annotated[GivenWhite, tag("type: white")]
-    | Annotated[GivenMultisine, tag("type: multisine")]
-    | Annotated[GivenTable, tag("type: table")]
-    | Annotated[GivenSignal, tag("signal")],
+    GivenWhite | GivenMultisine | GivenTable | GivenSignal,
     pick(lambda v: "signal" if "signal" in v else _type(v)),
     Wording("a mapping of keys", "write {type: white, power: 1} or {signal: u.csv}"),
 ]
@@ -174,14 +170,14 @@ class GivenSpectrum(Section, family="spectrum", phrase="given"):
 
 
 Spectrum = Annotated[
-    Annotated[WhiteSpectrum, tag("type: white")]
-    | Annotated[FirSpectrum, tag("type: fir")]
-    | Annotated[MultisineSpectrum, tag("type: multisine")]
-    | Annotated[FreeSpectrum, tag("type: free")]
-    | Annotated[PolynomialSpectrum, tag("type: polynomial")]
-    | Annotated[PointwiseSpectrum, tag("type: pointwise")]
-    | Annotated[MomentsSpectrum, tag("type: moments")]
-    | Annotated[GivenSpectrum, tag("given")],
+    WhiteSpectrum
+    | FirSpectrum
+    | MultisineSpectrum
+    | FreeSpectrum
+    | PolynomialSpectrum
+    | PointwiseSpectrum
+    | MomentsSpectrum
+    | GivenSpectrum,
     pick(lambda v: "given" if "given" in v else _type(v)),
     Wording("a mapping of keys", "write {type: fir, order: 20}"),
 ]
