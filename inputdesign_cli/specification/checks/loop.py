@@ -86,7 +86,7 @@ def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     target = error.control.model_reference
     if target is None or target.kind == "discrete" or target.kind == "continuous":
         return
-    rows = target.numerator if target.kind == "discrete_matrix" else target.continuous.numerator
+    rows = (target if target.kind == "discrete_matrix" else target.continuous).numerator_matrix
     if (len(rows), len(rows[0])) != (plant.outputs, plant.outputs):
         step = ("continuous",) if target.kind == "continuous_matrix" else ()
         message = (

@@ -21,9 +21,8 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import TAG, Section, tag
-from inputdesign_cli.specification.models.shapes import per_output
+from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.specification.models.transfer import Controller
-from inputdesign_cli.specification.models.values import Matrix
 
 InformationSource = Annotated[
     Annotated[FileName, tag("file")] | Annotated[SemidefiniteMatrix, tag("matrix")],
@@ -36,19 +35,19 @@ class NoiseShape(Section):
 
     C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
     D: StablePerOutput = Field(default=(1.0,), description="Monic, stable denominator in q^-1 (default 1).")
+    variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
+
+    def covariance(self, outputs: int) -> np.ndarray:
+        """The covariance of e (outputs, outputs); a number stands for that multiple of I, none for I."""
+        if isinstance(self.variance, tuple):
+            return np.array(self.variance, dtype=float)
+        return (self.variance or 1.0) * np.eye(outputs)
 
     @property
     def filters(self) -> tuple[str, ...]:
         """Which of C and D are not 1."""
-        stated = {"C": per_output(self.C, 1), "D": per_output(self.D, 1)}
-        return tuple(name for name, rows in stated.items() if any(any(p[1:]) for p in rows))
-
-
-def covariance_of(variance: float | Matrix, outputs: int) -> np.ndarray:
-    """The noise covariance as an array (outputs, outputs); a number stands for that multiple of I."""
-    if isinstance(variance, tuple):
-        return np.array(variance, dtype=float)
-    return variance * np.eye(outputs)
+        stated = {"C": with_paths(self.C), "D": with_paths(self.D)}
+        return tuple(name for name, all_ in stated.items() if any(any(p[1:]) for _, p in all_))
 
 
 class Noise(NoiseShape):
@@ -56,15 +55,10 @@ class Noise(NoiseShape):
 
     variance: Variance = Field(description="Variance of e, or its covariance matrix (outputs x outputs).")
 
-    def covariance(self, outputs: int) -> np.ndarray:
-        """The covariance of e as an array (outputs, outputs)."""
-        return covariance_of(self.variance, outputs)
-
 
 class SimulationNoise(NoiseShape):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
-    variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
     relative_std: Positive | None = Field(
         default=None, description="Standard deviation as a fraction of the smallest output rms."
     )

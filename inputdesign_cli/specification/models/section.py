@@ -47,7 +47,7 @@ class Section(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(
-        cls, source: type[Self], handler: GetCoreSchemaHandler
+        cls, source: type[BaseModel], handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         return Tag(TAG + cls.phrase).__get_pydantic_core_schema__(source, handler)
 

@@ -20,8 +20,7 @@ from inputdesign_cli.specification.models.report import Report
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
-from inputdesign_cli.specification.yaml.places import parse_key
-from inputdesign_cli.specification.yaml.source import Source
+from inputdesign_cli.specification.yaml.places import Source, parse_key
 from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
 
 Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
@@ -88,9 +87,8 @@ class Spec(Section):
     @property
     def given(self) -> Given | None:
         """The excitation that is given, if none is to be designed."""
-        if self.spectrum is None or self.spectrum.type != "given":
-            return None
-        return self.spectrum.given
+        spectrum = self.spectrum
+        return spectrum.given if spectrum is not None and spectrum.type == "given" else None
 
     @property
     def designs(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Discriminator, Field
 
@@ -22,9 +22,10 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.specification.yaml.plain import Plain
 
 
-def _type(value: dict[str, Any]) -> str:
+def _type(value: dict[str, Plain]) -> str:
     return f"type: {value.get('type')}"
 
 

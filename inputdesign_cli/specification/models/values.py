@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from inputdesign_cli.specification.wording import show
 PolynomialList = tuple[Polynomial, ...]
 PolynomialMatrix = tuple[tuple[Polynomial, ...], ...]
 Matrix = tuple[tuple[float, ...], ...]
-Nested = TypeVar("Nested", bound=tuple[Any, ...])
+Nested = TypeVar("Nested", bound=tuple)
 
 
 def depth(value: object) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
-from typing import Any
 
 from inputdesign_cli.errors import Diagnostic, SpecError
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import Path, format_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
 KEY = "include"
@@ -52,7 +52,7 @@ def _read(tree: Tree, path: Path, file: FilePath) -> Tree:
     return read(text, str(file), source=len(tree.places.sources))
 
 
-def _join(tree: Tree, included: Tree, path: Path, value: Any) -> None:
+def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
     holder = tree.data if len(path) == 1 else tree.data[path[0]]
     key = path[-1]
     if key not in holder:

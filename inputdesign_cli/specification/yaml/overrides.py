@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.specification.yaml.include import KEY, apply_includes
 from inputdesign_cli.specification.yaml.nodes import MAX_DEPTH
 from inputdesign_cli.specification.yaml.places import Mark, Path, format_key, parse_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
 
@@ -73,7 +73,7 @@ def _apply(tree: Tree, override: _Override) -> None:
     tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
 
 
-def _resolve(data: Any, path: Path, override: _Override) -> Path:
+def _resolve(data: Plain, path: Path, override: _Override) -> Path:
     """The path with digits turned into indices where the tree has a list."""
     found: list[str | int] = []
     for step in path:
@@ -100,7 +100,7 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
     if not isinstance(tree.data, dict):
         tree.data = {}
     places = tree.places
-    node: Any = tree.data
+    node: Plain = tree.data
     for depth, step in enumerate(path[:-1], start=1):
         here = path[:depth]
         if _child(node, step) is None:
@@ -118,5 +118,5 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
     places.keys.update(value.places.keys)
 
 
-def _child(node: Any, step: str | int) -> Any:
+def _child(node: Plain, step: str | int) -> Plain:
     return node.get(step) if isinstance(node, dict) else node[step]

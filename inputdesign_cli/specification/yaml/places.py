@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import NamedTuple
 
 from inputdesign_cli.errors import Location
+from inputdesign_cli.specification.yaml.plain import Plain
 
 Path = tuple[str | int, ...]
 
@@ -91,3 +93,12 @@ class Places:
             else:
                 break
         return known
+
+
+@dataclass
+class Source:
+    """What a spec remembers of its file; empty for a spec that was built in Python."""
+
+    data: dict[str, Plain] = field(default_factory=dict)
+    places: Places = field(default_factory=Places)
+    folder: FilePath = field(default_factory=FilePath)
