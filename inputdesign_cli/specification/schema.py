@@ -41,10 +41,7 @@ def _tidy(node: Plain) -> Plain:
     }
     options = kept.get("anyOf")
     if isinstance(options, list):
-        options = [option for option in options if option != {"type": "null"}]
-        if len(options) == 1 and isinstance(options[0], dict):
-            del kept["anyOf"]
-            kept = {**options[0], **kept}
-        else:
-            kept["anyOf"] = options
+        kept["anyOf"] = [option for option in options if option != {"type": "null"}]
+        if len(kept["anyOf"]) == 1:
+            kept = {**kept.pop("anyOf")[0], **kept}
     return kept

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.transfer import DiscreteMatrix, DiscreteTransfer
+from inputdesign_cli.specification.models.transfer import Controller
 from inputdesign_cli.specification.wording import count
+
+_SENSITIVITY = ("accuracy", "model_error", "sensitivity")
 
 
 def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -24,27 +26,21 @@ def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """So has the controller of a sensitivity that is to be kept."""
     error = spec.accuracy.model_error
-    sensitivity = error.sensitivity if error is not None else None
-    if sensitivity is not None and sensitivity.controller is not None and spec.plant.kind != "regression":
-        path = ("accuracy", "model_error", "sensitivity", "controller")
-        yield from _controller(spec.plant, sensitivity.controller, *path)
+    controller = error.sensitivity.controller if error is not None and error.sensitivity is not None else None
+    if controller is not None and spec.plant.kind != "regression":
+        yield from _controller(spec.plant, controller, *_SENSITIVITY, "controller")
 
 
 def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
     """A sensitivity is that of a loop."""
-    error = spec.accuracy.model_error
-    if error is None or error.sensitivity is None or error.sensitivity.controller is not None:
-        return
-    if not spec.closed_loop:
+    stated, own = spec.at(*_SENSITIVITY), spec.at(*_SENSITIVITY, "controller")
+    if stated is not None and own is None and not spec.closed_loop:
         message = "{key} is that of a control loop, but there is no controller"
         hint = "add experiment.controller, or a controller beside it for the loop to be kept"
-        path = ("accuracy", "model_error", "sensitivity")
-        yield PathDiagnostic("needs-controller", message, hint, path)
+        yield PathDiagnostic("needs-controller", message, hint, _SENSITIVITY)
 
 
-def _controller(
-    plant: Plant, controller: DiscreteTransfer | DiscreteMatrix, *path: str
-) -> Iterator[PathDiagnostic]:
+def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[PathDiagnostic]:
     if not plant.sampled:
         message = "{key} works in discrete time, but the plant is not sampled"
         yield PathDiagnostic("unsuitable-key", message, "add sample: zoh to the plant", path)

@@ -13,7 +13,7 @@ from inputdesign_cli.specification.wording import count
 def true_noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """The noise of the simulation has as many channels as the plant has outputs."""
     if spec.simulation is not None and spec.simulation.noise is not None:
-        yield from check_noise(spec, spec.simulation.noise, ("simulation", "noise"))
+        yield from check_noise(spec, spec.simulation.noise, "simulation", "noise")
 
 
 def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:

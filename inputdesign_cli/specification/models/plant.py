@@ -22,13 +22,13 @@ from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_gain,
+    check_per_output,
     per_output,
     shape_words,
     size_of,
 )
 from inputdesign_cli.specification.models.transfer import ContinuousMatrix
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
-from inputdesign_cli.specification.wording import count
 
 
 class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A, B, F"):
@@ -51,13 +51,7 @@ class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A,
     def check(self) -> Iterator[PathDiagnostic]:
         """B is not zero, and A and F have its shape."""
         yield from check_gain(self.B_matrix, "B")
-        if depth(self.A) == 2 and len(self.A) != self.outputs:
-            yield PathDiagnostic(
-                "wrong-shape",
-                f"{{key}} holds {len(self.A)} polynomials for {count(self.outputs, 'output')}",
-                "write one polynomial for all outputs, or a list with one per output",
-                ("A",),
-            )
+        yield from check_per_output(self.A, self.outputs, "A")
         if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
             yield PathDiagnostic(
                 "wrong-shape",

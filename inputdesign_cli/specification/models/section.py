@@ -59,6 +59,13 @@ class Section(BaseModel):
         """Those of the keys that have a value."""
         return tuple(key for key in keys if getattr(self, key) is not None)
 
+    def at(self, *path: str) -> object:
+        """The value at a path below; None where a section on the way is absent or has no such key."""
+        inner = getattr(self, path[0], None)
+        if path[1:]:
+            return inner.at(*path[1:]) if isinstance(inner, Section) else None
+        return inner
+
     def exactly_one(self, *keys: str) -> Iterator[PathDiagnostic]:
         """Exactly one of the keys is given."""
         given = self.stated(*keys)

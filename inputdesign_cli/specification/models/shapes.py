@@ -8,6 +8,7 @@ from dataclasses import replace
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import Polynomial, product
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+from inputdesign_cli.specification.wording import count
 
 
 def as_matrix(value: tuple) -> PolynomialMatrix:
@@ -54,6 +55,14 @@ def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
     if depth(value) == 1:
         return [((), value)]
     return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
+
+
+def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDiagnostic]:
+    """A list of polynomials at `path` has one for each output."""
+    if depth(value) == 2 and len(value) != outputs:
+        message = f"{{key}} holds {len(value)} polynomials, but the plant has {count(outputs, 'output')}"
+        hint = "write one polynomial for all outputs, or a list with one per output"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
 
 
 def check_gain(entries: PolynomialMatrix, name: str) -> Iterator[PathDiagnostic]:
