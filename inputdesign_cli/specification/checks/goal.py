@@ -32,37 +32,26 @@ def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
     """At most one goal, and an objective that has what it needs."""
     accuracy, objective = spec.accuracy, spec.objective
     for extra in accuracy.goals[1:]:
-        yield PathDiagnostic(
-            "conflicting-keys",
-            f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment",
-            "keep one of the two",
-            ("accuracy", extra),
-            at_key=True,
-        )
+        message = f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment"
+        where = ("accuracy", extra)
+        yield PathDiagnostic("conflicting-keys", message, "keep one of the two", where, at_key=True)
     if not spec.designs or not (accuracy.requirements or accuracy.goals):
         return
-    path = ("objective",)
+    found = ("", "")
+    goal = f"accuracy.{accuracy.goals[0]}" if accuracy.goals else ""
     if objective in ("least_cost", "shortest_experiment") and not accuracy.requirements:
-        yield PathDiagnostic(
-            "contradictory-objective",
-            f"{objective} needs a requirement to meet, but accuracy only holds {choices(accuracy.goals)}",
-            "add accuracy.model_error, or write objective: best_accuracy",
-            path,
+        message = (
+            f"{objective} needs a requirement to meet, but accuracy only holds {choices(accuracy.goals)}"
         )
-    elif objective in ("least_cost", "shortest_experiment") and accuracy.goals:
-        yield PathDiagnostic(
-            "contradictory-objective",
-            f"{objective} leaves nothing to optimise for accuracy.{accuracy.goals[0]}",
-            f"remove accuracy.{accuracy.goals[0]}, or write objective: best_accuracy",
-            path,
-        )
-    elif objective == "best_accuracy" and not accuracy.goals and accuracy.mean_squared_error is not None:
-        yield PathDiagnostic(
-            "contradictory-objective",
-            "best_accuracy asks for the least mean-squared error, but a target for it is given",
-            "remove the target of mean_squared_error, or write objective: least_cost",
-            path,
-        )
+        found = message, "add accuracy.model_error, or write objective: best_accuracy"
+    elif objective in ("least_cost", "shortest_experiment") and goal:
+        message = f"{objective} leaves nothing to optimise for {goal}"
+        found = message, f"remove {goal}, or write objective: best_accuracy"
+    elif objective == "best_accuracy" and not goal and accuracy.mean_squared_error is not None:
+        message = "best_accuracy asks for the least mean-squared error, but a target for it is given"
+        found = message, "remove the target of mean_squared_error, or write objective: least_cost"
+    if any(found):
+        yield PathDiagnostic("contradictory-objective", *found, ("objective",))
 
 
 def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:

@@ -69,7 +69,7 @@ def nested(levels: int, what: str, hint: str) -> BeforeValidator:
 
 _WHOLE = BeforeValidator(as_whole)
 _DEPTH = Discriminator(lambda value: f"{TAG}{depth(value)}")
-_LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if isinstance(value, list | tuple) else "one"))
+_LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if depth(value) else "one"))
 
 # Single values
 Number = Annotated[float, Strict(), AllowInfNan(False)]
@@ -105,10 +105,7 @@ Harmonics = Annotated[
     | Annotated[Literal["odd"], Wording("odd", "write odd, a number of harmonics, or a list"), tag("word")]
     | Annotated[Several[Index], AfterValidator(rising), tag("list")],
     Discriminator(
-        lambda value: (
-            TAG
-            + ("list" if isinstance(value, list | tuple) else "word" if isinstance(value, str) else "count")
-        )
+        lambda value: TAG + ("list" if depth(value) else "word" if isinstance(value, str) else "count")
     ),
 ]
 """How many harmonics of a period, "odd", or which."""

@@ -17,13 +17,11 @@ from inputdesign_cli.specification.models.fields import (
     StableMatrix,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import Polynomial
 from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_gain,
     check_per_output,
-    per_output,
     shape_words,
     size_of,
 )
@@ -78,14 +76,8 @@ class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A,
     @property
     def F_matrix(self) -> PolynomialMatrix:  # noqa: N802
         """F in the same form; absent polynomials are 1."""
-        if self.F is None:
-            return tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
-        return as_matrix(self.F)
-
-    @property
-    def A_per_output(self) -> tuple[Polynomial, ...]:  # noqa: N802
-        """One polynomial A for each output."""
-        return per_output(self.A, self.outputs)
+        ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
+        return ones if self.F is None else as_matrix(self.F)
 
 
 class ContinuousPlant(Section, family="plant", phrase="a continuous-time plant"):

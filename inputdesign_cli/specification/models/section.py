@@ -68,13 +68,16 @@ class Section(BaseModel):
 
     def exactly_one(self, *keys: str) -> Iterator[PathDiagnostic]:
         """Exactly one of the keys is given."""
-        given = self.stated(*keys)
-        alternatives = choices(keys)
-        if not given:
-            needs = f"{{key}} needs one of {alternatives}"
+        if not self.stated(*keys):
+            needs = f"{{key}} needs one of {choices(keys)}"
             yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
+        yield from self.at_most_one(*keys)
+
+    def at_most_one(self, *keys: str) -> Iterator[PathDiagnostic]:
+        """No two of the keys are given."""
+        given = self.stated(*keys)
         for extra in given[1:]:
-            message = f"{{key}} stands beside {given[0]}; give only one of {alternatives}"
+            message = f"{{key}} stands beside {given[0]}; give only one of {choices(keys)}"
             yield PathDiagnostic("conflicting-keys", message, "remove one of the two", (extra,), at_key=True)
 
     @model_validator(mode="after")

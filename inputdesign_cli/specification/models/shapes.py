@@ -16,11 +16,6 @@ def as_matrix(value: tuple) -> PolynomialMatrix:
     return value if depth(value) == 3 else ((value,),)
 
 
-def per_output(value: tuple, outputs: int) -> tuple[Polynomial, ...]:
-    """One polynomial repeated for every output; a list as it is."""
-    return value if depth(value) == 2 else (value,) * outputs
-
-
 def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
     """The numerator is not zero, and denominators for each entry have its shape."""
     yield from check_gain(as_matrix(numerator), "numerator")

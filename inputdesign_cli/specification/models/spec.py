@@ -15,8 +15,7 @@ from inputdesign_cli.specification.models.experiment import Cost, Experiment, No
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
-from inputdesign_cli.specification.models.realisation import Signal, Simulation, Solver
-from inputdesign_cli.specification.models.report import Report
+from inputdesign_cli.specification.models.realisation import Report, Signal, Simulation, Solver
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep

@@ -113,10 +113,8 @@ def _compose(events: Iterator[Plain], document: Document) -> Node | None:
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
-                message, hint = (
-                    'a second document begins here ("---")',
-                    "a file holds one spec; put the other into a file of its own",
-                )
+                message = 'a second document begins here ("---")'
+                hint = "a file holds one spec; put the other into a file of its own"
                 raise document.error("several-documents", message, line, column, hint)
             continue
         if isinstance(event, yaml.CollectionEndEvent):
