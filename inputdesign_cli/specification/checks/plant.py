@@ -1,4 +1,4 @@
-"""Does everything fit the kind of plant: its stability, the noise, the spectrum, the weights, the true system."""
+"""Do stability, noise, spectrum, weights and the true system of a simulation fit the kind of plant."""
 
 from __future__ import annotations
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import typing
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -183,14 +182,12 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
 def _homes(root: type[Section]) -> dict[str, list[str]]:
     """Every key below the root -> where it belongs, for a key that was written elsewhere."""
     homes: dict[str, set[str]] = {}
-    for path, model in _walk(root, ""):
-        for name in model.model_fields:
+
+    def walk(model: type[Section], path: str) -> None:
+        for name, field in model.model_fields.items():
             homes.setdefault(name, set()).add(f"under {path}" if path else "at the top level")
+            for part in sections_in(field.annotation):
+                walk(part, f"{path}.{name}" if path else name)
+
+    walk(root, "")
     return {name: sorted(home) for name, home in homes.items()}
-
-
-def _walk(model: type[Section], path: str) -> Iterator[tuple[str, type[Section]]]:
-    yield path, model
-    for name, field in model.model_fields.items():
-        for part in sections_in(field.annotation):
-            yield from _walk(part, f"{path}.{name}" if path else name)

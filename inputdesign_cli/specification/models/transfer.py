@@ -127,12 +127,18 @@ class ContinuousMatrix(_Matrix):
                 yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
 
 
+class ContinuousTarget(ContinuousMatrix):
+    """A transfer matrix in s that is written as one."""
+
+    numerator: RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
+
+
 class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):
     """A transfer matrix in s, sampled with a zero-order hold."""
 
     kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
 
-    continuous: ContinuousMatrix = Field(description="numerator and denominator in descending powers of s.")
+    continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
     sample: Literal["zoh"] | None = Field(default=None, description="How it is sampled: zoh.")
 
 

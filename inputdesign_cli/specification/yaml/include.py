@@ -57,11 +57,7 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
     key = path[-1]
     if key not in holder:
         holder[key] = value
-        for mine, theirs in (
-            (tree.places.keys, included.places.keys),
-            (tree.places.values, included.places.values),
-        ):
-            mine.update({p: mark for p, mark in theirs.items() if p[: len(path)] == path})
+        tree.places.adopt(included.places, path)
     elif len(path) == 1 and key not in _WHOLE and isinstance(holder[key], dict) and isinstance(value, dict):
         for inner, item in value.items():
             _join(tree, included, (*path, inner), item)
@@ -69,13 +65,8 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
         mark = included.places.mark(path, at_key=True)
         where = tree.places.location(mark)
         place = f"{where.file}, line {where.line}" if where else "the included file"
-        error = _error(
-            tree,
-            path,
-            f"{{key}} stands here and in {place}",
-            "remove one of them: the spec and what it includes are put together",
-        )
-        tree.diagnostics.extend(error.diagnostics)
+        hint = "remove one of them: the spec and what it includes are put together"
+        tree.diagnostics.extend(_error(tree, path, f"{{key}} stands here and in {place}", hint).diagnostics)
         tree.broken.add(path)
 
 

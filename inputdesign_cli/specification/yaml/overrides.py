@@ -103,8 +103,7 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
         return
     node[last] = value.data
     places.keys[path] = mark
-    places.values.update(value.places.values)
-    places.keys.update(value.places.keys)
+    places.adopt(value.places, path)
 
 
 def _child(node: Plain, step: str | int) -> Plain:

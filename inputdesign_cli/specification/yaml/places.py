@@ -77,6 +77,11 @@ class Places:
         text = lines[mark.line - 1] if 0 < mark.line <= len(lines) else ""
         return Location(file, mark.line, mark.column, text)
 
+    def adopt(self, other: Places, path: Path) -> None:
+        """Take over the marks of `path` and of all below it."""
+        for mine, theirs in ((self.keys, other.keys), (self.values, other.values)):
+            mine.update({p: mark for p, mark in theirs.items() if p[: len(path)] == path})
+
     def forget(self, path: Path) -> None:
         """Drop the marks of `path` and of all below it (an override has replaced them)."""
         for table in (self.keys, self.values):
