@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
+from inputdesign_cli.specification.models.shapes import size_of
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.transfer import Controller
 from inputdesign_cli.specification.wording import count
@@ -46,17 +47,13 @@ def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[Pa
         yield PathDiagnostic("unsuitable-key", message, "add sample: zoh to the plant", path)
     channels = (plant.inputs, plant.outputs)
     has = f"but the plant has {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
-    if controller.kind == "discrete":
-        if channels != (1, 1):
-            message = f"{{key}} is a single transfer function, {has}"
-            hint = (
-                "write numerator as rows (inputs) of columns (outputs) of coefficients, and "
-                "denominator likewise or as one for all entries"
-            )
-            yield PathDiagnostic("wrong-shape", message, hint, path)
-        return
-    shape = (len(controller.numerator), len(controller.numerator[0]))
-    if channels == (1, 1):
+    shape = size_of(controller.numerator)
+    if controller.kind == "discrete" and channels != (1, 1):
+        message = f"{{key}} is a single transfer function, {has}"
+        rows = "write numerator as rows (inputs) of columns (outputs) of coefficients"
+        hint = f"{rows}, and denominator likewise or as one for all entries"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
+    elif controller.kind == "discrete_matrix" and channels == (1, 1):
         message = "{key} is a matrix, but the plant has one input and one output"
         hint = "write numerator: [..] and denominator: [..]"
         yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
@@ -82,12 +79,10 @@ def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     target = error.control.model_reference
     if target is None or target.kind == "discrete" or target.kind == "continuous":
         return
-    rows = (target if target.kind == "discrete_matrix" else target.continuous).numerator_matrix
-    if (len(rows), len(rows[0])) != (plant.outputs, plant.outputs):
-        step = ("continuous",) if target.kind == "continuous_matrix" else ()
-        message = (
-            f"{{key}} is {len(rows)} x {len(rows[0])}: the loop from reference to output is square, "
-            f"{plant.outputs} x {plant.outputs}"
-        )
+    matrix, step = (target, ()) if target.kind == "discrete_matrix" else (target.continuous, ("continuous",))
+    rows, columns = size_of(matrix.numerator)
+    if (rows, columns) != (plant.outputs, plant.outputs):
+        square = f"the loop from reference to output is square, {plant.outputs} x {plant.outputs}"
+        message = f"{{key}} is {rows} x {columns}: {square}"
         hint = "write one transfer function t for t I, or a square matrix"
         yield PathDiagnostic("not-square", message, hint, (*path, "model_reference", *step, "numerator"))

@@ -91,7 +91,6 @@ Name = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("a parameter name"
 # Lists
 Several = Annotated[tuple[T, ...], Field(min_length=1)]
 Numbers = Annotated[Several[Number], Wording("a list of numbers")]
-Positives = Annotated[Several[Positive], Wording("a list of numbers above 0")]
 Names = Annotated[Several[Name], Wording("a list of parameter names")]
 PerChannel = Annotated[
     Annotated[T, tag("one")] | Annotated[Several[T], tag("list")],

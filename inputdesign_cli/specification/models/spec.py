@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal, TypeVar
 
@@ -136,12 +136,9 @@ class Spec(Section):
 
     def place(self, error: _Error) -> _Error:
         """An error of the same type whose keyed diagnostics point at their lines."""
-        placed = type(error)(
-            [
-                c if c.location or not c.key else dataclasses.replace(c, location=self.locate(c.key))
-                for c in error.diagnostics
-            ]
-        )
+        places = [d.location or (self.locate(d.key) if d.key else None) for d in error.diagnostics]
+        pairs = zip(error.diagnostics, places, strict=True)
+        placed = type(error)([replace(d, location=place) for d, place in pairs])
         placed.__cause__ = error.__cause__
         return placed
 

@@ -127,16 +127,13 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every frequency has an amplitude."""
-        listed = depth(self.amplitudes) == 2
-        for row in self.rows:
-            if len(row) != len(self.frequencies):
-                yield PathDiagnostic(
-                    "wrong-shape",
-                    f"{{key}} holds {len(row)} amplitudes for {len(self.frequencies)} frequencies",
-                    f"write one {'list per input, with one ' if listed else ''}amplitude per frequency",
-                    ("amplitudes",),
-                )
-                return
+        wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
+        if wrong is not None:
+            message = f"{{key}} holds {len(wrong)} amplitudes for {len(self.frequencies)} frequencies"
+            lists = "list per input, with one " if depth(self.amplitudes) == 2 else ""
+            yield PathDiagnostic(
+                "wrong-shape", message, f"write one {lists}amplitude per frequency", ("amplitudes",)
+            )
 
 
 class GivenTable(Section, family="given", phrase="type: table"):
