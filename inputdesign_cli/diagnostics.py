@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from typing import Any
+from dataclasses import asdict
 
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location
 
@@ -33,25 +33,9 @@ def render(error: IdesignError, color: bool = False) -> str:
     return "\n\n".join([*blocks, " ".join(footer)] if footer else blocks)
 
 
-def as_json(error: IdesignError) -> list[dict[str, Any]]:
+def as_json(error: IdesignError) -> list[dict[str, object]]:
     """The diagnostics as plain data; `location` is null where there is none."""
-    return [
-        {
-            "code": diagnostic.code,
-            "message": diagnostic.message,
-            "hint": diagnostic.hint,
-            "key": diagnostic.key,
-            "location": None
-            if diagnostic.location is None
-            else {
-                "file": diagnostic.location.file,
-                "line": diagnostic.location.line,
-                "column": diagnostic.location.column,
-                "text": diagnostic.location.text,
-            },
-        }
-        for diagnostic in error.diagnostics
-    ]
+    return [asdict(diagnostic) for diagnostic in error.diagnostics]
 
 
 def _block(diagnostic: Diagnostic, color: bool) -> str:

@@ -6,7 +6,6 @@ import copy
 import os
 from collections.abc import Sequence
 from pathlib import Path as FilePath
-from typing import Any
 
 from pydantic import ValidationError
 
@@ -19,12 +18,12 @@ from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import compose
-from inputdesign_cli.specification.yaml.places import Path, Places
+from inputdesign_cli.specification.yaml.places import Path, Places, Source
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
-from inputdesign_cli.specification.yaml.source import Source
 
 # Take the place of a section that could not be read, so that the rest can still be checked.
-_STAND_IN: dict[str, dict[str, Any]] = {"plant": {"B": [0, 1]}, "noise": {"variance": 1}}
+_STAND_IN: dict[str, dict[str, Plain]] = {"plant": {"B": [0, 1]}, "noise": {"variance": 1}}
 
 _MOST_ROUNDS = 50
 
@@ -42,13 +41,13 @@ def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Sp
     Raises:
         SpecError: With one diagnostic for everything that is wrong, in the order of the file.
     """
-    return _parse(read_text(path), os.fspath(path), overrides, FilePath(path).parent)
+    return parse_spec(read_text(path), os.fspath(path), overrides, folder=FilePath(path).parent)
 
 
 def parse_spec(
     text: str, file: str = "<spec>", overrides: Sequence[str] = (), *, folder: FilePath | None = None
 ) -> Spec:
-    """Read a spec from its text.
+    """Read a spec from its text, as `load_spec` does from a file.
 
     Args:
         text: YAML.
@@ -56,16 +55,26 @@ def parse_spec(
         overrides: As for `load_spec`.
         folder: What the paths in the spec are relative to (default: the current folder).
 
-    Returns:
-        The checked spec, with defaults filled in.
+    Raises:
+        SpecError: As `load_spec`.
+    """
+    folder = folder or FilePath()
+    tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder)
+    spec, found = _validate(tree)
+    diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
+    if diagnostics or spec is None:
+        raise SpecError(_sorted(diagnostics, tree.places))
+    spec = _with_defaults(spec)
+    spec._source = Source(tree.data, tree.places, folder)
+    return spec
+
+
+def read_tree(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> Tree:
+    """The plain data of a spec with what it includes and the overrides, not yet checked.
 
     Raises:
-        SpecError: With one diagnostic for everything that is wrong, in the order of the file.
+        SpecError: The text is no mapping in YAML, or a file cannot be included.
     """
-    return _parse(text.removeprefix("\ufeff"), file, overrides, folder or FilePath())
-
-
-def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> Spec:
     tree = read(text, file)
     if not isinstance(tree.data, dict):
         empty = tree.data is None
@@ -78,13 +87,7 @@ def _parse(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> 
             )
         )
     compose(tree, folder, overrides)
-    spec, found = _validate(tree)
-    diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
-    if diagnostics or spec is None:
-        raise SpecError(_sorted(diagnostics, tree.places))
-    spec = _with_defaults(spec)
-    spec._source = Source(tree.data, tree.places, folder)
-    return spec
+    return tree
 
 
 def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
@@ -98,11 +101,8 @@ def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
     broken = set(tree.broken)
     for path in _empty(data, ()):
         comma = isinstance(path[-1], str) and path[-1].isdecimal()
-        hint = (
-            "use a decimal point: a comma begins the next key"
-            if comma
-            else "write a value, or remove the key"
-        )
+        mend = "use a decimal point: a comma begins the next key"
+        hint = mend if comma else "write a value, or remove the key"
         told.append(PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True))
         broken.add(path)
         _prune(data, path)
@@ -137,18 +137,18 @@ def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool
     return related(found.path[:-1] if missing else found.path, broken)
 
 
-def _empty(data: Any, path: Path) -> list[Path]:
+def _empty(data: Plain, path: Path) -> list[Path]:
     if data is None:
         return [path]
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     return [found for step, value in items for found in _empty(value, (*path, step))]
 
 
-def _prune(data: dict[str, Any], path: Path) -> None:
+def _prune(data: dict[str, Plain], path: Path) -> None:
     """Remove the deepest mapping entry on the path; a required section gets its stand-in."""
-    holder: dict[str, Any] | None = None
+    holder: dict[str, Plain] | None = None
     key = ""
-    node: Any = data
+    node: Plain = data
     for step in path:
         if isinstance(node, dict):
             if step not in node:
@@ -167,7 +167,7 @@ def _prune(data: dict[str, Any], path: Path) -> None:
 
 def _with_defaults(spec: Spec) -> Spec:
     """The defaults that depend on other sections."""
-    update: dict[str, Any] = {}
+    update: dict[str, Plain] = {}
     if "cost" not in spec.model_fields_set and spec.closed_loop:
         update["cost"] = Cost(input_power=1.0, output_power=1.0)
     single = (spec.plant.inputs, spec.plant.outputs) == (1, 1)

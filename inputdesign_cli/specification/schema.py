@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.include import KEY
+from inputdesign_cli.specification.yaml.plain import Plain
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema() -> dict[str, Plain]:
     """The schema (draft 2020-12) of a spec file: keys, types, choices and descriptions.
 
     What spans several keys (shapes, stability, contradictions) is left to `idesign validate`.
@@ -27,7 +26,7 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def _tidy(node: Any) -> Any:
+def _tidy(node: Plain) -> Plain:
     """Without what pydantic adds for Python alone: null for absent keys, class names as titles, defaults
     that are whole sections."""
     if isinstance(node, list):
@@ -42,10 +41,7 @@ def _tidy(node: Any) -> Any:
     }
     options = kept.get("anyOf")
     if isinstance(options, list):
-        options = [option for option in options if option != {"type": "null"}]
-        if len(options) == 1 and isinstance(options[0], dict):
-            del kept["anyOf"]
-            kept = {**options[0], **kept}
-        else:
-            kept["anyOf"] = options
+        kept["anyOf"] = [option for option in options if option != {"type": "null"}]
+        if len(kept["anyOf"]) == 1:
+            kept = {**kept.pop("anyOf")[0], **kept}
     return kept

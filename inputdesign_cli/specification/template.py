@@ -8,18 +8,18 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
-from typing import Any
 
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.loading import parse_spec
+from inputdesign_cli.specification.loading import parse_spec, read_tree
 from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.yaml.files import read_text
-from inputdesign_cli.specification.yaml.overrides import apply_overrides, compose
+from inputdesign_cli.specification.yaml.overrides import apply_overrides
 from inputdesign_cli.specification.yaml.places import Places
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 from inputdesign_cli.specification.yaml.writer import fingerprint
 
@@ -32,7 +32,7 @@ class SpecTemplate:
     file: str
     folder: FilePath
     overrides: tuple[str, ...]
-    data: dict[str, Any]
+    data: dict[str, Plain]
 
     def spec(self, overrides: Sequence[str]) -> Spec:
         """The checked spec of one variant, without the `sweep` block.
@@ -43,7 +43,7 @@ class SpecTemplate:
         every = [*self.overrides, *overrides, "sweep=null"]
         return parse_spec(self.text, self.file, every, folder=self.folder)
 
-    def variant(self, overrides: Sequence[str]) -> dict[str, Any]:
+    def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
         """The plain data of one variant, without the `sweep` block; nothing is checked but the overrides.
 
         Raises:
@@ -53,18 +53,14 @@ class SpecTemplate:
         apply_overrides(tree, [*overrides, "sweep=null"])
         if tree.diagnostics:
             raise SpecError(tree.diagnostics)
-        data: dict[str, Any] = tree.data
-        return data
+        return tree.data
 
-    def digest(self, data: dict[str, Any]) -> str:
+    def digest(self, data: dict[str, Plain]) -> str:
         """SHA-256 of what a variant says and of the contents of every file that it names."""
-        files = self.files(data)
-        if not files:
-            return fingerprint(data)
-        contents = {name: hashlib.sha256((self.folder / name).read_bytes()).hexdigest() for name in files}
-        return fingerprint({"spec": data, "files": contents})
+        contents = {n: hashlib.sha256((self.folder / n).read_bytes()).hexdigest() for n in self.files(data)}
+        return fingerprint({"spec": data, "files": contents} if contents else data)
 
-    def files(self, data: dict[str, Any]) -> list[str]:
+    def files(self, data: dict[str, Plain]) -> list[str]:
         """The texts of a variant that name files which are there, as the spec writes them."""
         return sorted({name for name in _texts(data) if (self.folder / name).is_file()})
 
@@ -93,19 +89,16 @@ def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -
             file cannot be included.
     """
     text, file = read_text(path), os.fspath(path)
-    tree = read(text, file)
-    if not isinstance(tree.data, dict):
-        parse_spec(text, file, overrides)  # says what is wrong with it
-    compose(tree, FilePath(path).parent, overrides)
+    folder = FilePath(path).parent
+    tree = read_tree(text, file, overrides, folder)
     if tree.diagnostics:
         raise SpecError(tree.diagnostics)
-    return SpecTemplate(text, file, FilePath(path).parent, tuple(overrides), tree.data)
+    return SpecTemplate(text, file, folder, tuple(overrides), tree.data)
 
 
-def _texts(value: Any) -> list[str]:
+def _texts(value: Plain) -> list[str]:
     """Every text in the data that could be the name of a file."""
-    if isinstance(value, dict):
-        return [text for item in value.values() for text in _texts(item)]
-    if isinstance(value, list):
-        return [text for item in value for text in _texts(item)]
+    if isinstance(value, dict | list):
+        items = value.values() if isinstance(value, dict) else value
+        return [text for item in items for text in _texts(item)]
     return [value] if isinstance(value, str) and 0 < len(value) < 1000 and value.isprintable() else []

@@ -7,28 +7,19 @@ from collections.abc import Iterable, Sequence
 
 from inputdesign_cli.specification.yaml.scalars import clip
 
-# Words that people use for ours; difflib would not find them.
+# Our word -> words that people use for it; difflib would not find them.
 _SYNONYMS = {
-    "Ts": "sample_time",
-    "dt": "sample_time",
-    "sampling_time": "sample_time",
-    "N": "samples",
-    "length": "samples",
-    "num": "numerator",
-    "den": "denominator",
-    "lambda": "variance",
-    "sigma2": "variance",
-    "sec": "s",
-    "second": "s",
-    "seconds": "s",
-    "minute": "min",
-    "minutes": "min",
-    "hour": "h",
-    "hours": "h",
-    "day": "d",
-    "days": "d",
-    "optimized": "optimised",
-    "gaussian": "filtered_noise",
+    "sample_time": ("Ts", "dt", "sampling_time"),
+    "samples": ("N", "length"),
+    "numerator": ("num",),
+    "denominator": ("den",),
+    "variance": ("lambda", "sigma2"),
+    "s": ("sec", "second", "seconds"),
+    "min": ("minute", "minutes"),
+    "h": ("hour", "hours"),
+    "d": ("day", "days"),
+    "optimised": ("optimized",),
+    "filtered_noise": ("gaussian",),
 }
 
 
@@ -67,7 +58,7 @@ def choices(known: Sequence[str]) -> str:
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word that was probably meant, if there is one."""
     known = list(known)
-    if (synonym := _SYNONYMS.get(word)) in known:
+    if synonym := next((ours for ours in known if word in _SYNONYMS.get(ours, ())), None):
         return synonym
     lower = {k.lower(): k for k in known}
     flat = word[:80].lower().replace("-", "_").replace(" ", "_")

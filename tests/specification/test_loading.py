@@ -81,7 +81,7 @@ def test_the_closed_loop_example():
 def test_the_mimo_example():
     spec = by_name("distillation_column")
     assert (spec.plant.inputs, spec.plant.outputs) == (2, 2)
-    assert spec.plant.A_per_output == ((1.0, -0.9736857494),) * 2
+    assert spec.plant.A == (1.0, -0.9736857494)
     assert spec.noise.covariance(2).tolist() == [[1e-10, 0.0], [0.0, 1e-10]]
     assert spec.nyquist == math.pi / 2
     control = spec.accuracy.closed_loop_error.control

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from inputdesign_cli.specification.checks import goal, loop, plant, regression, simulation, size
+from inputdesign_cli.specification.checks import goal, loop, plant, regression, size
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.places import Path, parse_key
@@ -17,8 +17,8 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (loop.controller_fits, ("plant", "experiment.controller")),
     (loop.kept_loop_fits, ("plant", "accuracy.model_error.sensitivity")),
     (plant.noise_fits, ("plant", "noise")),
-    (simulation.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
-    (simulation.true_noise_fits, ("plant", "simulation.noise")),
+    (plant.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
+    (plant.true_noise_fits, ("plant", "simulation.noise")),
     (plant.spectrum_fits, ("plant", "spectrum.type")),
     (regression.regression_fits, ("plant", "accuracy.mean_squared_error")),
     (plant.weights_fit, ("plant.sample", "plant.continuous")),

@@ -32,60 +32,43 @@ def goals_agree(spec: Spec) -> Iterator[PathDiagnostic]:
     """At most one goal, and an objective that has what it needs."""
     accuracy, objective = spec.accuracy, spec.objective
     for extra in accuracy.goals[1:]:
-        yield PathDiagnostic(
-            "conflicting-keys",
-            f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment",
-            "keep one of the two",
-            ("accuracy", extra),
-            at_key=True,
-        )
+        message = f"{{key}} and accuracy.{accuracy.goals[0]} both ask for the best experiment"
+        where = ("accuracy", extra)
+        yield PathDiagnostic("conflicting-keys", message, "keep one of the two", where, at_key=True)
     if not spec.designs or not (accuracy.requirements or accuracy.goals):
         return
-    path = ("objective",)
+    found = ("", "")
+    goal = f"accuracy.{accuracy.goals[0]}" if accuracy.goals else ""
     if objective in ("least_cost", "shortest_experiment") and not accuracy.requirements:
-        yield PathDiagnostic(
-            "contradictory-objective",
-            f"{objective} needs a requirement to meet, but accuracy only holds {choices(accuracy.goals)}",
-            "add accuracy.model_error, or write objective: best_accuracy",
-            path,
-        )
-    elif objective in ("least_cost", "shortest_experiment") and accuracy.goals:
-        yield PathDiagnostic(
-            "contradictory-objective",
-            f"{objective} leaves nothing to optimise for accuracy.{accuracy.goals[0]}",
-            f"remove accuracy.{accuracy.goals[0]}, or write objective: best_accuracy",
-            path,
-        )
-    elif objective == "best_accuracy" and not accuracy.goals and accuracy.mean_squared_error is not None:
-        yield PathDiagnostic(
-            "contradictory-objective",
-            "best_accuracy asks for the least mean-squared error, but a target for it is given",
-            "remove the target of mean_squared_error, or write objective: least_cost",
-            path,
-        )
+        goals = choices(accuracy.goals)
+        message = f"{objective} needs a requirement to meet, but accuracy only holds {goals}"
+        found = message, "add accuracy.model_error, or write objective: best_accuracy"
+    elif objective in ("least_cost", "shortest_experiment") and goal:
+        message = f"{objective} leaves nothing to optimise for {goal}"
+        found = message, f"remove {goal}, or write objective: best_accuracy"
+    elif objective == "best_accuracy" and not goal and accuracy.mean_squared_error is not None:
+        message = "best_accuracy asks for the least mean-squared error, but a target for it is given"
+        found = message, "remove the target of mean_squared_error, or write objective: least_cost"
+    if any(found):
+        yield PathDiagnostic("contradictory-objective", *found, ("objective",))
 
 
 def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
     """Without a limit on power the best experiment has no end, and the shortest is one sample."""
+    asked = (*spec.accuracy.goals, *spec.accuracy.requirements)
     if not spec.designs or spec.limits.bounds_power:
         return
-    if spec.goal == "best_accuracy" and (spec.accuracy.goals or spec.accuracy.requirements):
-        asked = (*spec.accuracy.goals, *spec.accuracy.requirements)[0]
-        regression = spec.plant.kind == "regression"
-        key = "limits.energy" if regression else "limits.input_power"
-        yield PathDiagnostic(
-            "needs-limits",
-            f"accuracy.{asked} is to be the best that limits allow, but nothing limits its power",
-            f"add {key}" + ("" if regression else ", limits.output_power or limits.excitation_power"),
-            ("limits",) if "limits" in spec.model_fields_set else ("accuracy", asked),
-        )
+    keys, path = "limits.input_power, limits.output_power or limits.excitation_power", ["objective"]
     if spec.goal == "shortest_experiment":
-        yield PathDiagnostic(
-            "needs-limits",
-            "the shortest experiment needs a limit on power: otherwise one strong sample would do",
-            "add limits.input_power, limits.output_power or limits.excitation_power",
-            ("limits",) if "limits" in spec.model_fields_set else ("objective",),
-        )
+        message = "the shortest experiment needs a limit on power: otherwise one strong sample would do"
+    elif spec.goal == "best_accuracy" and asked:
+        message = f"accuracy.{asked[0]} is to be the best that limits allow, but nothing limits its power"
+        path = ["accuracy", asked[0]]
+        keys = "limits.energy" if spec.plant.kind == "regression" else keys
+    else:
+        return
+    where = ["limits"] if "limits" in spec.model_fields_set else path
+    yield PathDiagnostic("needs-limits", message, f"add {keys}", tuple(where))
 
 
 def lengths_agree(spec: Spec) -> Iterator[PathDiagnostic]:

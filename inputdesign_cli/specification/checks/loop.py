@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
+from inputdesign_cli.specification.models.shapes import size_of
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.transfer import DiscreteTransfer
+from inputdesign_cli.specification.models.transfer import Controller
 from inputdesign_cli.specification.wording import count
+
+_SENSITIVITY = ("accuracy", "model_error", "sensitivity")
 
 
 def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -25,43 +27,33 @@ def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """So has the controller of a sensitivity that is to be kept."""
     error = spec.accuracy.model_error
-    sensitivity = error.sensitivity if error is not None else None
-    if sensitivity is not None and sensitivity.controller is not None and spec.plant.kind != "regression":
-        path = ("accuracy", "model_error", "sensitivity", "controller")
-        yield from _controller(spec.plant, sensitivity.controller, *path)
+    controller = error.sensitivity.controller if error is not None and error.sensitivity is not None else None
+    if controller is not None and spec.plant.kind != "regression":
+        yield from _controller(spec.plant, controller, *_SENSITIVITY, "controller")
 
 
 def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
     """A sensitivity is that of a loop."""
-    error = spec.accuracy.model_error
-    if error is None or error.sensitivity is None or error.sensitivity.controller is not None:
-        return
-    if not spec.closed_loop:
+    stated, own = spec.at(*_SENSITIVITY), spec.at(*_SENSITIVITY, "controller")
+    if stated is not None and own is None and not spec.closed_loop:
         message = "{key} is that of a control loop, but there is no controller"
         hint = "add experiment.controller, or a controller beside it for the loop to be kept"
-        path = ("accuracy", "model_error", "sensitivity")
-        yield PathDiagnostic("needs-controller", message, hint, path)
+        yield PathDiagnostic("needs-controller", message, hint, _SENSITIVITY)
 
 
-def _controller(
-    plant: Plant, controller: DiscreteTransfer | ControllerMatrix, *path: str
-) -> Iterator[PathDiagnostic]:
+def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[PathDiagnostic]:
     if not plant.sampled:
         message = "{key} works in discrete time, but the plant is not sampled"
         yield PathDiagnostic("unsuitable-key", message, "add sample: zoh to the plant", path)
     channels = (plant.inputs, plant.outputs)
     has = f"but the plant has {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
-    if controller.kind == "discrete":
-        if channels != (1, 1):
-            message = f"{{key}} is a single transfer function, {has}"
-            hint = (
-                "write numerator as rows (inputs) of columns (outputs) of coefficients, and "
-                "denominator likewise or as one for all entries"
-            )
-            yield PathDiagnostic("wrong-shape", message, hint, path)
-        return
-    shape = (len(controller.numerator), len(controller.numerator[0]))
-    if channels == (1, 1):
+    shape = size_of(controller.numerator)
+    if controller.kind == "discrete" and channels != (1, 1):
+        message = f"{{key}} is a single transfer function, {has}"
+        rows = "write numerator as rows (inputs) of columns (outputs) of coefficients"
+        hint = f"{rows}, and denominator likewise or as one for all entries"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
+    elif controller.kind == "discrete_matrix" and channels == (1, 1):
         message = "{key} is a matrix, but the plant has one input and one output"
         hint = "write numerator: [..] and denominator: [..]"
         yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
@@ -87,12 +79,10 @@ def control_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     target = error.control.model_reference
     if target is None or target.kind == "discrete" or target.kind == "continuous":
         return
-    rows = target.numerator if target.kind == "discrete_matrix" else target.continuous.numerator
-    if (len(rows), len(rows[0])) != (plant.outputs, plant.outputs):
-        step = ("continuous",) if target.kind == "continuous_matrix" else ()
-        message = (
-            f"{{key}} is {len(rows)} x {len(rows[0])}: the loop from reference to output is square, "
-            f"{plant.outputs} x {plant.outputs}"
-        )
+    matrix, step = (target, ()) if target.kind == "discrete_matrix" else (target.continuous, ("continuous",))
+    rows, columns = size_of(matrix.numerator)
+    if (rows, columns) != (plant.outputs, plant.outputs):
+        square = f"the loop from reference to output is square, {plant.outputs} x {plant.outputs}"
+        message = f"{{key}} is {rows} x {columns}: {square}"
         hint = "write one transfer function t for t I, or a square matrix"
         yield PathDiagnostic("not-square", message, hint, (*path, "model_reference", *step, "numerator"))

@@ -1,19 +1,17 @@
-"""Does everything fit the kind of plant: its stability, the noise, the spectrum, the weights."""
+"""Do stability, noise, spectrum, weights and the true system of a simulation fit the kind of plant."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
 
-from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
+from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
-from inputdesign_cli.specification.models.shapes import check_each
+from inputdesign_cli.specification.models.shapes import check_each, check_per_output
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import count
-from inputdesign_cli.specification.yaml.places import Path
 
 
 def stable_unless_controlled(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -33,26 +31,21 @@ def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnosti
 
 def noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """The noise has as many channels as the plant has outputs."""
-    yield from check_noise(spec, spec.noise, ("noise",))
+    yield from check_noise(spec, spec.noise, "noise")
 
 
-def check_noise(spec: Spec, noise: Noise | SimulationNoise, path: Path) -> Iterator[PathDiagnostic]:
+def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagnostic]:
     """The noise at `path` fits the outputs of the plant and the time that it lives in."""
     outputs = spec.plant.outputs
     has = f"but the plant has {count(outputs, 'output')}"
-    kind = ""
-    if spec.plant.kind == "regression":
-        kind = "the noise of a regression is white"
-    elif not spec.plant.sampled:
-        kind = "the plant is not sampled"
+    white = "the noise of a regression is white" if spec.plant.kind == "regression" else ""
+    kind = white or ("" if spec.plant.sampled else "the plant is not sampled")
     for key, value in (("C", noise.C), ("D", noise.D)):
         if kind and key in noise.model_fields_set:
             message = f"{{key}} is a polynomial in q^-1, but {kind}"
             yield PathDiagnostic("unsuitable-key", message, f"remove {key}", (*path, key))
-        elif depth(value) == 2 and len(value) != outputs:
-            message = f"{{key}} holds {len(value)} polynomials, {has}"
-            hint = "write one polynomial for all outputs, or a list with one per output"
-            yield PathDiagnostic("wrong-shape", message, hint, (*path, key))
+        else:
+            yield from check_per_output(value, outputs, *path, key)
     variance = noise.variance
     if isinstance(variance, tuple) and len(variance) != outputs:
         message = f"{{key}} is {len(variance)} x {len(variance)}, {has}"
@@ -82,12 +75,53 @@ def weights_fit(spec: Spec) -> Iterator[PathDiagnostic]:
     """A filter in q^-1 has no meaning for a plant that is not sampled."""
     if spec.plant.sampled:
         return
-    accuracy = spec.accuracy
-    for name, given in (
-        ("model_error", accuracy.model_error),
-        ("weighted_variance", accuracy.weighted_variance),
-    ):
-        if given is not None and given.weight is not None and given.weight.kind == "discrete":
+    for name in ("model_error", "weighted_variance"):
+        path = ("accuracy", name, "weight")
+        if spec.at(*path, "kind") == "discrete":
             message = "{key} is in q^-1, but the plant is not sampled"
             hint = "write {continuous: {numerator: [..], denominator: [..]}} in s"
-            yield PathDiagnostic("unsuitable-key", message, hint, ("accuracy", name, "weight"))
+            yield PathDiagnostic("unsuitable-key", message, hint, path)
+
+
+def true_noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """The noise of the simulation has as many channels as the plant has outputs."""
+    if spec.simulation is not None and spec.simulation.noise is not None:
+        yield from check_noise(spec, spec.simulation.noise, "simulation", "noise")
+
+
+def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
+    """The true system has the channels of the nominal one, and is described in the same time."""
+    true = spec.simulation.plant if spec.simulation is not None else None
+    path, plant = ("simulation", "plant"), spec.plant
+    if true is None:
+        return
+    if plant.kind == "regression":
+        if true.kind != "parameters":
+            message = "{key} of a regression is a list of its true parameters"
+            hint = f"write {{parameters: [..]}} with {count(plant.inputs, 'number')}"
+            yield PathDiagnostic("regression-mismatch", message, hint, path)
+        elif len(true.parameters) != plant.inputs:
+            holds, has = count(len(true.parameters), "number"), count(plant.inputs, "parameter")
+            message = f"{{key}} holds {holds}, but the regression has {has}"
+            hint = "write the estimated parameters, then the neglected ones"
+            yield PathDiagnostic("wrong-shape", message, hint, (*path, "parameters"))
+        return
+    if true.kind == "parameters" or true.kind == "regression":
+        message = "{key} describes a regression, but the plant is not one"
+        hint = "describe the true system as the plant is described"
+        yield PathDiagnostic("regression-mismatch", message, hint, path)
+        return
+    if true.sampled and not plant.sampled:
+        message = "{key} is in discrete time, but the plant is not sampled"
+        yield PathDiagnostic("wrong-shape", message, "describe the true system in s as well", path)
+    if plant.sampled and not true.sampled:
+        message = "{key} is not sampled, but the plant is in discrete time"
+        yield PathDiagnostic("wrong-shape", message, "add sample: zoh to it", path)
+    if (true.inputs, true.outputs) != (plant.inputs, plant.outputs):
+        message = (
+            f"{{key}} has {count(true.inputs, 'input')} and {count(true.outputs, 'output')}, "
+            f"the plant {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
+        )
+        hint = "the true system may be of another order, but has the same signals"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
+    yield from check_stable(spec, true, *path)

@@ -9,8 +9,7 @@ from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.control import ClosedLoopError
-from inputdesign_cli.specification.models.controller import Controller
-from inputdesign_cli.specification.models.experiment import check_names, exactly_one
+from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
     Band,
     Denominator,
@@ -27,9 +26,16 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
-from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
+from inputdesign_cli.specification.models.transfer import Controller, DiscreteTransfer, Transfer
 
 DEFAULT_CONFIDENCE = 0.95
+_NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
+
+Deviations = Annotated[
+    Mapping[str, Positive],
+    Field(min_length=1),
+    Wording("a mapping", "write parameter names and numbers: {b1: 0.01}"),
+]
 
 
 class Sensitivity(Section):
@@ -46,7 +52,7 @@ class Sensitivity(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """W is given once, and whole."""
-        yield from exactly_one(self, "numerator", "max_db")
+        yield from self.exactly_one("numerator", "max_db")
         if self.denominator is not None and self.numerator is None:
             message = "{key} stands without a numerator"
             yield PathDiagnostic("missing-key", message, 'add "numerator: [..]"', ("denominator",))
@@ -86,22 +92,11 @@ class ModelError(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """r_adm and the size of the confidence region are given once."""
-        yield from exactly_one(self, "relative", "absolute", "table", "sensitivity")
-        if self.confidence is not None and self.alpha is not None:
-            yield PathDiagnostic(
-                "conflicting-keys",
-                "{key} stands beside confidence, which fixes it already",
-                "keep one of the two",
-                ("alpha",),
-                at_key=True,
-            )
+        yield from self.exactly_one("relative", "absolute", "table", "sensitivity")
+        yield from self.at_most_one("confidence", "alpha")
         if self.sensitivity is not None and self.norm == "entry":
-            yield PathDiagnostic(
-                "conflicting-keys",
-                "{key} is entry, but a sensitivity depends on all entries of the error together",
-                "remove norm, or write frobenius",
-                ("norm",),
-            )
+            message = "{key} is entry, but a sensitivity depends on all entries of the error together"
+            yield PathDiagnostic("conflicting-keys", message, "remove norm, or write frobenius", ("norm",))
 
     @property
     def probability(self) -> float | None:
@@ -154,16 +149,7 @@ class MeanSquaredError(Section):
     neglected_norm: Annotated[
         NonNegative, Wording("a number", "a norm is not negative; 0 stands for no bias at all")
     ] = Field(description="Bound on the norm of the neglected parameters.")
-    target: (
-        Annotated[
-            Positive,
-            Wording(
-                "a number",
-                "every estimate has some error; remove the key for the least that limits.energy allows",
-            ),
-        ]
-        | None
-    ) = Field(
+    target: Annotated[Positive, Wording("a number", _NO_TARGET)] | None = Field(
         default=None, description="Largest admissible error; absent: the least that limits.energy allows."
     )
 
@@ -181,14 +167,9 @@ class Accuracy(Section):
     weighted_variance: WeightedVariance | None = Field(
         default=None, description="Bound on a weighted variance."
     )
-    standard_deviation: (
-        Annotated[
-            Mapping[str, Positive],
-            Field(min_length=1),
-            Wording("a mapping", "write parameter names and numbers: {b1: 0.01}"),
-        ]
-        | None
-    ) = Field(default=None, description="Largest standard deviation of each named parameter.")
+    standard_deviation: Deviations | None = Field(
+        default=None, description="Largest standard deviation of each named parameter."
+    )
     criterion: Literal["D", "A", "E", "T"] | None = Field(
         default=None,
         description="The best det, trace of inverse, smallest eigenvalue or trace of M within limits.",
@@ -208,13 +189,11 @@ class Accuracy(Section):
     def requirements(self) -> tuple[str, ...]:
         """The keys of the requirements that are given, in the order of the contract."""
         names = ("model_error", "information", "application", "weighted_variance", "standard_deviation")
-        error = self.mean_squared_error
-        bounded = error is not None and error.target is not None
-        return self.stated(*names) + (("mean_squared_error",) if bounded else ())
+        bounded = self.at("mean_squared_error", "target") is not None
+        return self.stated(*names, *(("mean_squared_error",) if bounded else ()))
 
     @property
     def goals(self) -> tuple[str, ...]:
         """The keys that ask for the best that limits allow."""
-        error = self.mean_squared_error
-        unbounded = error is not None and error.target is None
-        return self.stated("criterion", "closed_loop_error") + (("mean_squared_error",) if unbounded else ())
+        goals = self.stated("criterion", "closed_loop_error", "mean_squared_error")
+        return tuple(goal for goal in goals if goal not in self.requirements)

@@ -42,7 +42,13 @@ class Declared:
     def alternatives(self) -> dict[str, Declared]:
         """The types of a union by their tags, which are empty for what carries none."""
         parts = [declared(part) for part in typing.get_args(self.type)] if _is_union(self.type) else []
-        return {next((m.tag for m in part.metadata if isinstance(m, Tag)), ""): part for part in parts}
+        return {part.tag: part for part in parts}
+
+    @property
+    def tag(self) -> str:
+        """What tells it apart from the other alternatives of a union."""
+        own = TAG + self.section.phrase if self.section else ""
+        return next((m.tag for m in self.metadata if isinstance(m, Tag)), own)
 
     @property
     def section(self) -> type[Section] | None:

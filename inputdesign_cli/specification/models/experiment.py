@@ -8,7 +8,6 @@ from typing import Annotated
 import numpy as np
 from pydantic import Discriminator, Field
 
-from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
     FileName,
@@ -21,10 +20,9 @@ from inputdesign_cli.specification.models.fields import (
     Variance,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import Polynomial
 from inputdesign_cli.specification.models.section import TAG, Section, tag
-from inputdesign_cli.specification.models.shapes import per_output
-from inputdesign_cli.specification.models.values import Matrix
+from inputdesign_cli.specification.models.shapes import with_paths
+from inputdesign_cli.specification.models.transfer import Controller
 
 InformationSource = Annotated[
     Annotated[FileName, tag("file")] | Annotated[SemidefiniteMatrix, tag("matrix")],
@@ -37,27 +35,19 @@ class NoiseShape(Section):
 
     C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
     D: StablePerOutput = Field(default=(1.0,), description="Monic, stable denominator in q^-1 (default 1).")
+    variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
 
-    def C_per_output(self, outputs: int) -> tuple[Polynomial, ...]:  # noqa: N802 (the paper's symbol)
-        """One polynomial C for each output."""
-        return per_output(self.C, outputs)
+    def covariance(self, outputs: int) -> np.ndarray:
+        """The covariance of e (outputs, outputs); a number stands for that multiple of I, none for I."""
+        if isinstance(self.variance, tuple):
+            return np.array(self.variance, dtype=float)
+        return (self.variance or 1.0) * np.eye(outputs)
 
     @property
     def filters(self) -> tuple[str, ...]:
         """Which of C and D are not 1."""
-        stated = {"C": per_output(self.C, 1), "D": per_output(self.D, 1)}
-        return tuple(name for name, rows in stated.items() if any(any(p[1:]) for p in rows))
-
-    def D_per_output(self, outputs: int) -> tuple[Polynomial, ...]:  # noqa: N802
-        """One polynomial D for each output."""
-        return per_output(self.D, outputs)
-
-
-def covariance_of(variance: float | Matrix, outputs: int) -> np.ndarray:
-    """The noise covariance as an array (outputs, outputs); a number stands for that multiple of I."""
-    if isinstance(variance, tuple):
-        return np.array(variance, dtype=float)
-    return variance * np.eye(outputs)
+        stated = {"C": with_paths(self.C), "D": with_paths(self.D)}
+        return tuple(name for name, all_ in stated.items() if any(any(p[1:]) for _, p in all_))
 
 
 class Noise(NoiseShape):
@@ -65,22 +55,17 @@ class Noise(NoiseShape):
 
     variance: Variance = Field(description="Variance of e, or its covariance matrix (outputs x outputs).")
 
-    def covariance(self, outputs: int) -> np.ndarray:
-        """The covariance of e as an array (outputs, outputs)."""
-        return covariance_of(self.variance, outputs)
-
 
 class SimulationNoise(NoiseShape):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
-    variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
     relative_std: Positive | None = Field(
         default=None, description="Standard deviation as a fraction of the smallest output rms."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Its size is given once."""
-        yield from exactly_one(self, "variance", "relative_std")
+        yield from self.exactly_one("variance", "relative_std")
 
 
 class Prior(Section):
@@ -129,23 +114,6 @@ class Cost(Section):
         if not any(np.any(w) for w in (self.input_power, self.output_power, self.excitation_power)):
             message = "all weights of {key} are zero: every experiment would be free"
             yield PathDiagnostic("no-cost", message, "write input_power: 1")
-
-
-def exactly_one(model: Section, *keys: str) -> Iterator[PathDiagnostic]:
-    """Exactly one of the keys is given."""
-    given = model.stated(*keys)
-    alternatives = ", ".join(keys[:-1]) + " or " + keys[-1]
-    if not given:
-        needs = f"{{key}} needs one of {alternatives}"
-        yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
-    for extra in given[1:]:
-        yield PathDiagnostic(
-            "conflicting-keys",
-            f"{{key}} stands beside {given[0]}; give only one of {alternatives}",
-            "remove one of the two",
-            (extra,),
-            at_key=True,
-        )
 
 
 def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> Iterator[PathDiagnostic]:

@@ -69,7 +69,7 @@ def nested(levels: int, what: str, hint: str) -> BeforeValidator:
 
 _WHOLE = BeforeValidator(as_whole)
 _DEPTH = Discriminator(lambda value: f"{TAG}{depth(value)}")
-_LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if isinstance(value, list | tuple) else "one"))
+_LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if depth(value) else "one"))
 
 # Single values
 Number = Annotated[float, Strict(), AllowInfNan(False)]
@@ -91,7 +91,6 @@ Name = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("a parameter name"
 # Lists
 Several = Annotated[tuple[T, ...], Field(min_length=1)]
 Numbers = Annotated[Several[Number], Wording("a list of numbers")]
-Positives = Annotated[Several[Positive], Wording("a list of numbers above 0")]
 Names = Annotated[Several[Name], Wording("a list of parameter names")]
 PerChannel = Annotated[
     Annotated[T, tag("one")] | Annotated[Several[T], tag("list")],
@@ -105,10 +104,7 @@ Harmonics = Annotated[
     | Annotated[Literal["odd"], Wording("odd", "write odd, a number of harmonics, or a list"), tag("word")]
     | Annotated[Several[Index], AfterValidator(rising), tag("list")],
     Discriminator(
-        lambda value: (
-            TAG
-            + ("list" if isinstance(value, list | tuple) else "word" if isinstance(value, str) else "count")
-        )
+        lambda value: TAG + ("list" if depth(value) else "word" if isinstance(value, str) else "count")
     ),
 ]
 """How many harmonics of a period, "odd", or which."""

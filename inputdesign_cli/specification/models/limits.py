@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +19,7 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
+from inputdesign_cli.specification.yaml.plain import Plain
 
 _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
 
@@ -48,15 +49,12 @@ class TableFile(Section, family="curve", phrase="table"):
     table: FileName = Field(description="CSV file with frequency and value.")
 
 
-def _kind(value: dict[str, Any]) -> str:
+def _kind(value: dict[str, Plain]) -> str:
     return TableFile.phrase if "table" in value else transfer_kind(value)
 
 
 Curve = Annotated[
-    Annotated[NonNegative, tag("number")]
-    | Annotated[TableFile, tag(TableFile.phrase)]
-    | Annotated[DiscreteTransfer, tag(DiscreteTransfer.phrase)]
-    | Annotated[ContinuousTransfer, tag(ContinuousTransfer.phrase)],
+    Annotated[NonNegative, tag("number")] | TableFile | DiscreteTransfer | ContinuousTransfer,
     pick(_kind, plain="number"),
 ]
 """A level, a tabulated curve, or |numerator/denominator|^2."""

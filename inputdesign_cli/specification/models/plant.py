@@ -9,7 +9,6 @@ from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
-    ContinuousDenominator,
     Count,
     GainMatrix,
     Index,
@@ -18,32 +17,23 @@ from inputdesign_cli.specification.models.fields import (
     StableMatrix,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
-from inputdesign_cli.specification.models.polynomials import Polynomial, check_left_half_plane
-from inputdesign_cli.specification.models.section import Section, pick, tag
+from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
-    check_each,
     check_gain,
-    check_proper,
-    check_shapes,
-    denominators_of,
-    per_output,
+    check_per_output,
     shape_words,
     size_of,
 )
+from inputdesign_cli.specification.models.transfer import ContinuousMatrix
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
-from inputdesign_cli.specification.wording import count
-
-_POLYNOMIALS = "a plant of polynomials A, B, F"
-_CONTINUOUS = "a continuous-time plant"
-_REGRESSION = "a regression"
-_PARAMETERS = "a list of true parameters"
 
 
-class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
+class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A, B, F"):
     """A(q) y = B(q)/F(q) u + noise, coefficients in ascending powers of q^-1."""
 
     kind: ClassVar[Literal["polynomial"]] = "polynomial"
+    sampled: ClassVar[bool] = True
 
     A: MonicPerOutput = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."
@@ -59,13 +49,7 @@ class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
     def check(self) -> Iterator[PathDiagnostic]:
         """B is not zero, and A and F have its shape."""
         yield from check_gain(self.B_matrix, "B")
-        if depth(self.A) == 2 and len(self.A) != self.outputs:
-            yield PathDiagnostic(
-                "wrong-shape",
-                f"{{key}} holds {len(self.A)} polynomials for {count(self.outputs, 'output')}",
-                "write one polynomial for all outputs, or a list with one per output",
-                ("A",),
-            )
+        yield from check_per_output(self.A, self.outputs, "A")
         if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
             yield PathDiagnostic(
                 "wrong-shape",
@@ -85,11 +69,6 @@ class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
         return len(self.B_matrix[0])
 
     @property
-    def sampled(self) -> bool:
-        """Whether the design runs in discrete time."""
-        return True
-
-    @property
     def B_matrix(self) -> PolynomialMatrix:  # noqa: N802 (the paper's symbol)
         """B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
         return as_matrix(self.B)
@@ -97,47 +76,11 @@ class PolynomialPlant(Section, family="plant", phrase=_POLYNOMIALS):
     @property
     def F_matrix(self) -> PolynomialMatrix:  # noqa: N802
         """F in the same form; absent polynomials are 1."""
-        if self.F is None:
-            return tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
-        return as_matrix(self.F)
-
-    @property
-    def A_per_output(self) -> tuple[Polynomial, ...]:  # noqa: N802
-        """One polynomial A for each output."""
-        return per_output(self.A, self.outputs)
+        ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
+        return ones if self.F is None else as_matrix(self.F)
 
 
-class ContinuousMatrix(Section):
-    """A transfer matrix in s, coefficients in descending powers."""
-
-    numerator: GainMatrix = Field(description="Coefficients; a matrix is rows (outputs) of columns (inputs).")
-    denominator: ContinuousDenominator = Field(
-        description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
-    )
-
-    def check(self) -> Iterator[PathDiagnostic]:
-        """Numerator and denominator have one shape, the poles lie on the left, every entry is proper."""
-        if shapes := list(check_shapes(self.numerator, self.denominator)):
-            yield from shapes
-            return
-        yield from check_each(self.denominator, check_left_half_plane, "denominator")
-        for i, row in enumerate(self.numerator_matrix):
-            for j, entry in enumerate(row):
-                where = (i, j) if depth(self.numerator) == 3 else ()
-                yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
-
-    @property
-    def numerator_matrix(self) -> PolynomialMatrix:
-        """The numerators as rows (outputs) of columns (inputs)."""
-        return as_matrix(self.numerator)
-
-    @property
-    def denominator_matrix(self) -> PolynomialMatrix:
-        """The denominators in the same form, factors multiplied out."""
-        return denominators_of(self.numerator, self.denominator)
-
-
-class ContinuousPlant(Section, family="plant", phrase=_CONTINUOUS):
+class ContinuousPlant(Section, family="plant", phrase="a continuous-time plant"):
     """A continuous-time transfer matrix; without `sample` the design stays in continuous time."""
 
     kind: ClassVar[Literal["continuous"]] = "continuous"
@@ -173,30 +116,22 @@ class RegressionSize(Section):
     )
 
 
-class RegressionPlant(Section, family="plant", phrase=_REGRESSION):
+class RegressionPlant(Section, family="plant", phrase="a regression"):
     """A linear regression of which some regressors are neglected."""
 
     kind: ClassVar[Literal["regression"]] = "regression"
+    sampled: ClassVar[bool] = True
+    outputs: ClassVar[int] = 1
 
     regression: RegressionSize = Field(description="The numbers of estimated and neglected regressors.")
-
-    @property
-    def outputs(self) -> int:
-        """A regression has one output."""
-        return 1
 
     @property
     def inputs(self) -> int:
         """Every regressor counts as an input."""
         return self.regression.estimated + self.regression.neglected
 
-    @property
-    def sampled(self) -> bool:
-        """A regression is a sequence of samples."""
-        return True
 
-
-class TrueParameters(Section, family="plant", phrase=_PARAMETERS):
+class TrueParameters(Section, family="plant", phrase="a list of true parameters"):
     """The true parameters of a regression: the estimated ones, then the neglected ones."""
 
     kind: ClassVar[Literal["parameters"]] = "parameters"
@@ -205,21 +140,20 @@ class TrueParameters(Section, family="plant", phrase=_PARAMETERS):
 
 
 _FORMS = Wording("a mapping of keys", "write {B: [0, 1], F: [1, -0.5]}, {continuous: ..} or {regression: ..}")
-_Polynomials = Annotated[PolynomialPlant, tag(_POLYNOMIALS)]
-_Continuous = Annotated[ContinuousPlant, tag(_CONTINUOUS)]
-_Regression = Annotated[RegressionPlant, tag(_REGRESSION)]
 
 
 def _kind(value: dict[str, object]) -> str:
-    return _REGRESSION if "regression" in value else _CONTINUOUS if "continuous" in value else _POLYNOMIALS
+    if "regression" in value:
+        return RegressionPlant.phrase
+    return (ContinuousPlant if "continuous" in value else PolynomialPlant).phrase
 
 
-Plant = Annotated[_Polynomials | _Continuous | _Regression, pick(_kind), _FORMS]
+Plant = Annotated[PolynomialPlant | ContinuousPlant | RegressionPlant, pick(_kind), _FORMS]
 """The nominal plant."""
 
 TruePlant = Annotated[
-    _Polynomials | _Continuous | _Regression | Annotated[TrueParameters, tag(_PARAMETERS)],
-    pick(lambda v: _PARAMETERS if "parameters" in v else _kind(v)),
+    PolynomialPlant | ContinuousPlant | RegressionPlant | TrueParameters,
+    pick(lambda v: TrueParameters.phrase if "parameters" in v else _kind(v)),
     _FORMS,
 ]
 """The plant of a simulation; of a regression only its parameters."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import typing
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import yaml
 from pydantic import ValidationError
@@ -18,6 +16,7 @@ from inputdesign_cli.specification.models.path_diagnostic import CARRIER, PathDi
 from inputdesign_cli.specification.models.section import FAMILIES, TAG, Section
 from inputdesign_cli.specification.wording import choices, describe, nearest, show, unknown_word
 from inputdesign_cli.specification.yaml.places import Path, format_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.scalars import clip, why_not_number
 
 # Pydantic's name of a bound that a number breaks -> our words.
@@ -36,7 +35,7 @@ _TYPE = f"{TAG}type: "
 """How the tags begin of alternatives that a key `type` tells apart."""
 
 
-def translate(error: ValidationError, data: Any, root: type[Section]) -> list[PathDiagnostic]:
+def translate(error: ValidationError, data: Plain, root: type[Section]) -> list[PathDiagnostic]:
     """The diagnostics behind a pydantic error.
 
     Args:
@@ -51,7 +50,7 @@ def translate(error: ValidationError, data: Any, root: type[Section]) -> list[Pa
     return [shorten(found, data) for detail in details for found in _translate(detail, root)]
 
 
-def shorten(diagnostic: PathDiagnostic, data: Any) -> PathDiagnostic:
+def shorten(diagnostic: PathDiagnostic, data: Plain) -> PathDiagnostic:
     """Drop the steps that a shorthand added: `limits.input_power: 5` has no `limits.input_power.max`."""
     kept: list[str | int] = []
     for step in diagnostic.path:
@@ -86,7 +85,9 @@ def _translate(error: ErrorDetails, root: type[Section]) -> list[PathDiagnostic]
     return [PathDiagnostic(*_wrong_value(kind, error["input"], context, declared), path)]
 
 
-def _wrong_value(kind: str, value: Any, context: dict[str, Any], declared: Declared) -> tuple[str, str, str]:
+def _wrong_value(
+    kind: str, value: Plain, context: dict[str, Plain], declared: Declared
+) -> tuple[str, str, str]:
     """Code, message and hint for a value that is not what its key wants."""
     hint = declared.wording.hint
     usual, advice = _DEFAULTS.get(kind, ("something else", ""))
@@ -117,7 +118,7 @@ def _wrong_value(kind: str, value: Any, context: dict[str, Any], declared: Decla
     return "wrong-shape", wrong, hint or advice
 
 
-def _no_number(value: Any, what: str, hint: str) -> tuple[str, str, str]:
+def _no_number(value: Plain, what: str, hint: str) -> tuple[str, str, str]:
     if isinstance(value, str):
         code, reason, mend = why_not_number(value)
         return code, f"{{key}} {reason}", mend or hint
@@ -130,7 +131,7 @@ def _no_number(value: Any, what: str, hint: str) -> tuple[str, str, str]:
     return "not-a-whole-number", message, f"write {below} or {below + 1}"
 
 
-def _unknown_type(path: Path, types: list[str], value: dict[str, Any]) -> PathDiagnostic:
+def _unknown_type(path: Path, types: list[str], value: dict[str, Plain]) -> PathDiagnostic:
     """A mapping whose `type` is missing or names none of the alternatives."""
     if "type" in value:
         message, hint = unknown_word(value["type"], types)
@@ -181,14 +182,12 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
 def _homes(root: type[Section]) -> dict[str, list[str]]:
     """Every key below the root -> where it belongs, for a key that was written elsewhere."""
     homes: dict[str, set[str]] = {}
-    for path, model in _walk(root, ""):
-        for name in model.model_fields:
+
+    def walk(model: type[Section], path: str) -> None:
+        for name, field in model.model_fields.items():
             homes.setdefault(name, set()).add(f"under {path}" if path else "at the top level")
+            for part in sections_in(field.annotation):
+                walk(part, f"{path}.{name}" if path else name)
+
+    walk(root, "")
     return {name: sorted(home) for name, home in homes.items()}
-
-
-def _walk(model: type[Section], path: str) -> Iterator[tuple[str, type[Section]]]:
-    yield path, model
-    for name, field in model.model_fields.items():
-        for part in sections_in(field.annotation):
-            yield from _walk(part, f"{path}.{name}" if path else name)

@@ -1,24 +1,27 @@
-"""`signal:`, `solver:` and `simulation:`: how a spectrum is realised, found and tried."""
+"""`signal:`, `solver:`, `simulation:` and `report:`: how a spectrum is realised, found, tried and shown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.fields import (
     Count,
     Harmonics,
     Index,
+    Name,
     Number,
     PerChannel,
     Positive,
     RegisterLength,
+    Several,
     Tolerance,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import Section
 
@@ -135,4 +138,27 @@ class Simulation(Section):
     )
     compare: tuple[Literal["white", "prbs", "multisine", "binary"], ...] = Field(
         default=(), description="Other inputs to compare with, at equal power."
+    )
+
+
+def _pair(value: object) -> object:
+    if isinstance(value, list | tuple) and (len(value) != 2 or value[0] == value[1]):
+        raise fail(
+            "wrong-shape",
+            "{key} must hold two different parameters, which span the plane of the ellipse",
+            'write a pair, such as ["b1", "f1"] or ["b1[1,1]", "a1[1]"] (names with brackets in quotes)',
+        )
+    return value
+
+
+Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of two parameter names")]
+
+
+class Report(Section):
+    """What the figures show."""
+
+    ellipses: Several[Pair] | None = Field(
+        default=None,
+        description="Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
+        "the most correlated ones; with one: none).",
     )

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Discriminator, GetJsonSchemaHandler, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Tag,
+    model_validator,
+)
 from pydantic_core import core_schema
 
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
+from inputdesign_cli.specification.wording import choices
+from inputdesign_cli.specification.yaml.plain import Plain
 
 TAG = "\x00"
 """Marks the tags that pydantic puts into the path of an error inside a union; they are not keys."""
@@ -29,11 +39,17 @@ class Section(BaseModel):
     phrase: ClassVar[str] = ""
     family: ClassVar[str] = ""
 
-    def __init_subclass__(cls, family: str = "", phrase: str = "", **kwargs: Any) -> None:
+    def __init_subclass__(cls, family: str = "", phrase: str = "", **kwargs: Plain) -> None:
         super().__init_subclass__(**kwargs)
         if family:
             cls.family, cls.phrase = family, phrase
             FAMILIES.setdefault(family, []).append(cls)
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: type[BaseModel], handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return Tag(TAG + cls.phrase).__get_pydantic_core_schema__(source, handler)
 
     def check(self) -> Iterator[PathDiagnostic]:
         """What is wrong with the section as a whole, once each of its values is valid."""
@@ -42,6 +58,27 @@ class Section(BaseModel):
     def stated(self, *keys: str) -> tuple[str, ...]:
         """Those of the keys that have a value."""
         return tuple(key for key in keys if getattr(self, key) is not None)
+
+    def at(self, *path: str) -> object:
+        """The value at a path below; None where a section on the way is absent or has no such key."""
+        inner = getattr(self, path[0], None)
+        if path[1:]:
+            return inner.at(*path[1:]) if isinstance(inner, Section) else None
+        return inner
+
+    def exactly_one(self, *keys: str) -> Iterator[PathDiagnostic]:
+        """Exactly one of the keys is given."""
+        if not self.stated(*keys):
+            needs = f"{{key}} needs one of {choices(keys)}"
+            yield PathDiagnostic("missing-key", needs, "add one of them", keys=keys)
+        yield from self.at_most_one(*keys)
+
+    def at_most_one(self, *keys: str) -> Iterator[PathDiagnostic]:
+        """No two of the keys are given."""
+        given = self.stated(*keys)
+        for extra in given[1:]:
+            message = f"{{key}} stands beside {given[0]}; give only one of {choices(keys)}"
+            yield PathDiagnostic("conflicting-keys", message, "remove one of the two", (extra,), at_key=True)
 
     @model_validator(mode="after")
     def _checked(self) -> Self:
@@ -55,7 +92,7 @@ def tag(word: str) -> Tag:
     return Tag(TAG + word)
 
 
-def pick(choose: Callable[[dict[str, Any]], str], plain: str = "") -> Discriminator:
+def pick(choose: Callable[[dict[str, Plain]], str], plain: str = "") -> Discriminator:
     """The discriminator of a union of sections.
 
     Args:
@@ -74,14 +111,18 @@ def pick(choose: Callable[[dict[str, Any]], str], plain: str = "") -> Discrimina
 class Shorthand:
     """Allow a plain value in place of a mapping: it is read as `{key: value}`."""
 
-    def __init__(self, key: str, *schemas: dict[str, Any]) -> None:
+    def __init__(self, key: str, *schemas: dict[str, Plain]) -> None:
         self.key, self.schemas = key, schemas
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
-        def widen(value: Any) -> Any:
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        def widen(value: Plain) -> Plain:
             return value if isinstance(value, dict | Section) else {self.key: value}
 
         return core_schema.no_info_before_validator_function(widen, handler(source))
 
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Plain]:
         return {"anyOf": [*self.schemas, handler(schema)]}

@@ -8,16 +8,12 @@ from dataclasses import replace
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import Polynomial, product
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+from inputdesign_cli.specification.wording import count
 
 
 def as_matrix(value: tuple) -> PolynomialMatrix:
     """One polynomial as a 1 x 1 matrix; a matrix as it is."""
     return value if depth(value) == 3 else ((value,),)
-
-
-def per_output(value: tuple, outputs: int) -> tuple[Polynomial, ...]:
-    """One polynomial repeated for every output; a list as it is."""
-    return value if depth(value) == 2 else (value,) * outputs
 
 
 def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
@@ -54,6 +50,14 @@ def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
     if depth(value) == 1:
         return [((), value)]
     return [((i, *path), p) for i, part in enumerate(value) for path, p in with_paths(part)]
+
+
+def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDiagnostic]:
+    """A list of polynomials at `path` has one for each output."""
+    if depth(value) == 2 and len(value) != outputs:
+        message = f"{{key}} holds {len(value)} polynomials for {count(outputs, 'output')}"
+        hint = "write one polynomial for all outputs, or a list with one per output"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
 
 
 def check_gain(entries: PolynomialMatrix, name: str) -> Iterator[PathDiagnostic]:

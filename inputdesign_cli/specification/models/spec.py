@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal, TypeVar
 
@@ -15,13 +15,11 @@ from inputdesign_cli.specification.models.experiment import Cost, Experiment, No
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
-from inputdesign_cli.specification.models.realisation import Signal, Simulation, Solver
-from inputdesign_cli.specification.models.report import Report
+from inputdesign_cli.specification.models.realisation import Report, Signal, Simulation, Solver
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
-from inputdesign_cli.specification.yaml.places import parse_key
-from inputdesign_cli.specification.yaml.source import Source
+from inputdesign_cli.specification.yaml.places import Source, parse_key
 from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
 
 Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
@@ -88,9 +86,8 @@ class Spec(Section):
     @property
     def given(self) -> Given | None:
         """The excitation that is given, if none is to be designed."""
-        if self.spectrum is None or self.spectrum.type != "given":
-            return None
-        return self.spectrum.given
+        spectrum = self.spectrum
+        return spectrum.given if spectrum is not None and spectrum.type == "given" else None
 
     @property
     def designs(self) -> bool:
@@ -139,12 +136,9 @@ class Spec(Section):
 
     def place(self, error: _Error) -> _Error:
         """An error of the same type whose keyed diagnostics point at their lines."""
-        placed = type(error)(
-            [
-                c if c.location or not c.key else dataclasses.replace(c, location=self.locate(c.key))
-                for c in error.diagnostics
-            ]
-        )
+        places = [d.location or (self.locate(d.key) if d.key else None) for d in error.diagnostics]
+        pairs = zip(error.diagnostics, places, strict=True)
+        placed = type(error)([replace(d, location=place) for d, place in pairs])
         placed.__cause__ = error.__cause__
         return placed
 

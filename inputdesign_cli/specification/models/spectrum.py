@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Discriminator, Field
 
 from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.experiment import exactly_one
 from inputdesign_cli.specification.models.fields import (
     Band,
     Count,
@@ -23,9 +22,10 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.specification.yaml.plain import Plain
 
 
-def _type(value: dict[str, Any]) -> str:
+def _type(value: dict[str, Plain]) -> str:
     return f"type: {value.get('type')}"
 
 
@@ -53,7 +53,7 @@ class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The lines are given once."""
-        yield from exactly_one(self, "lines", "frequencies")
+        yield from self.exactly_one("lines", "frequencies")
 
 
 class FreeSpectrum(Section, family="spectrum", phrase="type: free"):
@@ -127,16 +127,13 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every frequency has an amplitude."""
-        listed = depth(self.amplitudes) == 2
-        for row in self.rows:
-            if len(row) != len(self.frequencies):
-                yield PathDiagnostic(
-                    "wrong-shape",
-                    f"{{key}} holds {len(row)} amplitudes for {len(self.frequencies)} frequencies",
-                    f"write one {'list per input, with one ' if listed else ''}amplitude per frequency",
-                    ("amplitudes",),
-                )
-                return
+        wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
+        if wrong is not None:
+            message = f"{{key}} holds {len(wrong)} amplitudes for {len(self.frequencies)} frequencies"
+            lists = "list per input, with one " if depth(self.amplitudes) == 2 else ""
+            yield PathDiagnostic(
+                "wrong-shape", message, f"write one {lists}amplitude per frequency", ("amplitudes",)
+            )
 
 
 class GivenTable(Section, family="given", phrase="type: table"):
@@ -155,10 +152,7 @@ class GivenSignal(Section, family="given", phrase="signal"):
 
 
 Given = Annotated[
-    Annotated[GivenWhite, tag("type: white")]
-    | Annotated[GivenMultisine, tag("type: multisine")]
-    | Annotated[GivenTable, tag("type: table")]
-    | Annotated[GivenSignal, tag("signal")],
+    GivenWhite | GivenMultisine | GivenTable | GivenSignal,
     pick(lambda v: "signal" if "signal" in v else _type(v)),
     Wording("a mapping of keys", "write {type: white, power: 1} or {signal: u.csv}"),
 ]
@@ -174,14 +168,14 @@ class GivenSpectrum(Section, family="spectrum", phrase="given"):
 
 
 Spectrum = Annotated[
-    Annotated[WhiteSpectrum, tag("type: white")]
-    | Annotated[FirSpectrum, tag("type: fir")]
-    | Annotated[MultisineSpectrum, tag("type: multisine")]
-    | Annotated[FreeSpectrum, tag("type: free")]
-    | Annotated[PolynomialSpectrum, tag("type: polynomial")]
-    | Annotated[PointwiseSpectrum, tag("type: pointwise")]
-    | Annotated[MomentsSpectrum, tag("type: moments")]
-    | Annotated[GivenSpectrum, tag("given")],
+    WhiteSpectrum
+    | FirSpectrum
+    | MultisineSpectrum
+    | FreeSpectrum
+    | PolynomialSpectrum
+    | PointwiseSpectrum
+    | MomentsSpectrum
+    | GivenSpectrum,
     pick(lambda v: "given" if "given" in v else _type(v)),
     Wording("a mapping of keys", "write {type: fir, order: 20}"),
 ]

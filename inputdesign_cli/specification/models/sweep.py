@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from decimal import Decimal
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
@@ -13,6 +13,7 @@ from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import Flag, Several
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
 from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.scalars import resolve
 
 MOST_VALUES = 100_000
@@ -69,7 +70,7 @@ def _expanded(value: object) -> object:
 
 
 Values = Annotated[
-    Several[Any],
+    Several[Plain],
     BeforeValidator(_expanded),
     Wording("a list of values or a range", "write [250, 500, 1000] or 0:40:5"),
     WithJsonSchema({"anyOf": [{"type": "array", "minItems": 1}, {"type": "string"}]}),

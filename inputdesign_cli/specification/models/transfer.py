@@ -1,14 +1,20 @@
-"""Transfer functions of a spec: in the delay q^-1, or in s under a key `continuous:`."""
+"""Transfer functions and matrices of them: in the delay q^-1, or in s under a key `continuous:`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.fields import Denominator, Numerator
+from inputdesign_cli.specification.models.fields import (
+    ContinuousDenominator,
+    Denominator,
+    GainMatrix,
+    Numerator,
+    RowsMatrix,
+)
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import (
     Polynomial,
@@ -16,14 +22,16 @@ from inputdesign_cli.specification.models.polynomials import (
     check_left_half_plane,
     product,
 )
-from inputdesign_cli.specification.models.section import Section, pick, tag
-from inputdesign_cli.specification.models.shapes import check_each, check_proper
-from inputdesign_cli.specification.models.values import PolynomialList, depth
-
-
-def factors_of(denominator: Polynomial | PolynomialList) -> PolynomialList:
-    """The factors of a denominator; a single polynomial is its own only factor."""
-    return cast(PolynomialList, denominator if depth(denominator) == 2 else (denominator,))
+from inputdesign_cli.specification.models.section import Section, pick
+from inputdesign_cli.specification.models.shapes import (
+    as_matrix,
+    check_each,
+    check_proper,
+    check_shapes,
+    denominators_of,
+)
+from inputdesign_cli.specification.models.values import PolynomialList, PolynomialMatrix, depth
+from inputdesign_cli.specification.yaml.plain import Plain
 
 
 class Ratio(Section):
@@ -37,7 +45,7 @@ class Ratio(Section):
     @property
     def denominator_factors(self) -> tuple[Polynomial, ...]:
         """The factors of the denominator as written."""
-        return factors_of(self.denominator)
+        return cast(PolynomialList, self.denominator if depth(self.denominator) == 2 else (self.denominator,))
 
     @property
     def denominator_polynomial(self) -> Polynomial:
@@ -49,10 +57,6 @@ class DiscreteTransfer(Ratio, family="transfer", phrase="a transfer function in 
     """A transfer function in the delay operator: coefficients in ascending powers of q^-1."""
 
     kind: ClassVar[Literal["discrete"]] = "discrete"
-
-    def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
-        """Its poles lie inside the unit circle; `path` leads to the transfer function."""
-        yield from check_each(self.denominator, check_delay_stable, *path, "denominator")
 
 
 class ContinuousRatio(Ratio):
@@ -73,21 +77,85 @@ class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time t
         default=None, description="How it is sampled at sample_time: zoh, a zero-order hold."
     )
 
-    def check_stable(self, *path: str) -> Iterator[PathDiagnostic]:
-        """Its poles lie in the left half plane; `path` leads to the transfer function."""
-        yield from check_each(
-            self.continuous.denominator, check_left_half_plane, *path, "continuous", "denominator"
-        )
+
+class _Matrix(Section):
+    """numerator / denominator entry by entry, whatever the variable."""
+
+    numerator: GainMatrix = Field(description="Coefficients; a matrix is rows (outputs) of columns (inputs).")
+    denominator: ContinuousDenominator = Field(
+        description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Numerator and denominator have one shape."""
+        yield from check_shapes(self.numerator, self.denominator)
+
+    @property
+    def numerator_matrix(self) -> PolynomialMatrix:
+        """The numerators as rows (outputs) of columns (inputs)."""
+        return as_matrix(self.numerator)
+
+    @property
+    def denominator_matrix(self) -> PolynomialMatrix:
+        """The denominators in the same form, factors multiplied out."""
+        return denominators_of(self.numerator, self.denominator)
 
 
-def transfer_kind(value: dict[str, Any]) -> str:
-    """Which of the two a mapping of the file stands for."""
+class DiscreteMatrix(_Matrix, family="transfer", phrase="a transfer matrix in q^-1"):
+    """A transfer matrix in the delay operator: coefficients in ascending powers of q^-1."""
+
+    kind: ClassVar[Literal["discrete_matrix"]] = "discrete_matrix"
+
+    numerator: RowsMatrix = Field(description="Rows of columns of coefficients.")
+    denominator: ContinuousDenominator = Field(
+        default=(1.0,), description="One polynomial for all entries, its factors, or one per entry."
+    )
+
+
+class ContinuousMatrix(_Matrix):
+    """A stable transfer matrix in s, coefficients in descending powers."""
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Numerator and denominator have one shape, the poles lie on the left, every entry is proper."""
+        if shapes := list(super().check()):
+            yield from shapes
+            return
+        yield from check_each(self.denominator, check_left_half_plane, "denominator")
+        for i, row in enumerate(self.numerator_matrix):
+            for j, entry in enumerate(row):
+                where = (i, j) if depth(self.numerator) == 3 else ()
+                yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
+
+
+class ContinuousTarget(ContinuousMatrix):
+    """A transfer matrix in s that is written as one."""
+
+    numerator: RowsMatrix = Field(description="Rows (outputs) of columns of coefficients.")
+
+
+class ContinuousMatrixTransfer(Section, family="transfer", phrase="a continuous-time transfer matrix"):
+    """A transfer matrix in s, sampled with a zero-order hold."""
+
+    kind: ClassVar[Literal["continuous_matrix"]] = "continuous_matrix"
+
+    continuous: ContinuousTarget = Field(description="numerator and denominator in descending powers of s.")
+    sample: Literal["zoh"] | None = Field(default=None, description="How it is sampled: zoh.")
+
+
+def transfer_kind(value: dict[str, Plain]) -> str:
+    """Whether a mapping of the file is in q^-1 or in s."""
     return ContinuousTransfer.phrase if "continuous" in value else DiscreteTransfer.phrase
 
 
+def _target_kind(value: dict[str, Plain]) -> str:
+    inside = value.get("continuous", value)
+    if depth(inside.get("numerator") if isinstance(inside, dict) else None) < 2:
+        return transfer_kind(value)
+    return ContinuousMatrixTransfer.phrase if "continuous" in value else DiscreteMatrix.phrase
+
+
 Transfer = Annotated[
-    Annotated[DiscreteTransfer, tag(DiscreteTransfer.phrase)]
-    | Annotated[ContinuousTransfer, tag(ContinuousTransfer.phrase)],
+    DiscreteTransfer | ContinuousTransfer,
     pick(transfer_kind),
     Wording(
         "a mapping of keys",
@@ -96,3 +164,32 @@ Transfer = Annotated[
     ),
 ]
 """A filter or weight, in q^-1 or in s."""
+
+Controller = Annotated[
+    DiscreteTransfer | DiscreteMatrix,
+    pick(lambda v: (DiscreteMatrix if depth(v.get("numerator")) > 1 else DiscreteTransfer).phrase),
+    Wording(
+        "a mapping of keys",
+        "write {numerator: [..], denominator: [..]} in q^-1; with several channels rows of columns of them",
+    ),
+]
+"""C of a loop u = r - C y: one transfer function, or rows (inputs) of columns (outputs) of them."""
+
+Target = Annotated[
+    DiscreteTransfer | ContinuousTransfer | DiscreteMatrix | ContinuousMatrixTransfer,
+    pick(_target_kind),
+    Wording(
+        "a mapping of keys",
+        "write {continuous: {numerator: [1], denominator: [10, 1]}}, or the same in q^-1 or with matrices",
+    ),
+]
+"""t(q) I from one transfer function, or a square matrix."""
+
+
+def check_stable(transfer: Target, *path: str) -> Iterator[PathDiagnostic]:
+    """The poles of the transfer function at `path` are stable; a matrix in s that is not is never read."""
+    if transfer.kind == "continuous":
+        inside = (*path, "continuous", "denominator")
+        yield from check_each(transfer.continuous.denominator, check_left_half_plane, *inside)
+    elif transfer.kind != "continuous_matrix":
+        yield from check_each(transfer.denominator, check_delay_stable, *path, "denominator")

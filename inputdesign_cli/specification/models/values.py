@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from inputdesign_cli.specification.wording import show
 PolynomialList = tuple[Polynomial, ...]
 PolynomialMatrix = tuple[tuple[Polynomial, ...], ...]
 Matrix = tuple[tuple[float, ...], ...]
-Nested = TypeVar("Nested", bound=tuple[Any, ...])
+Nested = TypeVar("Nested", bound=tuple)
 
 
 def depth(value: object) -> int:
@@ -40,11 +40,8 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
     """Frequencies or harmonics increase."""
     for before, after in pairwise(values):
         if not before < after:
-            raise fail(
-                "not-increasing",
-                f"{{key}} must increase: {show(after)} follows {show(before)}",
-                "sort the entries and remove repetitions",
-            )
+            message = f"{{key}} must increase: {show(after)} follows {show(before)}"
+            raise fail("not-increasing", message, "sort the entries and remove repetitions")
     return values
 
 
@@ -97,15 +94,13 @@ def symmetric(rows: Matrix) -> Matrix:
         if len(row) != len(rows):
             message = f"it has {len(rows)} rows, and one of them has {len(row)} entries"
             raise fail("wrong-shape", f"{{key}} must be square: {message}")
-    scale = max(abs(x) for row in rows for x in row)
-    for i, row in enumerate(rows):
-        for j in range(i):
-            if abs(row[j] - rows[j][i]) > 1e-9 * scale:
-                message = (
-                    f"{{key}} is not symmetric: entry ({i + 1}, {j + 1}) is {show(row[j])} "
-                    f"but ({j + 1}, {i + 1}) is {show(rows[j][i])}"
-                )
-                raise fail("not-symmetric", message)
+    values = np.array(rows)
+    for i, j in np.argwhere(np.tril(np.abs(values - values.T)) > 1e-9 * np.max(np.abs(values))):
+        entry, mirrored = (
+            f"({i + 1}, {j + 1}) is {show(rows[i][j])}",
+            f"({j + 1}, {i + 1}) is {show(rows[j][i])}",
+        )
+        raise fail("not-symmetric", f"{{key}} is not symmetric: entry {entry} but {mirrored}")
     return rows
 
 

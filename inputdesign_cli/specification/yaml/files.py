@@ -30,19 +30,14 @@ def read_text(path: str | os.PathLike[str]) -> str:
     except FileNotFoundError:
         raise _error("file-missing", f"there is no file {name}", name, _nearby(Path(name))) from None
     except PermissionError:
-        raise _error(
-            "file-unreadable", f"{name} may not be read", name, "check the permissions of the file"
-        ) from None
+        hint = "check the permissions of the file"
+        raise _error("file-unreadable", f"{name} may not be read", name, hint) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "the name is not a file name"
         raise _error("file-unreadable", f"{name!r} cannot be read: {reason}", name, "") from None
     if len(raw) > MAX_BYTES:
-        raise _error(
-            "file-too-large",
-            f"{name} is larger than {MAX_BYTES // 2**20} MiB",
-            name,
-            "is it a data file? A spec is a page of text; data belong into a CSV file that it names",
-        )
+        hint = "is it a data file? A spec is a page of text; data belong into a CSV file that it names"
+        raise _error("file-too-large", f"{name} is larger than {MAX_BYTES // 2**20} MiB", name, hint)
     return decode(raw, name)
 
 
@@ -63,14 +58,9 @@ def decode(raw: bytes, file: str) -> str:
         byte = error.object[error.start]
         text = error.object.decode("utf-8", errors="replace").splitlines()[len(rows) - 1]
         place = Location(file, len(rows), len(rows[-1]), text)
-        raise SpecError(
-            Diagnostic(
-                "file-encoding",
-                f"the byte 0x{byte:02X} is not UTF-8",
-                "save the file as UTF-8 (an editor may have used Latin-1 or Windows-1252)",
-                location=place,
-            )
-        ) from None
+        hint = "save the file as UTF-8 (an editor may have used Latin-1 or Windows-1252)"
+        message = f"the byte 0x{byte:02X} is not UTF-8"
+        raise SpecError(Diagnostic("file-encoding", message, hint, location=place)) from None
 
 
 def _nearby(path: Path) -> str:

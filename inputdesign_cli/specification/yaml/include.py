@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path as FilePath
-from typing import Any
 
 from inputdesign_cli.errors import Diagnostic, SpecError
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import Path, format_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
 KEY = "include"
@@ -52,16 +52,12 @@ def _read(tree: Tree, path: Path, file: FilePath) -> Tree:
     return read(text, str(file), source=len(tree.places.sources))
 
 
-def _join(tree: Tree, included: Tree, path: Path, value: Any) -> None:
+def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
     holder = tree.data if len(path) == 1 else tree.data[path[0]]
     key = path[-1]
     if key not in holder:
         holder[key] = value
-        for mine, theirs in (
-            (tree.places.keys, included.places.keys),
-            (tree.places.values, included.places.values),
-        ):
-            mine.update({p: mark for p, mark in theirs.items() if p[: len(path)] == path})
+        tree.places.adopt(included.places, path)
     elif len(path) == 1 and key not in _WHOLE and isinstance(holder[key], dict) and isinstance(value, dict):
         for inner, item in value.items():
             _join(tree, included, (*path, inner), item)
@@ -69,13 +65,8 @@ def _join(tree: Tree, included: Tree, path: Path, value: Any) -> None:
         mark = included.places.mark(path, at_key=True)
         where = tree.places.location(mark)
         place = f"{where.file}, line {where.line}" if where else "the included file"
-        error = _error(
-            tree,
-            path,
-            f"{{key}} stands here and in {place}",
-            "remove one of them: the spec and what it includes are put together",
-        )
-        tree.diagnostics.extend(error.diagnostics)
+        hint = "remove one of them: the spec and what it includes are put together"
+        tree.diagnostics.extend(_error(tree, path, f"{{key}} stands here and in {place}", hint).diagnostics)
         tree.broken.add(path)
 
 

@@ -9,18 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import yaml
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.syntax import syntax_error
 
 MAX_DEPTH = 64
 MAX_NODES = 100_000
 
 # The parser written in C is some ten times faster; both give the same events and marks.
-_PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_PARSER: Plain = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -30,7 +30,7 @@ class Node:
     another node; where it stands is counted from 1 in the text that the parser saw."""
 
     kind: str
-    value: Any
+    value: Plain
     line: int
     column: int
     plain: bool = False
@@ -94,7 +94,7 @@ def compose(text: str, document: Document) -> Node | None:
         raise syntax_error(error, document.file, document.lines, document.shift) from None
 
 
-def _events(text: str) -> Iterator[Any]:
+def _events(text: str) -> Iterator[Plain]:
     parser = _PARSER(text)
     try:
         while parser.check_event():
@@ -103,7 +103,7 @@ def _events(text: str) -> Iterator[Any]:
         parser.dispose()
 
 
-def _compose(events: Iterator[Any], document: Document) -> Node | None:
+def _compose(events: Iterator[Plain], document: Document) -> Node | None:
     root: Node | None = None
     stack: list[Node] = []
     anchors: dict[str, Node] = {}
@@ -113,10 +113,8 @@ def _compose(events: Iterator[Any], document: Document) -> Node | None:
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
-                message, hint = (
-                    'a second document begins here ("---")',
-                    "a file holds one spec; put the other into a file of its own",
-                )
+                message = 'a second document begins here ("---")'
+                hint = "a file holds one spec; put the other into a file of its own"
                 raise document.error("several-documents", message, line, column, hint)
             continue
         if isinstance(event, yaml.CollectionEndEvent):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.specification.yaml.include import KEY, apply_includes
 from inputdesign_cli.specification.yaml.nodes import MAX_DEPTH
 from inputdesign_cli.specification.yaml.places import Mark, Path, format_key, parse_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
 
@@ -30,50 +29,40 @@ def apply_overrides(tree: Tree, overrides: Sequence[str]) -> None:
     """
     for override in overrides:
         try:
-            _apply(tree, _Override(override))
+            _apply(tree, override)
         except SpecError as error:
             tree.diagnostics.extend(error.diagnostics)
 
 
-@dataclass(frozen=True)
-class _Override:
-    text: str
-
-    @property
-    def source(self) -> str:
-        """The name it goes by in diagnostics."""
-        return f"--set {self.text}"
-
-    def error(self, message: str, hint: str, column: int = 1) -> SpecError:
-        """What is wrong with it, at a column of its text."""
-        first = self.text.splitlines()[0] if self.text else ""
-        return SpecError(
-            Diagnostic("bad-override", message, hint, location=Location(self.source, 1, column, first))
-        )
+def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError:
+    """What is wrong with an override, at a column of its text."""
+    first = override.splitlines()[0] if override else ""
+    location = Location(f"--set {override}", 1, column, first)
+    return SpecError(Diagnostic("bad-override", message, hint, location=location))
 
 
-def _apply(tree: Tree, override: _Override) -> None:
-    key, equals, text = override.text.partition("=")
+def _apply(tree: Tree, override: str) -> None:
+    key, equals, text = override.partition("=")
     name = key.strip()
     path = tuple(step.strip() if isinstance(step, str) else step for step in parse_key(name))
     if not equals or not path or "" in path or not key.isprintable():
-        message = f"{override.text!r} is not of the form key.path=value"
-        raise override.error(message, "write --set noise.variance=0.5")
+        message = f"{override!r} is not of the form key.path=value"
+        raise _error(override, message, "write --set noise.variance=0.5")
     if len(path) > MAX_DEPTH:
-        raise override.error("the key has too many steps", "no key has more than six")
+        raise _error(override, "the key has too many steps", "no key has more than six")
     if not text.strip():
         hint = f"write {name}=VALUE, or {name}=null to remove the key"
-        raise override.error(f"no value is given for {name}", hint, len(key) + 2)
+        raise _error(override, f"no value is given for {name}", hint, len(key) + 2)
     number = len(tree.places.sources)
     where = _resolve(tree.data, path, override)
-    value = read(text, override.source, source=number, before=key + equals, at=where)
+    value = read(text, f"--set {override}", source=number, before=key + equals, at=where)
     tree.places.sources.append(value.places.sources[0])
     _put(tree, where, value, Mark(number, 1, 1))
     tree.diagnostics.extend(value.diagnostics)
     tree.broken = {p for p in tree.broken if p[: len(where)] != where} | value.broken
 
 
-def _resolve(data: Any, path: Path, override: _Override) -> Path:
+def _resolve(data: Plain, path: Path, override: str) -> Path:
     """The path with digits turned into indices where the tree has a list."""
     found: list[str | int] = []
     for step in path:
@@ -83,13 +72,13 @@ def _resolve(data: Any, path: Path, override: _Override) -> Path:
             if index is None or index >= len(data):
                 has = f"entries 0 to {len(data) - 1}" if data else "no entries"
                 message = f"{above} is a list with {has}; there is no entry {step}"
-                raise override.error(message, f"give the whole list: --set {above}=[..]")
+                raise _error(override, message, f"give the whole list: --set {above}=[..]")
             found.append(index)
             data = data[index]
             continue
         if data is not None and not isinstance(data, dict):
             message = f"{above} is a single value, so it has no part {step}"
-            raise override.error(message, f"give the whole value: --set {above}=..")
+            raise _error(override, message, f"give the whole value: --set {above}=..")
         step = str(step)
         found.append(step)
         data = data.get(step) if isinstance(data, dict) else None
@@ -100,7 +89,7 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
     if not isinstance(tree.data, dict):
         tree.data = {}
     places = tree.places
-    node: Any = tree.data
+    node: Plain = tree.data
     for depth, step in enumerate(path[:-1], start=1):
         here = path[:depth]
         if _child(node, step) is None:
@@ -114,9 +103,8 @@ def _put(tree: Tree, path: Path, value: Tree, mark: Mark) -> None:
         return
     node[last] = value.data
     places.keys[path] = mark
-    places.values.update(value.places.values)
-    places.keys.update(value.places.keys)
+    places.adopt(value.places, path)
 
 
-def _child(node: Any, step: str | int) -> Any:
+def _child(node: Plain, step: str | int) -> Plain:
     return node.get(step) if isinstance(node, dict) else node[step]

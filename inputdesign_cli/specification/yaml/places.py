@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import NamedTuple
 
 from inputdesign_cli.errors import Location
+from inputdesign_cli.specification.yaml.plain import Plain
 
 Path = tuple[str | int, ...]
 
@@ -75,6 +77,11 @@ class Places:
         text = lines[mark.line - 1] if 0 < mark.line <= len(lines) else ""
         return Location(file, mark.line, mark.column, text)
 
+    def adopt(self, other: Places, path: Path) -> None:
+        """Take over the marks of `path` and of all below it."""
+        for mine, theirs in ((self.keys, other.keys), (self.values, other.values)):
+            mine.update({p: mark for p, mark in theirs.items() if p[: len(path)] == path})
+
     def forget(self, path: Path) -> None:
         """Drop the marks of `path` and of all below it (an override has replaced them)."""
         for table in (self.keys, self.values):
@@ -91,3 +98,12 @@ class Places:
             else:
                 break
         return known
+
+
+@dataclass
+class Source:
+    """What a spec remembers of its file; empty for a spec that was built in Python."""
+
+    data: dict[str, Plain] = field(default_factory=dict)
+    places: Places = field(default_factory=Places)
+    folder: FilePath = field(default_factory=FilePath)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from inputdesign_cli.errors import Diagnostic
 from inputdesign_cli.specification.yaml.nodes import Document, Node, compose
 from inputdesign_cli.specification.yaml.places import Mark, Path, Places, format_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.scalars import clip, resolve
 
 _FORBIDDEN_IN_TEXT = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
@@ -25,7 +25,7 @@ class Tree:
     `diagnostics` are those that did not stop the reading; `broken` are the paths where something is lost.
     """
 
-    data: Any
+    data: Plain
     places: Places
     diagnostics: list[Diagnostic] = field(default_factory=list)
     broken: set[Path] = field(default_factory=set)
@@ -64,7 +64,7 @@ class _Expansion:
     source: int
     tree: Tree
 
-    def expand(self, node: Node, path: Path, key: Mark | None) -> Any:
+    def expand(self, node: Node, path: Path, key: Mark | None) -> Plain:
         """The plain data of the node at `path`; `key` marks the key in front of it, if there is one."""
         mark = self._mark(node)
         if node.kind == "alias":
@@ -81,7 +81,7 @@ class _Expansion:
             return [self.expand(item, (*path, i), None) for i, item in enumerate(node.value)]
         return self._mapping(node, path)
 
-    def _scalar(self, node: Node, path: Path, mark: Mark) -> Any:
+    def _scalar(self, node: Node, path: Path, mark: Mark) -> Plain:
         if node.plain:
             return resolve(node.value)
         if bad := _FORBIDDEN_IN_TEXT.search(node.value):
@@ -91,8 +91,8 @@ class _Expansion:
             return ""
         return node.value
 
-    def _mapping(self, node: Node, path: Path) -> dict[str, Any]:
-        data: dict[str, Any] = {}
+    def _mapping(self, node: Node, path: Path) -> dict[str, Plain]:
+        data: dict[str, Plain] = {}
         first: dict[str, int] = {}
         for key, value in zip(node.value[::2], node.value[1::2], strict=True):
             mark = self._mark(key)

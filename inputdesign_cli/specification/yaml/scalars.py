@@ -35,10 +35,10 @@ def resolve(word: str) -> Scalar:
     if _LEADING_ZERO.fullmatch(word) or not NUMBER.fullmatch(word):
         return word
     if _INTEGER.fullmatch(word):
-        if len(word) > LARGEST_DIGITS + 1 or math.isinf(_as_float(word)):
+        if len(word) > LARGEST_DIGITS + 1 or math.isinf(float(word)):
             return word
         return int(word)
-    value = _as_float(word)
+    value = float(word)
     return word if math.isinf(value) or _vanished(word, value) else value
 
 
@@ -56,7 +56,7 @@ def why_not_number(word: str) -> tuple[str, str, str]:
             f"some programs read {quoted} as an octal number; write {plain}",
         )
     if NUMBER.fullmatch(text):
-        value = _as_float(text)
+        value = float(text)
         if math.isinf(value):
             return "not-finite", f"is too large: {quoted}", "numbers must stay below 1.8e308"
         if _vanished(text, value):
@@ -91,10 +91,6 @@ def _number_hint(text: str) -> str:
     if match := re.match(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*[A-Za-z/]+$", text):
         return f"write the number without a unit: {match.group(1)}"
     return ""
-
-
-def _as_float(word: str) -> float:
-    return float(word)
 
 
 def _vanished(word: str, value: float) -> bool:

@@ -2,53 +2,47 @@
 
 from __future__ import annotations
 
+import re
+
 import yaml
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 
-# What PyYAML says (its C and its Python parser word it differently), what it means, what to do.
-_MEANINGS: tuple[tuple[tuple[str, ...], str, str], ...] = (
-    (("',' or ']'",), "a list is not closed, or a comma is missing", 'close it with "]"'),
-    (("',' or '}'",), "a mapping is not closed, or a comma is missing", 'close it with "}"'),
+# What PyYAML says (a pattern: its C and its Python parser word it differently), what it means, what to do.
+_MEANINGS = (
+    ("',' or ']'", "a list is not closed, or a comma is missing", 'close it with "]"'),
+    ("',' or '}'", "a mapping is not closed, or a comma is missing", 'close it with "}"'),
     (
-        ("mapping values are not allowed",),
+        "mapping values are not allowed",
         "a colon stands where no key can begin",
         "start the key on its own line, at the indentation of its neighbours; put a text that contains "
         '": " in quotes',
     ),
+    ("could not (find|found) expected ':'", "a key is not followed by a colon", 'write "key: value"'),
     (
-        ("could not find expected ':'", "could not found expected ':'"),
-        "a key is not followed by a colon",
-        'write "key: value"',
-    ),
-    (
-        ("did not find expected key", "expected <block end>", "did not find expected '-' indicator"),
+        "did not find expected key|expected <block end>|did not find expected '-' indicator",
         "this line does not fit the indentation of the lines above",
         "keys of one mapping begin in the same column; so do the dashes of one list",
     ),
+    ("unexpected end of stream", "a quotation mark is not closed", "close it on the same line"),
+    ("undefined alias", "this alias (*name) refers to no anchor (&name) above it", "write the value out"),
     (
-        ("unexpected end of stream",),
-        "a quotation mark is not closed",
-        "close it on the same line",
-    ),
-    (("undefined alias",), "this alias (*name) refers to no anchor (&name) above it", "write the value out"),
-    (
-        ("undefined tag handle",),
+        "undefined tag handle",
         "tags (!name) are not used in a spec",
         'remove the tag; put a text that begins with "!" in quotes',
     ),
     (
-        ("unknown escape character",),
+        "unknown escape character",
         "this backslash is not a known escape",
         "use single quotes, or double the \\",
     ),
     (
-        ("expected the node content", "did not find expected node content"),
+        "expected the node content|did not find expected node content",
         "a value is missing or begins with a character that YAML reserves",
         "write a value; put a text that begins with a special character in quotes",
     ),
     (
-        ("expected <document start>",),
+        "expected <document start>",
         "the text goes on after the end of the spec",
         "a spec is one mapping of keys; check the indentation of this line",
     ),
@@ -80,11 +74,8 @@ def _meaning(error: yaml.YAMLError, character: str) -> tuple[str, str]:
     if "cannot start any token" in problem or character == "\t":
         if character == "\t":
             return "a tab is used where YAML wants spaces", "indent with spaces"
-        return (
-            f'a value cannot begin with "{character}"',
-            "put the text in quotes",
-        )
-    for words, message, hint in _MEANINGS:
-        if any(word in problem for word in words):
+        return f'a value cannot begin with "{character}"', "put the text in quotes"
+    for pattern, message, hint in _MEANINGS:
+        if re.search(pattern, problem):
             return message, hint
     return "this is not valid YAML", "compare with an example spec (`idesign init` writes one)"

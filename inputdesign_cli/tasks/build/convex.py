@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from inputdesign_cli.design.convex.designs import Question
 from inputdesign_cli.design.convex.problem import Goal
-from inputdesign_cli.specification import PolynomialSpectrum, Spec
-from inputdesign_cli.specification.models.spectrum import FirSpectrum, WhiteSpectrum
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
@@ -141,7 +140,7 @@ def _grid_method(spec: Spec) -> GridMethod | None:
         and spec.accuracy.requirements == ("model_error",)
         and error is not None
         and error.region == "first_order"
-        and (spec.spectrum is None or isinstance(spec.spectrum, FirSpectrum | WhiteSpectrum))
+        and (spec.spectrum is None or spec.spectrum.type in ("fir", "white"))
         and spec.plant.inputs == spec.plant.outputs == 1
         and spec.plant.sampled
         and not limited
@@ -160,7 +159,7 @@ def _grid_method(spec: Spec) -> GridMethod | None:
 def _few_columns(spec: Spec, basis: Basis) -> FewColumns | None:
     """`factor_columns`: a factor of few columns is for criteria under upper power limits."""
     spectrum = spec.spectrum
-    if not isinstance(spectrum, PolynomialSpectrum) or spectrum.factor_columns is None:
+    if spectrum is None or spectrum.type != "polynomial" or spectrum.factor_columns is None:
         return None
     plain = spec.accuracy.criterion is not None and not spec.accuracy.requirements
     floors = any(not limit.upper for limit in build_power_limits(spec))

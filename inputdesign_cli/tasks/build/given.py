@@ -17,7 +17,6 @@ from inputdesign_cli.specification.models.spectrum import (
     GivenTable,
     GivenWhite,
 )
-from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
 from inputdesign_cli.tasks.build.header import build_header, build_units
@@ -50,7 +49,7 @@ def build_given(spec: Spec) -> GivenTask:
     Raises:
         SpecError, DataError: `nothing-given` when there is no excitation; see the builders of the parts.
     """
-    if not isinstance(spec.spectrum, GivenSpectrum):
+    if spec.spectrum is None or spec.spectrum.type != "given":
         raise spec.complain(
             "nothing-given",
             "there is no excitation to analyse",
@@ -94,9 +93,8 @@ def _check_signal_is_open(spec: Spec, stated: GivenSpectrum) -> None:
     Raises:
         SpecError: `not-supported`.
     """
-    fixed = isinstance(stated.given, GivenSignal) or (
-        isinstance(stated.given, GivenMultisine) and spec.plant.inputs > 1
-    )
+    kind = stated.given.type
+    fixed = kind == "signal" or (kind == "multisine" and spec.plant.inputs > 1)
     for name in spec.signal.stated(*_MADE) if fixed else ():
         if (name, spec.signal.type) == ("type", "multisine") or (name, spec.signal.phases) == (
             "phases",
@@ -157,8 +155,7 @@ def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
     frequencies = np.array(given.frequencies) * build_units(spec).frequency
     if spec.plant.sampled:
         frequencies = np.minimum(frequencies, np.pi)
-    rows = given.amplitudes if depth(given.amplitudes) == 2 else (given.amplitudes,)
-    amplitudes = np.array(rows, dtype=float).T
+    amplitudes = np.array(given.rows, dtype=float).T
     there = np.any(amplitudes != 0.0, axis=1)
     if not there.any():
         raise spec.complain(

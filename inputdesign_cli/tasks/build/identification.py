@@ -9,7 +9,7 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.specification import RegressionPlant, Spec, parse_spec
+from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
@@ -25,7 +25,7 @@ def build_identification(spec: Spec) -> Identification:
     Raises:
         SpecError: the plant has no such model.
     """
-    if isinstance(spec.plant, RegressionPlant):
+    if spec.plant.kind == "regression":
         raise bad_spec(
             "not-supported",
             "a regression is no model of a plant that could be estimated from u and y",

@@ -12,7 +12,7 @@ from inputdesign_cli.information import POWER_KINDS, Experiment
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.limits import Curve, TableFile
+from inputdesign_cli.specification.models.limits import Curve
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.tables import read_columns
 from inputdesign_cli.tasks.build.weights import build_weight
@@ -93,7 +93,7 @@ def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array]
     if isinstance(curve, float | int):
         constant = float(curve)
         return lambda w: np.full(np.shape(w), constant), nowhere, smooth
-    if isinstance(curve, TableFile):
+    if curve.kind == "table":
         frequency, value = _table(spec, curve.table, key)
         return lambda w: np.interp(w, frequency, value), frequency, smooth
     W = build_weight(spec, curve, key)

@@ -22,22 +22,13 @@ from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix, hold_entries, zero_order_hold
 from inputdesign_cli.specification import (
     ClosedLoopError,
-    ContinuousMatrixTransfer,
-    ContinuousPlant,
-    ContinuousTransfer,
-    DiscreteMatrix,
-    DiscreteTransfer,
-    FreeSpectrum,
     Noise,
-    PointwiseSpectrum,
-    PolynomialPlant,
-    RegressionPlant,
     Simulation,
     SimulationNoise,
     Spec,
-    TrueParameters,
 )
-from inputdesign_cli.specification.models.experiment import covariance_of
+from inputdesign_cli.specification.models.plant import TruePlant
+from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.refusals import refuse, stated
 from inputdesign_cli.tasks.build.system import polynomial_model, rows_of
@@ -82,7 +73,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         trial = _trial(spec, problem)
     except SpecError as found:
         refusal = found
-    cost = spec.cost
+    cost, spectrum = spec.cost, spec.spectrum
     terms = LoopErrorTerms(
         header=build_header(spec),
         law=name,
@@ -94,14 +85,14 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
             "output": np.asarray(cost.output_power),
             "excitation": np.asarray(cost.excitation_power),
         },
-        grid=spec.spectrum.grid if isinstance(spec.spectrum, PointwiseSpectrum) else _GRID,
+        grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
     return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), trial, refusal)
 
 
 def _plant(
     spec: Spec,
-    plant: PolynomialPlant | ContinuousPlant | RegressionPlant | TrueParameters,
+    plant: TruePlant,
     noise: Noise | SimulationNoise,
     key: str,
 ) -> MatrixPlant:
@@ -113,10 +104,10 @@ def _plant(
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
-    if isinstance(plant, PolynomialPlant):
-        covariance = covariance_of(noise.variance, plant.outputs)
+    if plant.kind == "polynomial":
+        covariance = noise.covariance(plant.outputs)
         return MatrixPlant.of(polynomial_model(plant, noise, covariance))
-    if not isinstance(plant, ContinuousPlant) or not plant.sampled:
+    if plant.kind != "continuous" or not plant.sampled:
         raise bad_spec(
             "not-supported",
             "this version designs for the closed-loop error of sampled plants only",
@@ -131,7 +122,7 @@ def _plant(
         F=tuple(tuple(entry.denominator_polynomial for entry in row) for row in held),
         C=rows_of(noise.C),
         D=rows_of(noise.D),
-        covariance=covariance_of(noise.variance, plant.outputs),
+        covariance=noise.covariance(plant.outputs),
     )
     return MatrixPlant.of(sampled)
 
@@ -147,9 +138,9 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, C
         return "internal_model", InternalModel.build(plant, _transfer(spec, control.internal_model))
     target = control.model_reference
     assert target is not None
-    if isinstance(target, DiscreteMatrix):
+    if target.kind == "discrete_matrix":
         T = TransferMatrix.build(target.numerator_matrix, target.denominator_matrix)
-    elif isinstance(target, ContinuousMatrixTransfer):
+    elif target.kind == "continuous_matrix":
         inside = target.continuous
         held = hold_entries(inside.numerator_matrix, inside.denominator_matrix, spec.sample_time)
         above = [[entry.numerator for entry in row] for row in held]
@@ -159,9 +150,9 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, C
     return "model_reference", ModelReference(T)
 
 
-def _transfer(spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer) -> Rational:
+def _transfer(spec: Spec, transfer: Transfer) -> Rational:
     """A transfer function of the spec, sampled by a zero-order hold where it is given in s."""
-    if isinstance(transfer, ContinuousTransfer):
+    if transfer.kind == "continuous":
         ratio = transfer.continuous
         return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, spec.sample_time)
     return Rational.build(transfer.numerator, transfer.denominator_factors)
@@ -264,7 +255,7 @@ def _check_supported(spec: Spec) -> None:
             )
             raise _refuse(f"limits.{name}", what=what, hint=hint)
     spectrum, signal = spec.spectrum, spec.signal
-    if spectrum is not None and not isinstance(spectrum, PointwiseSpectrum | FreeSpectrum):
+    if spectrum is not None and spectrum.type not in ("pointwise", "free"):
         kind = spectrum.phrase.replace(":", "")
         what = f"design spectra of {kind} for closed_loop_error"
         raise _refuse("spectrum", what=what, hint="use type: pointwise, which is best at every frequency")

@@ -9,8 +9,7 @@ import numpy as np
 from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender
-from inputdesign_cli.specification import MomentsSpectrum, Noise, SimulationNoise, Spec, TrueParameters
-from inputdesign_cli.specification.models.plant import RegressionPlant
+from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.refusals import refuse, stated
 from inputdesign_cli.tasks.regression import KEY, RegressionTask, RegressionTrial, TrueNoise
@@ -36,7 +35,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         SpecError: the spec asks for what a regression design does not do.
     """
     error, plant = spec.accuracy.mean_squared_error, spec.plant
-    assert isinstance(plant, RegressionPlant)
+    assert plant.kind == "regression"
     if error is None:
         raise bad_spec(
             "missing-key",
@@ -61,7 +60,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
             neglected_norm=error.neglected_norm,
             variance=float(spec.noise.covariance(1)[0, 0]),
         ),
-        toeplitz=isinstance(spectrum, MomentsSpectrum) and spectrum.structure == "toeplitz",
+        toeplitz=spectrum is not None and spectrum.type == "moments" and spectrum.structure == "toeplitz",
         samples=spec.experiment.samples,
         target=error.target,
         energy=spec.limits.energy if error.target is None else None,
@@ -85,7 +84,8 @@ def build_regression_task(spec: Spec) -> RegressionTask:
 
 def _trial(spec: Spec) -> RegressionTrial:
     simulation = spec.simulation
-    if simulation is None or not isinstance(simulation.plant, TrueParameters):
+    true = None if simulation is None else simulation.plant
+    if simulation is None or true is None or true.kind != "parameters":
         raise bad_spec(
             "missing-key",
             "a regression is simulated with its true parameters, and there are none",
@@ -110,7 +110,7 @@ def _trial(spec: Spec) -> RegressionTrial:
             variance=None if variance is None else float(np.ravel(np.asarray(variance, dtype=float))[0]),
             relative_std=simulation.noise.relative_std,
         )
-    theta = np.array(simulation.plant.parameters, dtype=float)
+    theta = np.array(true.parameters, dtype=float)
     return RegressionTrial(theta, simulation.runs, simulation.seed, tuple(contenders), noise)
 
 

@@ -9,8 +9,6 @@ from inputdesign_cli.runs.results import Table
 from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.plant import PolynomialPlant
-from inputdesign_cli.specification.models.spectrum import GivenSignal, GivenSpectrum, PolynomialSpectrum
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
@@ -118,7 +116,7 @@ def deviations(spec: Spec, table: Table) -> Array:
     """(n, r): the samples of signal.csv from their operating points; a record that was given as it is."""
     columns = build_units(spec).excitations
     values = np.stack([np.asarray(table.columns[name]) for name in columns], axis=1)
-    given = isinstance(spec.spectrum, GivenSpectrum) and isinstance(spec.spectrum.given, GivenSignal)
+    given = spec.given is not None and spec.given.type == "signal"
     return values if given else values - _operating_points(spec)
 
 
@@ -136,8 +134,9 @@ def _method(spec: Spec) -> Method:
         return "multisine"
     if signal.bits is not None:
         return "prbs"
-    single = isinstance(spec.plant, PolynomialPlant) and spec.plant.inputs == spec.plant.outputs == 1
-    banded = isinstance(spec.spectrum, PolynomialSpectrum) and not spec.closed_loop
+    plant, spectrum = spec.plant, spec.spectrum
+    single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
+    banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
     return "filtered_noise" if single and not banded else "multisine"
 
 

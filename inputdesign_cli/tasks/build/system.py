@@ -20,7 +20,6 @@ from inputdesign_cli.plant import (
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.controller import ControllerMatrix
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
 from inputdesign_cli.specification.models.spectrum import (
@@ -30,7 +29,7 @@ from inputdesign_cli.specification.models.spectrum import (
     MultisineSpectrum,
     PolynomialSpectrum,
 )
-from inputdesign_cli.specification.models.transfer import DiscreteTransfer
+from inputdesign_cli.specification.models.transfer import DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.tables import read_columns
@@ -100,14 +99,14 @@ def build_experiment(spec: Spec) -> Experiment:
     return replace(experiment, prior=_prior(spec, experiment))
 
 
-def build_loop(model: Model, controller: DiscreteTransfer | ControllerMatrix) -> Loop:
+def build_loop(model: Model, controller: DiscreteTransfer | DiscreteMatrix) -> Loop:
     """The loop of a model that is sampled; a single transfer function is a controller of one entry.
 
     Raises:
         SpecError: the loop is unstable or algebraic.
     """
     match controller:
-        case ControllerMatrix():
+        case DiscreteMatrix():
             C = TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
         case _:
             C = TransferMatrix.diagonal(rational(controller), 1)

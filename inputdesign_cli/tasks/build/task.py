@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.specification import RegressionPlant, Spec
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
@@ -18,7 +18,7 @@ def build_task(spec: Spec) -> Task:
     """
     if not spec.designs:
         return build_given(spec)
-    if isinstance(spec.plant, RegressionPlant):
+    if spec.plant.kind == "regression":
         return build_regression_task(spec)
     if spec.accuracy.closed_loop_error is not None:
         return build_loop_error_task(spec)

@@ -27,7 +27,7 @@ def build_true_system(spec: Spec) -> TrueSystem | None:
     if study.noise is not None:
         stated = study.noise
         noise = Noise.model_construct(C=stated.C, D=stated.D, variance=stated.variance or 1.0)
-    if isinstance(plant, ContinuousPlant) and (isinstance(spec.plant, PolynomialPlant) or noise.filters):
+    if plant.kind == "continuous" and (spec.plant.kind == "polynomial" or noise.filters):
         plant = _polynomials(plant, spec.sample_time)
     model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
     controller = spec.experiment.controller
