@@ -1,7 +1,7 @@
 """Optimal experiments for system identification.
 
     from inputdesign_cli import load_spec, solve
-    outcome = solve(load_spec("specs/first_order.yaml", ["spectrum.order=10"]))
+    results = solve(load_spec("specs/first_order.yaml", ["spectrum.order=10"]))
 
 The verbs are resolved at first use, so that importing the package costs nothing.
 """
