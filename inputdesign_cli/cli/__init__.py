@@ -51,20 +51,7 @@ def _start(
     pass
 
 
-COMMANDS = (
-    solve,
-    analyse,
-    simulate,
-    identify,
-    assess,
-    sweep,
-    report,
-    validate,
-    check,
-    init,
-    explain,
-    schema,
-)
+COMMANDS = (solve, analyse, simulate, identify, assess, sweep, report, validate, check, init, explain, schema)
 for command in COMMANDS:
     app.command()(guarded(command))
 

@@ -16,8 +16,7 @@ from inputdesign_cli.errors import EXIT_MISSED
 def identify(
     data: DataFile,
     spec: Annotated[
-        Path,
-        typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure."),
+        Path, typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure.")
     ],
     overrides: Overrides = None,
     output: Output = None,

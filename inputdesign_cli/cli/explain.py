@@ -14,9 +14,7 @@ def explain(
     code: Annotated[
         str | None,
         typer.Argument(
-            metavar="[CODE]",
-            help="The code of an error; without it, all codes.",
-            autocompletion=error_codes,
+            metavar="[CODE]", help="The code of an error; without it, all codes.", autocompletion=error_codes
         ),
     ] = None,
 ) -> None:

@@ -71,9 +71,7 @@ class Cluster:
         except ImportError:
             raise DataError(
                 Diagnostic(
-                    "cluster-extra",
-                    "Dask is not installed",
-                    hint="pip install 'inputdesign-cli[cluster]'",
+                    "cluster-extra", "Dask is not installed", hint="pip install 'inputdesign-cli[cluster]'"
                 )
             ) from None
         # Its diagnostics about lost connections are no news: what they lead to is an error of ours.
