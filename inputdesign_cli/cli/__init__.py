@@ -13,10 +13,9 @@ from inputdesign_cli import __version__
 from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.data import assess, identify
 from inputdesign_cli.cli.designs import analyse, simulate, solve
-from inputdesign_cli.cli.explain import explain
 from inputdesign_cli.cli.init import init
+from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
-from inputdesign_cli.cli.schema import schema
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate

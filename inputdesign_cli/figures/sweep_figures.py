@@ -74,15 +74,9 @@ def _usable(values: Array | None) -> bool:
     return values is not None and int(np.isfinite(values).sum()) > 1
 
 
-def _kind(table: SweepTable) -> str:
-    """The objective that all points have in common, or nothing."""
-    kinds = {kind for kind in table.columns.get("objective.kind", []) if kind}
-    return kinds.pop() if len(kinds) == 1 else ""
-
-
 def _label(table: SweepTable, quantity: str) -> str:
-    kind = _kind(table)
-    return OBJECTIVES[kind].axis if quantity == "objective.value" and kind in OBJECTIVES else quantity
+    named = quantity == "objective.value" and table.kind in OBJECTIVES
+    return OBJECTIVES[table.kind].axis if named else quantity
 
 
 def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, page: Figure) -> None:
@@ -107,14 +101,14 @@ def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | Non
         side = "ceiling" if _maximised(table) else "floor"
         label = f"{side}: {whatever}"
         handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
-    white = table.numbers(f"baseline.white.{objective(_kind(table)).white}")
+    white = table.numbers(f"baseline.white.{objective(table.kind).white}")
     if quantity == "objective.value" and not across and white is not None:
         handles += curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
         shown.append(white)
     mark_failures(axes, x[~np.isfinite(y)])
     values = np.concatenate([part[np.isfinite(part)] for part in shown])
     low, high = float(values.min()), float(values.max())
-    if low > 0 and high > LOG_FROM * low and _kind(table) != "D":
+    if low > 0 and high > LOG_FROM * low and table.kind != "D":
         axes.set_yscale("log")
         plain_numbers(axes.yaxis, high / low)
     elif _maximised(table):

@@ -172,13 +172,13 @@ SPECS = Path(__file__).parents[2] / "specs"
             "first_order",
             ["objective=best_accuracy", "limits={input_power: 1}", "spectrum={type: white}"],
             solve,
-            ["Asked: the smallest multiple of what is admitted", "can be kept to 1.30595 times"],
+            ["Asked: the smallest multiple of the admissible error", "can be kept to 1.30595 times"],
         ),
         (
             "criterion",
             ["spectrum.order=2"],
             solve,
-            ["Asked: the experiment that teaches most", "log det M ="],
+            ["Asked: the most information within the limits", "log det M ="],
         ),
         (
             "first_order_given",
