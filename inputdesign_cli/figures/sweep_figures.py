@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -156,8 +157,8 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     bar = page.colorbar(image, label=_label(table, quantity))
     if wide:
         plain_numbers(bar.ax.yaxis, high / low)
-    _ticks(axes, columns, "x")
-    _ticks(axes, rows, "y")
+    _ticks(axes.xaxis, columns)
+    _ticks(axes.yaxis, rows)
     axes.set_xlabel(key_label(along))
     axes.set_ylabel(key_label(down))
     if cells.size <= MOST_LABELLED and len(columns) <= 12:
@@ -177,14 +178,9 @@ def _ordered(texts: list[str]) -> list[str]:
     return sorted(set(texts), key=float)
 
 
-def _ticks(axes: Axes, texts: list[str], which: str) -> None:
+def _ticks(axis: Axis, texts: list[str]) -> None:
     step = -(-len(texts) // 20)
-    places = np.arange(len(texts))[::step] + 0.5
-    labels = texts[::step]
-    if which == "x":
-        axes.set_xticks(places, labels)
-    else:
-        axes.set_yticks(places, labels)
+    axis.set_ticks((np.arange(len(texts))[::step] + 0.5).tolist(), texts[::step])
 
 
 def _short(key: str | None) -> str:
