@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from inputdesign_cli import __version__
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.version import __version__
 
 PAGE = "report.html"
 
