@@ -1,4 +1,4 @@
-"""The command line: one thin file a command, and the only room that prints.
+"""The command line: thin files that hold a command or its kind, and the only room that prints.
 
 Nothing heavy is imported here or at the top of a command's file: `idesign --help` answers at once.
 """
@@ -9,16 +9,12 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.analyse import analyse
-from inputdesign_cli.cli.assess import assess
 from inputdesign_cli.cli.check import check
-from inputdesign_cli.cli.explain import explain
-from inputdesign_cli.cli.identify import identify
+from inputdesign_cli.cli.data import assess, identify
+from inputdesign_cli.cli.designs import analyse, simulate, solve
 from inputdesign_cli.cli.init import init
+from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
-from inputdesign_cli.cli.schema import schema
-from inputdesign_cli.cli.simulate import simulate
-from inputdesign_cli.cli.solve import solve
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
@@ -54,20 +50,7 @@ def _start(
     pass
 
 
-COMMANDS = (
-    solve,
-    analyse,
-    simulate,
-    identify,
-    assess,
-    sweep,
-    report,
-    validate,
-    check,
-    init,
-    explain,
-    schema,
-)
+COMMANDS = (solve, analyse, simulate, identify, assess, sweep, report, validate, check, init, explain, schema)
 for command in COMMANDS:
     app.command()(guarded(command))
 

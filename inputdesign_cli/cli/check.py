@@ -65,13 +65,9 @@ def check(
 def _default_files() -> list[Path]:
     found = sorted(Path("golden").glob("*.yaml"))
     if not found:
-        raise DataError(
-            Diagnostic(
-                "golden-missing",
-                "there is no golden/*.yaml in the current folder, and idesign installs none",
-                hint="name golden files, or run this in a checkout of the project",
-            )
-        )
+        message = "there is no golden/*.yaml in the current folder, and idesign installs none"
+        hint = "name golden files, or run this in a checkout of the project"
+        raise DataError(Diagnostic("golden-missing", message, hint))
     return found
 
 

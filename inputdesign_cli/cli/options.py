@@ -11,8 +11,7 @@ from inputdesign_cli.cli.completion import spec_keys
 
 SpecFile = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
 DataFile = Annotated[
-    Path,
-    typer.Argument(metavar="DATA", help="The record of an experiment: a CSV file with columns u and y."),
+    Path, typer.Argument(metavar="DATA", help="The record of an experiment: a CSV file with columns u and y.")
 ]
 Means = Annotated[
     bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")

@@ -1,4 +1,4 @@
-"""What commands that make a run have in common: spec in, run directory and summary out."""
+"""What commands that make a run end with: a run directory and a summary."""
 
 from __future__ import annotations
 
@@ -10,34 +10,14 @@ import typer
 from inputdesign_cli.cli.terminal import status
 
 if TYPE_CHECKING:
-    from inputdesign_cli.compute.executor import Executor
     from inputdesign_cli.runs.results import Results
-    from inputdesign_cli.sweep.verbs import Verb
 
 
-def produce(
-    verb: Verb,
-    spec_file: Path,
-    overrides: list[str] | None,
-    output: Path | None,
-    *,
-    figures: bool,
-    json_output: bool,
-    quiet: bool,
-    executor: Executor | None = None,
+def keep(
+    results: Results, output: Path | None, name: str, *, figures: bool, json_output: bool, quiet: bool
 ) -> None:
-    """Run a verb on a spec file, write the run, and print it or its summary."""
-    with status(f"{spec_file}: computing ...", quiet=quiet):
-        from inputdesign_cli.specification import load_spec
-        from inputdesign_cli.sweep.verbs import run_verb
-
-        results = run_verb(verb, load_spec(spec_file, overrides or []), executor)
-    directory = output or Path("runs") / spec_file.stem
-    keep(results, directory, figures=figures, json_output=json_output, quiet=quiet)
-
-
-def keep(results: Results, directory: Path, *, figures: bool, json_output: bool, quiet: bool) -> None:
-    """Write a run, with or without its figures, and print its result or its summary."""
+    """Write a run to `output` or else to runs/`name`, and print its result or its summary."""
+    directory = output or Path("runs") / name
     with status(f"{directory}: writing ...", quiet=quiet):
         from inputdesign_cli.runs.run_directory import write_run
 

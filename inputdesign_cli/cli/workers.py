@@ -11,15 +11,12 @@ if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
 
 Jobs = Annotated[
-    int,
-    typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core."),
+    int, typer.Option("--jobs", "-j", metavar="N", min=0, help="Processes to compute with; 0: one per core.")
 ]
 ClusterAddress = Annotated[
     str | None,
     typer.Option(
-        "--cluster",
-        metavar="ADDRESS",
-        help="Compute on the Dask cluster at this address (tcp://HOST:PORT).",
+        "--cluster", metavar="ADDRESS", help="Compute on the Dask cluster at this address (tcp://HOST:PORT)."
     ),
 ]
 

@@ -71,9 +71,7 @@ class Cluster:
         except ImportError:
             raise DataError(
                 Diagnostic(
-                    "cluster-extra",
-                    "Dask is not installed",
-                    hint="pip install 'inputdesign-cli[cluster]'",
+                    "cluster-extra", "Dask is not installed", hint="pip install 'inputdesign-cli[cluster]'"
                 )
             ) from None
         # Its diagnostics about lost connections are no news: what they lead to is an error of ours.
@@ -95,13 +93,9 @@ class Cluster:
         for worker, version in client.run(_version, on_error="return").items():
             if version != __version__:
                 found = version if isinstance(version, str) else "no inputdesign-cli that can be imported"
-                raise DataError(
-                    Diagnostic(
-                        "cluster-version",
-                        f"the worker {worker} has {found}, and this is {__version__}",
-                        hint="install the same version everywhere, so that every point is computed alike",
-                    )
-                )
+                message = f"the worker {worker} has {found}, and this is {__version__}"
+                hint = "install the same version everywhere, so that every point is computed alike"
+                raise DataError(Diagnostic("cluster-version", message, hint))
 
 
 def _version() -> str:
@@ -129,10 +123,6 @@ def _reaching(address: str) -> Iterator[None]:
 
 
 def _unreachable(address: str, why: str) -> DataError:
-    return DataError(
-        Diagnostic(
-            "cluster-unreachable",
-            f"there is no Dask cluster to compute on at {address}{f': {why}' if why else ''}",
-            hint="start one (`dask scheduler`, `dask worker ADDRESS --nthreads 1`) or leave out --cluster",
-        )
-    )
+    message = f"there is no Dask cluster to compute on at {address}{f': {why}' if why else ''}"
+    hint = "start one (`dask scheduler`, `dask worker ADDRESS --nthreads 1`) or leave out --cluster"
+    return DataError(Diagnostic("cluster-unreachable", message, hint))

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, marked
 from inputdesign_cli.runs.results import Array, BoundCurves, BoundPanel
 
 
@@ -34,30 +34,15 @@ def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
         white = _positive(curves.r_u_white)
         handles += axes.plot(w, white, color=GREY, linestyle=DOTTED, label="$r_u$, white")
     if curves.active.size:
-        handles += axes.plot(
-            curves.active,
-            np.exp(np.interp(curves.active, w, np.log(curves.r_u))),
-            linestyle="none",
-            marker="o",
-            markersize=6,
-            markerfacecolor="white",
-            markeredgecolor=BLUE,
-            markeredgewidth=1.4,
-            clip_on=False,
-            zorder=5,
-            label="active",
-        )
+        height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
+        handles += marked(axes, curves.active, height, color=BLUE, label="active")
     if curves.r_adm is not None:
-        _shade_above(axes, w, _positive(curves.r_adm))
+        low, high = axes.get_ylim()
+        axes.fill_between(w, _positive(curves.r_adm), high, color=ORANGE, alpha=0.07, linewidth=0)
+        axes.set_ylim(low, high)
     return handles
 
 
 def _positive(values: Array) -> Array:
     """`values` with gaps where a logarithmic axis has no place for them (an r_adm below zero, say)."""
     return np.where(values > 0, values, np.nan)
-
-
-def _shade_above(axes: Axes, w: Array, r_adm: Array) -> None:
-    low, high = axes.get_ylim()
-    axes.fill_between(w, r_adm, high, color=ORANGE, alpha=0.07, linewidth=0)
-    axes.set_ylim(low, high)

@@ -53,28 +53,15 @@ def _plot(axes: Axes, time: Array, panel: FitPanel, recorded: str, simulated: st
 def draw_residuals(page: Figure, curves: ResidualCurves, time_unit: str) -> None:
     """Correlations of the residuals with themselves and with past inputs; 99 % bands of a right model.
 
-    A row for every output; one output and one input have a row for each of the two correlations.
+    A row for every output, a column for every residual and every input.
     """
     _, p, r = curves.cross_correlation.shape
-    single = p == r == 1
-    if single:
-        grid = page.subplots(2, 1, squeeze=False).T
-    else:
-        grid = page.subplots(p, p + r, sharex=True, sharey=True, squeeze=False)
+    grid = page.subplots(p, p + r, sharex=True, sharey=True, squeeze=False)
     for i in range(p):
         for j in range(p):
             _stems(grid[i][j], curves.lags, curves.autocorrelation[:, i, j], curves.limit)
         for j in range(r):
             _stems(grid[i][p + j], curves.input_lags, curves.cross_correlation[:, i, j], curves.limit)
-    if single:
-        upper, lower = grid[0]
-        upper.set_ylabel("with themselves")
-        upper.set_title(f"correlations of the residuals; probability {curves.whiteness:.2g}", loc="left")
-        lower.set_ylabel("with past inputs")
-        lower.set_title(f"probability {curves.independence:.2g}", loc="left")
-        lower.set_xlabel("lag (samples)")
-        return
-    for i in range(p):
         grid[i][0].set_ylabel(f"residual {i + 1}")
     for j, name in enumerate([f"residual {j + 1}" for j in range(p)] + [f"u{j + 1}" for j in range(r)]):
         grid[0][j].set_title(f"with {name}", color=GREY)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, legend_over_all
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, legend_over_all, page_of_pairs
 from inputdesign_cli.runs.results import Array, Ellipse, EllipseCurves
 
 COLUMNS = 3
@@ -15,14 +15,10 @@ POINTS = 200
 
 def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
     """One panel a pair: the region that holds the estimate with the probability of the title."""
-    columns = min(COLUMNS, len(curves.pairs))
-    rows = -(-len(curves.pairs) // columns)
-    grid = page.subplots(rows, columns, squeeze=False)
-    for axes, pair in zip(grid.flat, curves.pairs, strict=False):
+    grid = page_of_pairs(page, len(curves.pairs), COLUMNS)
+    for axes, pair in zip(grid, curves.pairs, strict=True):
         _draw(axes, pair, curves.probability)
-    for axes in grid.flat[len(curves.pairs) :]:
-        axes.set_axis_off()
-    handles, _ = grid.flat[0].get_legend_handles_labels()
+    handles, _ = grid[0].get_legend_handles_labels()
     legend_over_all(page, handles)
 
 
@@ -35,7 +31,6 @@ def _draw(axes: Axes, pair: Ellipse, probability: float) -> None:
     axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
     axes.set_xlabel(pair.names[0])
     axes.set_ylabel(pair.names[1])
-    axes.locator_params(nbins=4)
     axes.tick_params(axis="x", labelrotation=30)  # the labels are wide for three columns
 
 

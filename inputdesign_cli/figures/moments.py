@@ -35,15 +35,11 @@ def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
     axes.set_xticks(range(n), [str(i + 1) for i in range(n)])
     axes.set_yticks(range(n), [str(i + 1) for i in range(n)])
     axes.set_title(f"R, trace {np.trace(R):.5g}; framed: estimated", loc="left")
-    axes.plot(
-        np.array([-0.5, m - 0.5, m - 0.5]), np.array([m - 0.5, m - 0.5, -0.5]), color=BLACK, linewidth=1.6
-    )
+    inner, edge = m - 0.5, -0.5
+    axes.plot(np.array([edge, inner, inner]), np.array([inner, inner, edge]), color=BLACK, linewidth=1.6)
     axes.set_xlim(-0.5, n - 0.5)
     axes.set_ylim(n - 0.5, -0.5)
     if n <= NUMBERED:
-        for i in range(n):
-            for j in range(n):
-                dark = abs(R[i, j]) > 0.6 * largest
-                axes.text(
-                    j, i, f"{R[i, j]:.3g}", ha="center", va="center", fontsize=8, color="w" if dark else BLACK
-                )
+        for (i, j), value in np.ndenumerate(R):
+            colour = "w" if abs(value) > 0.6 * largest else BLACK
+            axes.text(j, i, f"{value:.3g}", ha="center", va="center", fontsize=8, color=colour)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, BLUE, ORANGE, frequency_axis, legend_above
+from inputdesign_cli.figures.style import BLACK, BLUE, ORANGE, frequency_axis, legend_above, marked
 from inputdesign_cli.runs.results import OptimalityCurves
 
 
@@ -17,19 +17,8 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     )
     handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="optimal: nowhere above one")]
     if curves.support.size:
-        handles += axes.plot(
-            curves.support,
-            np.interp(curves.support, curves.frequency, curves.ratio),
-            linestyle="none",
-            marker="o",
-            markersize=6,
-            markerfacecolor="white",
-            markeredgecolor=ORANGE,
-            markeredgewidth=1.6,
-            clip_on=False,
-            zorder=5,
-            label="power of the optimum",
-        )
+        height = np.interp(curves.support, curves.frequency, curves.ratio)
+        handles += marked(axes, curves.support, height, color=ORANGE, label="power of the optimum")
     axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
     axes.set_ylabel("relative worth of excitation")
     frequency_axis(axes, curves.frequency, time_unit)

@@ -19,39 +19,24 @@ from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_spectrum
 from inputdesign_cli.figures.style import FileType, rendered
 from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands
-from inputdesign_cli.runs.results import (
-    BoundCurves,
-    CloudCurves,
-    Curves,
-    DirectionCurves,
-    EllipseCurves,
-    ErrorBandCurves,
-    ErrorCurves,
-    FitCurves,
-    LossCurves,
-    MomentsCurves,
-    OptimalityCurves,
-    ResidualCurves,
-    Results,
-    SignalCurves,
-    SpectrumCurves,
-)
+from inputdesign_cli.runs import results as of
+from inputdesign_cli.runs.results import Curves, Results
 
 # Each draws its curves on an empty page; the text is the unit of time.
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
-    BoundCurves: draw_bound,
-    CloudCurves: draw_cloud,
-    DirectionCurves: draw_directions,
-    EllipseCurves: draw_ellipses,
-    ErrorBandCurves: draw_error_bands,
-    ErrorCurves: draw_error,
-    FitCurves: draw_fit,
-    LossCurves: draw_loss,
-    MomentsCurves: draw_moments,
-    OptimalityCurves: draw_optimality,
-    ResidualCurves: draw_residuals,
-    SignalCurves: draw_signal,
-    SpectrumCurves: draw_spectrum,
+    of.BoundCurves: draw_bound,
+    of.CloudCurves: draw_cloud,
+    of.DirectionCurves: draw_directions,
+    of.EllipseCurves: draw_ellipses,
+    of.ErrorBandCurves: draw_error_bands,
+    of.ErrorCurves: draw_error,
+    of.FitCurves: draw_fit,
+    of.LossCurves: draw_loss,
+    of.MomentsCurves: draw_moments,
+    of.OptimalityCurves: draw_optimality,
+    of.ResidualCurves: draw_residuals,
+    of.SignalCurves: draw_signal,
+    of.SpectrumCurves: draw_spectrum,
 }
 
 

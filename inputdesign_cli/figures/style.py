@@ -11,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from inputdesign_cli.runs.results import Array
 
@@ -73,6 +74,24 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
     if positive.size > 1:
         axes.set_xlim(positive.min(), positive.max())
     axes.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+
+
+def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Line2D]:
+    """Rings around points of a curve."""
+    (rings,) = axes.plot(x, y, "o", markersize=6, clip_on=False, zorder=5, label=label)
+    rings.set(markerfacecolor="white", markeredgecolor=color, markeredgewidth=1.5)
+    return [rings]
+
+
+def page_of_pairs(page: Figure, pairs: int, columns: int) -> list[Axes]:
+    """Axes for so many pairs of parameters, row by row."""
+    columns = min(columns, pairs)
+    grid = list(page.subplots(-(-pairs // columns), columns, squeeze=False).flat)
+    for axes in grid[pairs:]:
+        axes.set_axis_off()
+    for axes in grid[:pairs]:
+        axes.locator_params(nbins=4)
+    return grid[:pairs]
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:

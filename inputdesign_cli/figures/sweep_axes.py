@@ -39,15 +39,8 @@ def curve(axes: Axes, x: Array, y: Array, **style: Any) -> list[Artist]:
 def mark_failures(axes: Axes, where: Array) -> None:
     """Crosses at the foot of the axes where a point has no result."""
     where = where[np.isfinite(where)]
-    axes.plot(
-        where,
-        np.full(where.size, 0.02),
-        linestyle="none",
-        marker="x",
-        color=ORANGE,
-        transform=axes.get_xaxis_transform(),
-        clip_on=False,
-    )
+    foot = np.full(where.size, 0.02)
+    axes.plot(where, foot, "x", color=ORANGE, transform=axes.get_xaxis_transform(), clip_on=False)
 
 
 def scale_key(axes: Axes, key: str, x: Array) -> None:

@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -74,15 +75,9 @@ def _usable(values: Array | None) -> bool:
     return values is not None and int(np.isfinite(values).sum()) > 1
 
 
-def _kind(table: SweepTable) -> str:
-    """The objective that all points have in common, or nothing."""
-    kinds = {kind for kind in table.columns.get("objective.kind", []) if kind}
-    return kinds.pop() if len(kinds) == 1 else ""
-
-
 def _label(table: SweepTable, quantity: str) -> str:
-    kind = _kind(table)
-    return OBJECTIVES[kind].axis if quantity == "objective.value" and kind in OBJECTIVES else quantity
+    named = quantity == "objective.value" and table.kind in OBJECTIVES
+    return OBJECTIVES[table.kind].axis if named else quantity
 
 
 def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, page: Figure) -> None:
@@ -107,14 +102,14 @@ def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | Non
         side = "ceiling" if _maximised(table) else "floor"
         label = f"{side}: {whatever}"
         handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
-    white = table.numbers(f"baseline.white.{objective(_kind(table)).white}")
+    white = table.numbers(f"baseline.white.{objective(table.kind).white}")
     if quantity == "objective.value" and not across and white is not None:
         handles += curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
         shown.append(white)
     mark_failures(axes, x[~np.isfinite(y)])
     values = np.concatenate([part[np.isfinite(part)] for part in shown])
     low, high = float(values.min()), float(values.max())
-    if low > 0 and high > LOG_FROM * low and _kind(table) != "D":
+    if low > 0 and high > LOG_FROM * low and table.kind != "D":
         axes.set_yscale("log")
         plain_numbers(axes.yaxis, high / low)
     elif _maximised(table):
@@ -162,8 +157,8 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     bar = page.colorbar(image, label=_label(table, quantity))
     if wide:
         plain_numbers(bar.ax.yaxis, high / low)
-    _ticks(axes, columns, "x")
-    _ticks(axes, rows, "y")
+    _ticks(axes.xaxis, columns)
+    _ticks(axes.yaxis, rows)
     axes.set_xlabel(key_label(along))
     axes.set_ylabel(key_label(down))
     if cells.size <= MOST_LABELLED and len(columns) <= 12:
@@ -183,14 +178,9 @@ def _ordered(texts: list[str]) -> list[str]:
     return sorted(set(texts), key=float)
 
 
-def _ticks(axes: Axes, texts: list[str], which: str) -> None:
+def _ticks(axis: Axis, texts: list[str]) -> None:
     step = -(-len(texts) // 20)
-    places = np.arange(len(texts))[::step] + 0.5
-    labels = texts[::step]
-    if which == "x":
-        axes.set_xticks(places, labels)
-    else:
-        axes.set_yticks(places, labels)
+    axis.set_ticks((np.arange(len(texts))[::step] + 0.5).tolist(), texts[::step])
 
 
 def _short(key: str | None) -> str:

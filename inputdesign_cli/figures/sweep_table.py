@@ -30,6 +30,12 @@ class SweepTable:
     def rows(self) -> int:
         return len(self.columns["status"])
 
+    @property
+    def kind(self) -> str:
+        """The objective that all points have in common, or nothing."""
+        kinds = {kind for kind in self.columns.get("objective.kind", []) if kind}
+        return kinds.pop() if len(kinds) == 1 else ""
+
     def numbers(self, name: str) -> Array | None:
         """A column as numbers (n,), NaN where it is empty; None if it is missing or holds text."""
         texts = self.columns.get(name)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from inputdesign_cli.figures.ellipses import boundary
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, ORANGE, legend_over_all
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, ORANGE, legend_over_all, page_of_pairs
 from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel
 
 COLUMNS = 2
@@ -20,10 +20,8 @@ COLUMNS = 2
 
 def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
     """One panel a pair of parameters: an estimate a dot, with the ellipse that theory predicts."""
-    columns = min(COLUMNS, len(curves.pairs))
-    rows = -(-len(curves.pairs) // columns)
-    grid = page.subplots(rows, columns, squeeze=False)
-    for axes, (i, j) in zip(grid.flat, curves.pairs, strict=False):
+    grid = page_of_pairs(page, len(curves.pairs), COLUMNS)
+    for axes, (i, j) in zip(grid, curves.pairs, strict=True):
         pair = np.array([i, j])
         axes.plot(*curves.theta[:, pair].T, ".", color=BLUE, markersize=2.5, alpha=0.5, rasterized=True)
         outline = boundary(curves.centre[pair], curves.covariance[np.ix_(pair, pair)], curves.probability)
@@ -31,9 +29,6 @@ def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
         axes.plot(*curves.centre[pair], "+", color=BLACK, markersize=9, markeredgewidth=1.6)
         axes.set_xlabel(curves.names[i])
         axes.set_ylabel(curves.names[j])
-        axes.locator_params(nbins=4)
-    for axes in grid.flat[len(curves.pairs) :]:
-        axes.set_axis_off()
     share = f"{100 * curves.probability:g} % ellipse of theory"
     handles = [
         Line2D([], [], color=BLUE, marker=".", linestyle="none", label=f"{len(curves.theta)} estimates"),

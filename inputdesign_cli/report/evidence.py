@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-from inputdesign_cli.report.numbers import Fact, Rows, shown, spoken
+from inputdesign_cli.report.numbers import BREAK, Fact, Rows, listed, shown, spoken
 from inputdesign_cli.runs.results import Result
 
 _SPREAD = "{:.4g} ± {:.2g}"
@@ -24,19 +24,21 @@ def estimate_facts(result: Result) -> Iterator[Fact]:
     """How well the estimate explains the data."""
     found = result.get("identification", {})
     if "variance" in found:
-        variance = found["variance"]
-        several = isinstance(variance, list)
-        value = "; ".join(" ".join(f"{v:.5g}" for v in row) for row in variance) if several else ""
-        yield f"noise {'covariance' if several else 'variance'}", value or shown(variance), ""
+        value = found["variance"]
+        if isinstance(value, list):
+            yield "noise", f"covariance [{'; '.join(listed(row) for row in value)}]", ""
+        else:
+            yield "noise", f"variance {value:.5g}", ""
     fit = found.get("fit_percent")
     if fit is not None:
         each = fit if isinstance(fit, list) else [fit]
-        text = ", ".join("-" if value is None else f"{value:.1f} %" for value in each)
-        yield "simulation explains", text, "of the variation of the outputs, by the input alone"
-    tests = (("whiteness", "residuals white"), ("independence", "residuals independent of past inputs"))
-    for key, name in tests:
-        if key in found:
-            yield name, f"probability {found[key]['probability']:.2g}", ""
+        text = " and ".join("-" if value is None else f"{value:.1f}" for value in each)
+        yield "fit", f"simulation explains {text} % of the output{'s' * isinstance(fit, list)}", ""
+    tests = [
+        f"{name} {found[name]['probability']:.2g}" for name in ("whiteness", "independence") if name in found
+    ]
+    if tests:
+        yield "residuals", f"probability of {', of '.join(tests)}", ""
 
 
 def estimate_answer(result: Result) -> str:
@@ -75,38 +77,23 @@ def requirement_table(result: Result, time_unit: str) -> Rows | None:
 def simulation_table(result: Result) -> Rows | None:
     """One row for each input that was tried; None without a simulation."""
     inputs = result.get("simulation", {}).get("inputs", {})
-    if any("loss" in entry for entry in inputs.values()):
-        rows = tuple(
-            (spoken(name), _mean(entry.get("loss")), _mean(entry.get("theory", {}).get("loss")))
-            for name, entry in inputs.items()
-        )
-        return Rows(("input", "loss", "theory"), rows)
-    if any("mse" in entry for entry in inputs.values()):
-        rows = tuple(
-            (
-                spoken(name),
-                _SPREAD.format(entry["mse"], entry.get("mse_standard_error", 0.0)),
-                shown(entry["theory"]["mse"]) if "theory" in entry else "",
-            )
-            for name, entry in inputs.items()
-        )
-        return Rows(("input", "mean squared error", "theory"), rows)
-    columns = {
-        "runs within r_adm": [_share(entry, "within_r_adm") for entry in inputs.values()],
-        "were the design model true": [
-            _share(entry.get("on_design_model", {}), "within_r_adm") for entry in inputs.values()
-        ],
-        "runs within r_u": [_share(entry, "within_r_u") for entry in inputs.values()],
-        "cost": [f"{entry['cost']:.5g}" if "cost" in entry else "" for entry in inputs.values()],
-        "not settled": [str(entry.get("not_converged", "")) for entry in inputs.values()],
+    columns: dict[str, Callable[[Result], str]] = {
+        "loss": lambda entry: _mean(entry.get("loss")),
+        "mean squared error": _squared_error,
+        "theory": lambda entry: _theory(entry.get("theory", {})),
+        "mean estimate": lambda entry: listed(entry.get("mean_estimate", [])) if "mse" in entry else "",
+        "within r_adm": lambda entry: _share(entry, "within_r_adm"),
+        "were the design model true": lambda entry: _share(entry.get("on_design_model", {}), "within_r_adm"),
+        "within r_u": lambda entry: _share(entry, "within_r_u"),
+        "cost": lambda entry: f"{entry['cost']:.5g}" if "cost" in entry else "",
+        "not settled": lambda entry: str(entry.get("not_converged") or ""),
     }
-    shown_columns = {name: cells for name, cells in columns.items() if any(cells)}
-    if not shown_columns:
+    cells = {name: [cell(entry) for entry in inputs.values()] for name, cell in columns.items()}
+    filled = {name: column for name, column in cells.items() if any(column)}
+    if not filled:
         return None
-    each = zip(*shown_columns.values(), strict=True)
-    return Rows(
-        ("input", *shown_columns), tuple((spoken(n), *cells) for n, cells in zip(inputs, each, strict=True))
-    )
+    each = zip(map(spoken, inputs), *filled.values(), strict=True)
+    return Rows(("input", *filled), tuple(each))
 
 
 def _named(entry: Result) -> str:
@@ -121,8 +108,16 @@ def _share(entry: Result, key: str) -> str:
     if key not in entry:
         return ""
     low, high = (100 * limit for limit in entry[f"{key}_limits"])
-    return f"{100 * entry[key]:.1f} %\n{low:.1f} to {high:.1f}"
+    return f"{100 * entry[key]:.1f} %{BREAK}95 % limits {low:.1f} to {high:.1f}"
 
 
 def _mean(entry: Result | None) -> str:
     return "" if entry is None else _SPREAD.format(entry["mean"], entry["sd"])
+
+
+def _squared_error(entry: Result) -> str:
+    return _SPREAD.format(entry["mse"], entry.get("mse_standard_error", 0.0)) if "mse" in entry else ""
+
+
+def _theory(entry: Result) -> str:
+    return shown(entry["mse"]) if "mse" in entry else _mean(entry.get("loss"))

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from inputdesign_cli.runs.results import Json
 
+BREAK = "\n"  # within a cell: what follows is a remark
 # A line of a table of facts: name, value, and a note that may be empty.
 Fact = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A table: the first column holds names, the others numbers, what follows a line break being a remark."""
+    """A table: the first column holds names, the others numbers."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -24,10 +25,9 @@ def shown(value: Json) -> str:
     return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
-def listed(values: Json, *, digits: int = 7) -> str:
-    """A number, or several with commas between them."""
-    each = values if isinstance(values, list) else [values]
-    return ", ".join(f"{value:.{digits}g}" if isinstance(value, float) else str(value) for value in each)
+def listed(values: Json) -> str:
+    """A number, or one for each channel, with four digits."""
+    return " ".join(f"{value:.4g}" for value in (values if isinstance(values, list | tuple) else [values]))
 
 
 def spoken(name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from inputdesign_cli.report.numbers import spoken
+from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.specification import PolynomialPlant, Spec, parse_spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
@@ -164,12 +165,11 @@ def _goal(spec: Spec, verb: str) -> str:
     among = f" among {family}" if family else ""
     if isinstance(stated, FirSpectrum | PolynomialSpectrum) and stated.order:
         among += f" of order {stated.order}"
-    if spec.goal == "best_accuracy":
-        return f"Asked: {_best(spec)}{among}."
-    if spec.goal == "shortest_experiment":
-        return f"Asked: the shortest experiment that does it{among}."
-    if spec.plant.kind == "regression":
+    if spec.plant.kind == "regression" and spec.goal == "least_cost":
         return f"Asked: the least energy that does it{among}; the energy is their trace."
+    asked = f"Asked: {objective(_objective(spec)).asked}{among}"
+    if spec.goal != "least_cost":
+        return f"{asked}."
     weights = {"input": spec.cost.input_power, "output": spec.cost.output_power}
     weights["excitation"] = spec.cost.excitation_power
     cost = " + ".join(
@@ -177,18 +177,16 @@ def _goal(spec: Spec, verb: str) -> str:
         for name, weight in weights.items()
         if isinstance(weight, int | float) and weight
     )
-    return f"Asked: the cheapest experiment that does it{among}; its cost is the {cost or 'weighted power'}."
+    return f"{asked}; its cost is the {cost or 'weighted power'}."
 
 
-def _best(spec: Spec) -> str:
-    accuracy = spec.accuracy
-    if accuracy.closed_loop_error is not None:
-        return "the experiment after which the loop errs least"
-    if accuracy.mean_squared_error is not None:
-        return "the least error"
-    if accuracy.criterion is not None:
-        return "the experiment that teaches most"
-    return "the smallest multiple of what is admitted that the limits allow"
+def _objective(spec: Spec) -> str:
+    """The `objective.kind` of the result."""
+    if spec.goal != "best_accuracy":
+        return spec.goal
+    errors = ("closed_loop_error", "mean_squared_error")
+    asked = (name for name, value in spec.accuracy if name in errors and value is not None)
+    return next(asked, spec.accuracy.criterion or "accuracy_factor")
 
 
 def _count(n: int, what: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError, Diagnostic, SpecError
@@ -14,7 +14,8 @@ from inputdesign_cli.report.evidence import (
     requirement_table,
     simulation_table,
 )
-from inputdesign_cli.report.numbers import Fact, listed, provenance, shown
+from inputdesign_cli.report.facts import facts, proofs, white
+from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.runs.objectives import objective
@@ -55,7 +56,8 @@ def run_page(run: Path) -> dict[str, Json]:
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
     sections = [(heading, [n for n in names if n in charts]) for heading, names in _SECTIONS]
     sections.append(("Further figures", [name for name in charts if name not in placed]))
-    proofs = _proofs(result)
+    proved = [f"{text[0].upper()}{text[1:]}." for text in proofs(result)]
+    status = str(result.get("assessment", {}).get("top_up_status") or result.get("status", ""))
     return {
         "title": question.title or run.resolve().name,
         "question": question.sentences,
@@ -65,10 +67,10 @@ def run_page(run: Path) -> dict[str, Json]:
         "estimate_facts": list(estimate_facts(result)),
         "verdicts": requirement_table(result, question.time_unit),
         "data_charts": data,
-        "facts": list(_facts(result, question.time_unit)),
+        "facts": [("status", status, ""), *facts(result, question.time_unit)],
         "charts": charts,
-        "sections": [(h, names) for h, names in sections if names or (h == "The certificate" and proofs)],
-        "proofs": proofs,
+        "sections": [(h, names) for h, names in sections if names or (h == "The certificate" and proved)],
+        "proofs": proved,
         "simulation": simulation_table(result),
         "simulated_runs": result.get("simulation", {}).get("runs"),
         "run_charts": runs,
@@ -112,61 +114,8 @@ def _answer(result: Result) -> str:
         said = f"{sentence.format(result['samples'])} (as a real number {value:.6g})"
     else:
         said = sentence.format(f"{value:.6g}")
-    white = result.get("baseline", {}).get("white", {})
-    if kind == "least_cost" and {"ratio", "cost"} <= set(white) and white["cost"]:
-        said += f"; white excitation of the same accuracy costs {white['cost']:.6g}, "
-        said += f"{white['ratio']:.3g} times as much"
-    elif kind == "shortest_experiment" and "samples" in white:
-        said += f"; white excitation within the same limits needs {white['samples']}"
-    elif "mean_squared_error" in white:
-        said += f"; white regressors of the same energy reach {white['mean_squared_error']:.6g}"
-    elif "value" in white:
-        said += f"; white excitation within the same limits reaches {white['value']:.6g}"
-    return said + "."
-
-
-def _facts(result: Result, time_unit: str) -> Iterator[Fact]:
-    found = result.get("objective", {})
-    if "value" in found:
-        yield (
-            objective(found.get("kind")).name,
-            shown(found["value"]),
-            str(result.get("assessment", {}).get("top_up_status") or result.get("status", "")),
-        )
-    if found.get("kind") != "least_cost" and "cost" in result:
-        yield "cost", shown(result["cost"]), ""
-    for kind, values in result.get("power", {}).items():
-        yield f"{kind} power", listed(values), ""
-    error = result.get("model_error", {})
-    if "worst_ratio" in error:
-        where = f"at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
-        yield "r_u / r_adm at most", shown(error["worst_ratio"]), where
-    signal = result.get("signal", {})
-    if "samples" in signal:
-        parts = [f"{signal['samples']} samples"]
-        for key, name in (("power", "power"), ("peak", "peak"), ("crest_factor", "crest factor")):
-            if signal.get(key):
-                parts.append(f"{name} {listed(signal[key], digits=4)}")
-        ratio = signal.get("worst_ratio")
-        note = f"r_u / r_adm at most {ratio:.4g} with these very samples" if ratio is not None else ""
-        yield "signal", ", ".join(parts), note
-
-
-def _proofs(result: Result) -> list[str]:
-    found = result.get("objective", {})
-    proofs = []
-    moments = "moments" in result
-    family = "moments of this structure get" if moments else "spectrum of this family gets"
-    for key, side in (("lower_bound", "below"), ("upper_bound", "above")):
-        if key in found:
-            gap = f" (gap {found['relative_gap']:.1e})" if "relative_gap" in found else ""
-            proofs.append(f"No {family} {side} {found[key]:.8g}{gap}.")
-    if "any_spectrum_bound" in found:
-        side = "above" if objective(found.get("kind")).maximised else "below"
-        proofs.append(f"No spectrum whatever gets {side} {found['any_spectrum_bound']:.8g}.")
-    if "any_structure_bound" in found:
-        proofs.append(f"No moments whatever get below {found['any_structure_bound']:.8g}.")
-    return proofs
+    compared = white(result)
+    return f"{said} ({compared})." if compared else f"{said}."
 
 
 def flat(value: Json, path: str = "") -> list[tuple[str, str]]:
@@ -177,7 +126,7 @@ def flat(value: Json, path: str = "") -> list[tuple[str, str]]:
         return [row for key, item in value.items() for row in flat(item, f"{path}.{key}" if path else key)]
     if isinstance(value, list):
         if all(isinstance(item, int | float) for item in value):
-            return [(path, listed(value) if len(value) <= 4 else f"{len(value)} numbers")]
+            return [(path, ", ".join(map(shown, value)) if len(value) <= 4 else f"{len(value)} numbers")]
         if len(value) > _MOST_ENTRIES:
             return [(path, f"{len(value)} entries")]
         return [row for i, item in enumerate(value) for row in flat(item, f"{path}[{i}]")]

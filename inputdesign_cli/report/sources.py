@@ -36,7 +36,7 @@ def assumptions(question: Question, result: Result) -> list[str]:
     rests = "The design is best" if "objective" in result else "The figures hold"
     said = [
         f"The plant and the noise are as the spec has them. {rests} for this nominal system; the accuracy "
-        "of a model of another system may differ.",
+        "of a model of another system may differ."
     ]
     if "worst_ratio" in result.get("model_error", {}):
         first = " and of first order in the parameters" if question.linearised else ""

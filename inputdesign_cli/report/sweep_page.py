@@ -77,9 +77,7 @@ def _answer(table: SweepTable) -> str:
     values = table.numbers(quantity) if quantity else None
     if values is None or not np.isfinite(values).any():
         return said
-    kinds = {kind for kind in table.columns.get("objective.kind", []) if kind}
-    kind = next(iter(kinds)) if len(kinds) == 1 else ""
-    known = OBJECTIVES.get(kind)
+    known = OBJECTIVES.get(table.kind)
     best = int(np.nanargmax(values) if known and known.maximised else np.nanargmin(values))
     point = ", ".join(f"{key} = {table.columns[key][best]}" for key in table.axes)
     what = known.name if known else quantity

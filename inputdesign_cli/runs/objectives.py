@@ -13,7 +13,6 @@ class Objective:
     asked: str  # what the summary says was asked
     answer: str  # a sentence with a place for the value
     label: str = ""  # of the value on an axis, if that is not the name
-    quantity: str = "value"  # of the value in the summary
     maximised: bool = False  # its bounds are from above
     white: str = "value"  # the entry of `baseline.white` to compare with
 
@@ -31,14 +30,12 @@ OBJECTIVES = {
         "cost",
         "the cheapest experiment that meets the accuracy",
         "The cheapest experiment that meets the accuracy costs {}",
-        quantity="cost",
         white="cost",
     ),
     "shortest_experiment": Objective(
         "samples",
         "the shortest experiment that meets the accuracy",
         "The shortest experiment that meets the accuracy has {} samples",
-        quantity="samples",
         white="samples",
     ),
     "accuracy_factor": Objective(
@@ -46,7 +43,6 @@ OBJECTIVES = {
         "the smallest multiple of the admissible error that the limits allow",
         "Within the limits the error of the model can be kept to {} times the admissible error",
         label="factor on the admissible error",
-        quantity="factor",
     ),
     "D": Objective(
         "log det M", f"{_MOST}log det M", f"{_BEST}log det M = {{}}", "log det $M$", maximised=True
@@ -76,7 +72,6 @@ OBJECTIVES = {
         "mean squared error",
         "the least mean squared error",
         "The least mean squared error is {}",
-        quantity="error",
         white="mean_squared_error",
     ),
 }

@@ -27,8 +27,12 @@ class Table:
     columns: Mapping[str, Array]
 
 
+class Curves:
+    """What one figure shows; `figures.plots` draws each kind."""
+
+
 @dataclass(frozen=True)
-class SpectrumCurves:
+class SpectrumCurves(Curves):
     """The spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
 
     frequency: Array  # (n,) rad per time unit
@@ -42,7 +46,7 @@ class SpectrumCurves:
 
 
 @dataclass(frozen=True)
-class DirectionCurves:
+class DirectionCurves(Curves):
     """The plant's gains in its principal directions, and the input's power in each of them."""
 
     frequency: Array  # (n,)
@@ -53,7 +57,7 @@ class DirectionCurves:
 
 
 @dataclass(frozen=True)
-class LossCurves:
+class LossCurves(Curves):
     """What the runs of a Monte Carlo study lost, input by input."""
 
     losses: Mapping[str, Array]  # name -> (runs,)
@@ -76,14 +80,14 @@ class BoundPanel:
 
 
 @dataclass(frozen=True)
-class BoundCurves:
+class BoundCurves(Curves):
     """Model error against admissible error, entry by entry."""
 
     panels: tuple[BoundPanel, ...]
 
 
 @dataclass(frozen=True)
-class OptimalityCurves:
+class OptimalityCurves(Curves):
     """The equivalence-theorem ratio over frequency: at most one everywhere, one on the support."""
 
     frequency: Array
@@ -102,7 +106,7 @@ class Ellipse:
 
 
 @dataclass(frozen=True)
-class EllipseCurves:
+class EllipseCurves(Curves):
     """Confidence ellipses of some pairs, all at one `probability`."""
 
     pairs: tuple[Ellipse, ...]
@@ -110,7 +114,7 @@ class EllipseCurves:
 
 
 @dataclass(frozen=True)
-class CloudCurves:
+class CloudCurves(Curves):
     """Estimates of many runs in some planes of the parameters, and what theory predicts."""
 
     names: tuple[str, ...]
@@ -133,7 +137,7 @@ class ErrorBandPanel:
 
 
 @dataclass(frozen=True)
-class ErrorBandCurves:
+class ErrorBandCurves(Curves):
     """The errors of the models of `runs` experiments with the input `name`, entry by entry."""
 
     panels: tuple[ErrorBandPanel, ...]
@@ -153,7 +157,7 @@ class FitPanel:
 
 
 @dataclass(frozen=True)
-class FitCurves:
+class FitCurves(Curves):
     """A model against the data that it was estimated from, output by output, over `time` (n,)."""
 
     time: Array
@@ -161,7 +165,7 @@ class FitCurves:
 
 
 @dataclass(frozen=True)
-class ResidualCurves:
+class ResidualCurves(Curves):
     """Normalised correlations of p residuals among each other and with r past inputs, over lags (samples).
 
     `whiteness` and `independence` are the probabilities of the two tests.
@@ -177,7 +181,7 @@ class ResidualCurves:
 
 
 @dataclass(frozen=True)
-class SignalCurves:
+class SignalCurves(Curves):
     """The record to be applied: `time` (n,), one array (n,) a channel."""
 
     time: Array
@@ -186,7 +190,7 @@ class SignalCurves:
 
 
 @dataclass(frozen=True)
-class ErrorCurves:
+class ErrorCurves(Curves):
     """Mean-squared error of a shape of moments over the energy; all arrays (n,)."""
 
     energy: Array
@@ -198,7 +202,7 @@ class ErrorCurves:
 
 
 @dataclass(frozen=True)
-class MomentsCurves:
+class MomentsCurves(Curves):
     """The moments of regressors, and the lines of the periodic input that has them (if it is one input)."""
 
     R: Array  # (n, n)
@@ -206,23 +210,6 @@ class MomentsCurves:
     line_frequency: Array | None = None  # (L,) rad per time unit, from 0 on
     line_power: Array | None = None  # (L,) mean squares
     nyquist: float = np.pi
-
-
-Curves = (
-    SpectrumCurves
-    | DirectionCurves
-    | LossCurves
-    | BoundCurves
-    | OptimalityCurves
-    | SignalCurves
-    | EllipseCurves
-    | ErrorCurves
-    | MomentsCurves
-    | CloudCurves
-    | ErrorBandCurves
-    | FitCurves
-    | ResidualCurves
-)
 
 
 @dataclass(frozen=True)

@@ -71,13 +71,9 @@ def write_run(
     target = Path(os.path.realpath(directory))
     with output_errors(directory):
         if target.exists() and not target.is_dir():
-            raise OutputError(
-                Diagnostic(
-                    "output-not-a-directory",
-                    f"{directory} is a file, and a run is written into a directory",
-                    hint="choose another directory with -o",
-                )
-            )
+            message = f"{directory} is a file, and a run is written into a directory"
+            hint = "choose another directory with -o"
+            raise OutputError(Diagnostic("output-not-a-directory", message, hint))
         target.parent.mkdir(parents=True, exist_ok=True)
         # Beside a new run, but inside a directory that exists: it may be the root of a file system
         # (a mounted volume), and a file can be moved in one step only within its file system.
@@ -135,13 +131,8 @@ def read_run(directory: Path) -> dict[str, Json]:
     result = _load_result(directory)
     missing = [name for name in result.get("files", ()) if not (directory / name).is_file()]
     if missing:
-        raise DataError(
-            Diagnostic(
-                "run-incomplete",
-                f"{directory} lacks {', '.join(missing)}, which its {RESULT} lists",
-                hint="run the spec again",
-            )
-        )
+        message = f"{directory} lacks {', '.join(missing)}, which its {RESULT} lists"
+        raise DataError(Diagnostic("run-incomplete", message, hint="run the spec again"))
     return result
 
 
@@ -149,13 +140,9 @@ def _load_result(directory: Path) -> dict[str, Json]:
     try:
         result = json.loads((directory / RESULT).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
-        raise DataError(
-            Diagnostic(
-                "run-missing",
-                f"{directory} holds no finished run: there is no {RESULT} in it",
-                hint="write one with `idesign solve SPEC -o DIR`",
-            )
-        ) from None
+        message = f"{directory} holds no finished run: there is no {RESULT} in it"
+        hint = "write one with `idesign solve SPEC -o DIR`"
+        raise DataError(Diagnostic("run-missing", message, hint)) from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise _unreadable(directory, str(error)) from error
     if not isinstance(result, dict) or result.get("format") != 1:
@@ -200,13 +187,9 @@ def _replace(names: list[str], partial: Path, target: Path, *, shown: Path) -> N
     owned = _owned(target)
     foreign = [name for name in names if name not in owned and (target / name).exists()]
     if foreign:
-        raise OutputError(
-            Diagnostic(
-                "output-not-a-run",
-                f"{shown} already has {', '.join(foreign)}, written by something other than an earlier run",
-                hint="choose another directory with -o, or move these files away",
-            )
-        )
+        message = f"{shown} already has {', '.join(foreign)}, written by something other than an earlier run"
+        hint = "choose another directory with -o, or move these files away"
+        raise OutputError(Diagnostic("output-not-a-run", message, hint))
     previous = partial / "previous"
     previous.mkdir()
     leaving = [RESULT, *(name for name in owned if name != RESULT)]
@@ -261,16 +244,9 @@ def output_errors(target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        code, message = "output-not-writable", f"{target} cannot be written: {error.strerror or error}"
+        hint = "choose another place, or change the permissions"
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            diagnostic = Diagnostic(
-                "output-full",
-                f"there is no space left for {target}",
-                hint="free some space, or choose a place on another disc",
-            )
-        else:
-            diagnostic = Diagnostic(
-                "output-not-writable",
-                f"{target} cannot be written: {error.strerror or error}",
-                hint="choose another place, or change the permissions",
-            )
-        raise OutputError(diagnostic) from error
+            code, message = "output-full", f"there is no space left for {target}"
+            hint = "free some space, or choose a place on another disc"
+        raise OutputError(Diagnostic(code, message, hint)) from error

@@ -66,10 +66,8 @@ class Grid:
 
     def block(self) -> dict[str, Json]:
         """The grid as the `sweep` block of a spec."""
-        block: dict[str, Json] = {
-            "set": {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
-        }
-        return {**block, "zip": True} if self.zipped else block
+        values = {axis.key: [_data(text) for text in axis.texts] for axis in self.axes}
+        return {"set": values, "zip": True} if self.zipped else {"set": values}
 
 
 def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
@@ -95,9 +93,8 @@ def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
         if not equals or len(texts) < 2:
             fixed.append(setting)
         elif "" in texts:
-            raise bad_spec(
-                "bad-override", f"a value of --set {setting} is empty", hint="remove the extra comma"
-            )
+            message = f"a value of --set {setting} is empty"
+            raise bad_spec("bad-override", message, hint="remove the extra comma")
         elif key in axes:
             hint = "give all its values at once: key=v1,v2,v3"
             raise bad_spec("sweep-twice", f"{key} is swept by two settings", hint=hint, key=key)
@@ -121,25 +118,19 @@ def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Gr
         merged[axis.key] = axis
     grid = Grid(tuple(merged.values()), zipped or (block is not None and block.zip))
     if not merged:
-        raise bad_spec(
-            "sweep-empty",
-            "nothing is varied: no key has several values",
-            hint="write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5",
-        )
+        message = "nothing is varied: no key has several values"
+        hint = "write --set experiment.samples=250,500,1000 or --set spectrum.order=0:40:5"
+        raise bad_spec("sweep-empty", message, hint=hint)
     lengths = {axis.key: len(axis.texts) for axis in grid.axes}
     if grid.zipped and len(set(lengths.values())) > 1:
         listed = ", ".join(f"{key} has {n}" for key, n in lengths.items())
-        raise bad_spec(
-            "sweep-lengths",
-            f"values that are taken side by side must be equally many ({listed})",
-            hint="give each key as many values, or leave out --zip for every combination",
-        )
+        message = f"values that are taken side by side must be equally many ({listed})"
+        hint = "give each key as many values, or leave out --zip for every combination"
+        raise bad_spec("sweep-lengths", message, hint=hint)
     if len(grid) > MOST_POINTS:
-        raise bad_spec(
-            "sweep-too-large",
-            f"the sweep has {len(grid)} points, and at most {MOST_POINTS} are run",
-            hint="vary fewer keys at once, or --zip them",
-        )
+        message = f"the sweep has {len(grid)} points, and at most {MOST_POINTS} are run"
+        hint = "vary fewer keys at once, or --zip them"
+        raise bad_spec("sweep-too-large", message, hint=hint)
     return grid
 
 

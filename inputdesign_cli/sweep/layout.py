@@ -107,13 +107,9 @@ def opened(root: Path) -> Iterator[Layout]:
             root.mkdir(parents=True, exist_ok=True)
             foreign = sorted(p.name for p in root.iterdir() if not p.name.startswith("."))
             if foreign and not (root / SUMMARY).is_file():
-                raise OutputError(
-                    Diagnostic(
-                        "output-not-a-sweep",
-                        f"{root} already has {', '.join(foreign[:4])}, and no {SUMMARY} of an earlier sweep",
-                        hint="choose another directory with -o",
-                    )
-                )
+                message = f"{root} already has {', '.join(foreign[:4])}, and no {SUMMARY} of an earlier sweep"
+                hint = "choose another directory with -o"
+                raise OutputError(Diagnostic("output-not-a-sweep", message, hint))
             lock = held.enter_context((root / LOCK).open("a+", encoding="utf-8"))
             _claim(lock, root)
             with (root / WORKERS).open("a") as workers:
@@ -130,13 +126,9 @@ def _claim(lock: IO[str], root: Path) -> None:
     except BlockingIOError:
         lock.seek(0)
         owner = lock.read().strip()
-        raise OutputError(
-            Diagnostic(
-                "sweep-locked",
-                f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}",
-                hint="wait for it, or choose another directory with -o",
-            )
-        ) from None
+        message = f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}"
+        hint = "wait for it, or choose another directory with -o"
+        raise OutputError(Diagnostic("sweep-locked", message, hint)) from None
     lock.truncate(0)
     lock.write(str(os.getpid()))
     lock.flush()

@@ -103,9 +103,8 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
     except OutputError:
         raise
     except IdesignError as error:
-        return failed(
-            STATUS.get(error.exit_code, BROKEN), error.diagnostics[0], time.perf_counter() - started
-        )
+        status = STATUS.get(error.exit_code, BROKEN)
+        return failed(status, error.diagnostics[0], time.perf_counter() - started)
     except Exception as error:
         diagnostic = Diagnostic("internal-error", f"{type(error).__name__}: {error}")
         return failed(BROKEN, diagnostic, time.perf_counter() - started)

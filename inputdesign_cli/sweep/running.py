@@ -86,12 +86,7 @@ class SweepSummary:
 
 
 def list_points(
-    spec: Path,
-    settings: Sequence[str] = (),
-    *,
-    directory: Path,
-    zipped: bool = False,
-    verb: Verb = "solve",
+    spec: Path, settings: Sequence[str] = (), *, directory: Path, zipped: bool = False, verb: Verb = "solve"
 ) -> Iterator[Listing]:
     """The points of a sweep and whether they are done; nothing is computed or written."""
     plan = build_plan(spec, settings, zipped=zipped, verb=verb)

@@ -27,10 +27,10 @@ Part = TypeVar("Part", Table, Curves)
 
 @dataclass(frozen=True)
 class Assessment:
-    """Whether the data meet what the spec asks for; the outcome of the identification or of the top-up."""
+    """Whether the data meet what the spec asks for; the results of the identification or of the top-up."""
 
     met: bool
-    outcome: Results
+    results: Results
 
 
 def assess(task: Identification, path: Path, *, remove_means: bool = False) -> Assessment:

@@ -188,7 +188,7 @@ def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(pa
 
 
 def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
-    assert [a.get_ylabel() for a in page(CURVES["residuals"]).axes] == ["with themselves", "with past inputs"]
+    assert [axes.get_title() for axes in page(CURVES["residuals"]).axes] == ["with residual 1", "with u1"]
     titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
     assert titles == ["with residual 1", "with residual 2", "with u1", "", "", ""]
 

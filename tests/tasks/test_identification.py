@@ -46,7 +46,7 @@ def test_the_blocks_can_be_pasted(data):
 def test_data_that_suffice_meet_the_target(data):
     assessment = assess(load_spec(SPEC, ["accuracy.model_error={relative: 0.1, alpha: 2.45}"]), data)
     assert assessment.met
-    assert assessment.outcome.result["status"] == "met"
+    assert assessment.results.result["status"] == "met"
 
 
 def test_a_top_up_makes_up_for_what_is_missing(write):
@@ -56,11 +56,11 @@ def test_a_top_up_makes_up_for_what_is_missing(write):
     spec = load_spec(SPEC, EASY)
     short = assess(spec, path)
     assert not short.met
-    result = short.outcome.result
+    result = short.results.result
     assert result["assessment"]["requirements"][0]["worst_ratio"] > 1
     assert result["model_error"]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
     # Cheaper than the experiment from scratch on the same model.
-    pasted = yaml.safe_load(short.outcome.files["model.yaml"].decode())
+    pasted = yaml.safe_load(short.results.files["model.yaml"].decode())
     scratch = solve(parse_spec(yaml.safe_dump({**yaml.safe_load(spec.to_yaml()), **pasted})))
     assert result["cost"] < scratch.result["cost"]
 

@@ -117,7 +117,7 @@ def test_plants_in_s_are_assessed(relative, enough, write):
     found = assess(spec, data)
     assert found.met == enough
     if not enough:
-        assert found.outcome.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+        assert found.results.result["requirements"][0]["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_held_input_taken_for_its_interpolation_is_told(write):
@@ -144,8 +144,8 @@ def test_a_loop_is_identified_directly_and_topped_up(write):
     assert found["fit_percent"][0] is None  # the plant alone is unstable there
     assessed = assess(spec, data)
     assert not assessed.met
-    assert {"r1", "r2"} < set(assessed.outcome.tables["signal"].columns)
-    after = assessed.outcome.result["information"]["standard_deviation"]
+    assert {"r1", "r2"} < set(assessed.results.tables["signal"].columns)
+    after = assessed.results.result["information"]["standard_deviation"]
     assert all(after[name] < found["standard_deviation"][name] for name in model.names)
 
 
@@ -176,7 +176,7 @@ def test_data_that_suffice_meet_the_target(data):
     spec = load_spec(SPEC, ["accuracy.model_error={absolute: 4}"])
     assessment = assess(spec, data)
     assert assessment.met
-    assert [r["entry"] for r in assessment.outcome.result["assessment"]["requirements"]] == [
+    assert [r["entry"] for r in assessment.results.result["assessment"]["requirements"]] == [
         "[1,1]", "[1,2]", "[2,1]", "[2,2]"
     ]  # fmt: skip
 

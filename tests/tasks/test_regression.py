@@ -269,7 +269,7 @@ def test_the_summary_says_what_was_found(capsys, monkeypatch, tmp_path):
         "energy      2\n",
         "no toeplitz moments get below",
         "squared bias 0 + variance 1",
-        "design: error",
+        "design: mean squared error",
     ):
         assert part in text
 

@@ -174,7 +174,7 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
     strict = "accuracy={model_error: {relative: 0.02}}"
     more = assess(parse_spec(spec.to_yaml(), overrides=[strict, "spectrum.order=2"]), data)
     assert not more.met
-    after = more.outcome.result["information"]["standard_deviation"]
+    after = more.results.result["information"]["standard_deviation"]
     assert all(after[name] < found["standard_deviation"][name] for name in model.names)
 
 

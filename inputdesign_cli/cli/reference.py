@@ -1,7 +1,8 @@
-"""`idesign explain`."""
+"""`idesign explain` and `idesign schema`: what error codes mean, and what a spec may hold."""
 
 from __future__ import annotations
 
+import json
 from typing import Annotated
 
 import typer
@@ -14,9 +15,7 @@ def explain(
     code: Annotated[
         str | None,
         typer.Argument(
-            metavar="[CODE]",
-            help="The code of an error; without it, all codes.",
-            autocompletion=error_codes,
+            metavar="[CODE]", help="The code of an error; without it, all codes.", autocompletion=error_codes
         ),
     ] = None,
 ) -> None:
@@ -31,3 +30,13 @@ def explain(
         typer.echo("\n".join(aligned([(name, entry.title) for name, entry in known], wrap=True)))
     else:
         typer.echo(explanation(code))
+
+
+def schema() -> None:
+    """Print the JSON schema of a spec.
+
+    Editors use it for completion and for checks while you type.
+    """
+    from inputdesign_cli.specification import json_schema
+
+    typer.echo(json.dumps(json_schema(), indent=1, ensure_ascii=False))

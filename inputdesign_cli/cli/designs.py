@@ -1,0 +1,81 @@
+"""`idesign solve`, `idesign analyse` and `idesign simulate`: a spec in, a run out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from inputdesign_cli.cli.options import Figures, Json, Output, Overrides, Quiet, SpecFile
+from inputdesign_cli.cli.run import keep
+from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
+
+if TYPE_CHECKING:
+    from inputdesign_cli.compute.executor import Executor
+    from inputdesign_cli.runs.results import Results
+    from inputdesign_cli.sweep.verbs import Verb
+
+
+def solve(
+    spec: SpecFile,
+    overrides: Overrides = None,
+    output: Output = None,
+    figures: Figures = True,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Design the experiment that a spec asks for.
+
+    Writes a run directory with the spectrum, the signal to apply, the model error that it buys, and the
+    proof of optimality; prints a summary.
+    """
+    results = _results("solve", spec, overrides, quiet)
+    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+
+
+def analyse(
+    spec: SpecFile,
+    overrides: Overrides = None,
+    output: Output = None,
+    figures: Figures = True,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Tell what accuracy a given excitation buys.
+
+    Nothing is optimised: the excitation stands in the spec under `spectrum.given`. Writes a run
+    directory and prints a summary.
+    """
+    results = _results("analyse", spec, overrides, quiet)
+    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+
+
+def simulate(
+    spec: SpecFile,
+    overrides: Overrides = None,
+    output: Output = None,
+    jobs: Jobs = 1,
+    cluster: ClusterAddress = None,
+    figures: Figures = True,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Try the designed experiment on the true system, many times.
+
+    Designs as `solve` does, runs the experiment as often as `simulation.runs` says, each time with new
+    noise, and adds to the run directory of `solve` what the models did; prints a summary.
+    The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
+    """
+    results = _results("simulate", spec, overrides, quiet, executor(jobs, cluster))
+    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+
+
+def _results(
+    verb: Verb, file: Path, overrides: list[str] | None, quiet: bool, executor: Executor | None = None
+) -> Results:
+    """What a verb makes of a spec file; the numerical libraries are imported behind the message."""
+    with status(f"{file}: computing ...", quiet=quiet):
+        from inputdesign_cli.specification import load_spec
+        from inputdesign_cli.sweep.verbs import run_verb
+
+        return run_verb(verb, load_spec(file, overrides or []), executor)

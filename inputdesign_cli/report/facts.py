@@ -1,0 +1,97 @@
+"""A result in words, a line a fact: the same in the terminal and on a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from inputdesign_cli.report.numbers import Fact, listed, shown, spoken
+from inputdesign_cli.runs.objectives import objective
+from inputdesign_cli.runs.results import Result
+
+# What is said of an excitation that was given, by the status of the result.
+GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
+
+
+def facts(result: Result, time_unit: str) -> Iterator[Fact]:
+    """What an experiment costs and what it buys, as far as the result has the numbers."""
+    found = result.get("objective", {})
+    kind, cost = found.get("kind"), "energy" if "moments" in result else "cost"
+    if "value" in found:
+        yield cost if kind == "least_cost" else objective(kind).name, _clean(found["value"]), white(result)
+    if kind != "least_cost" and "cost" in result:
+        yield cost, shown(result["cost"]), ""
+    powers = ", ".join(f"{name} {listed(power)}" for name, power in result.get("power", {}).items())
+    if powers:
+        yield "power", powers, ""
+    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
+    if binding:
+        yield "limits", f"{', '.join(dict.fromkeys(binding))} exhausted", ""
+    error = result.get("model_error", {})
+    if "worst_ratio" in error:
+        where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
+        yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+    if "mean_squared_error" in result:
+        error = result["mean_squared_error"]
+        parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"
+        yield "error", f"{error['value']:.6g} = {parts}", ""
+    deviations = result.get("information", {}).get("standard_deviation")
+    if deviations and result.get("status") in GIVEN and "identification" not in result:
+        yield "std", ", ".join(f"{name} {value:.4g}" for name, value in deviations.items()), ""
+    if "samples" in result.get("signal", {}):
+        yield "signal", ", ".join(_signal(result)), ""
+    if "improvement" in result.get("simulation", {}):
+        measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
+        yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def white(result: Result) -> str:
+    """What white excitation costs or reaches instead: at the same accuracy, or within the same limits."""
+    kind = result.get("objective", {}).get("kind")
+    found = result.get("baseline", {}).get("white", {})
+    value, ratio = found.get(objective(kind).white), found.get("ratio")
+    multiple = kind in ("least_cost", "closed_loop_error")
+    if value is None or (multiple and (ratio is None or not value)):
+        return ""
+    return f"white excitation: {_clean(value)}" + (f", {ratio:.3g} times as much" if multiple else "")
+
+
+def proofs(result: Result) -> Iterator[str]:
+    """What is proved of other experiments."""
+    found = result.get("objective", {})
+    family = f"no {result.get('spectrum', {}).get('type', 'such')} spectrum gets"
+    if "moments" in result:
+        family = f"no {result['moments']['structure']} moments get"
+    for key, side in (("lower_bound", "below"), ("upper_bound", "above")):
+        if key in found:
+            gap = f", gap {found['relative_gap']:.1e}" if "relative_gap" in found else ""
+            yield f"{family} {side} {shown(found[key])}{gap}"
+    side = "above" if objective(found.get("kind")).maximised else "below"
+    for what in ("spectrum", "structure"):
+        if f"any_{what}_bound" in found:
+            whatever = "spectrum at all gets" if what == "spectrum" else "moments at all get"
+            yield f"no {whatever} {side} {shown(found[f'any_{what}_bound'])}"
+
+
+def _clean(value: float) -> str:
+    """Seven digits; the logarithm of one is zero, whatever rounding says."""
+    return shown(0.0 if abs(value) < 1e-12 else value)
+
+
+def _signal(result: Result) -> Iterator[str]:
+    """The samples of the record, and what they attain."""
+    signal = result["signal"]
+    yield f"{signal['samples']} samples"
+    for key in ("power", "peak", "crest_factor"):
+        if signal.get(key):
+            yield f"{spoken(key)} {listed(signal[key])}"
+    if "mean_squared_error" in signal:
+        yield f"error {signal['mean_squared_error']:.6g} with these samples"
+    if "worst_ratio" in signal:
+        error = "worst_ratio" in result.get("model_error", {})
+        ratio = "r_u / r_adm" if error else "ratio to the requirement"
+        yield f"{ratio} at most {signal['worst_ratio']:.4g} with these samples"
+    more = signal.get("extra_power", 0.0)
+    if abs(more) >= 5e-5:
+        yield f"costs {abs(100 * more):.3g} % {'more' if more > 0 else 'less'} than the design"
+    if "criterion" in signal:
+        yield f"criterion {signal['criterion']:.6g} with these samples"
