@@ -31,6 +31,9 @@ from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Tran
 
 DEFAULT_CONFIDENCE = 0.95
 
+# Every other key of `accuracy` is a requirement; the mean-squared error is one where it has a target.
+_NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_error")
+
 
 class Sensitivity(Section):
     """An admissible error that keeps the sensitivity S of a control loop: |W S| <= 1, or |S| below a peak."""
@@ -207,7 +210,7 @@ class Accuracy(Section):
     @property
     def requirements(self) -> tuple[str, ...]:
         """The keys of the requirements that are given, in the order of the contract."""
-        names = ("model_error", "information", "application", "weighted_variance", "standard_deviation")
+        names = (key for key in type(self).model_fields if key not in _NO_REQUIREMENTS)
         error = self.mean_squared_error
         bounded = error is not None and error.target is not None
         return self.stated(*names) + (("mean_squared_error",) if bounded else ())
