@@ -79,8 +79,8 @@ def rational_filter(taps: Array, order: int) -> RationalFilter:
 
     With the Hankel matrix H = U S V^T, cut to its largest singular values, U S^(1/2) stacks C, C A, C A^2, ..
     and S^(1/2) V^T is [B, A B, A^2 B, ..]: C and B are their first blocks, and A is what takes the first
-    stack to itself moved up by one block. H is never formed: its products with vectors are convolutions with the
-    taps, made by FFT, and these are all that the singular value decomposition asks for.
+    stack to itself moved up by one block. H is never formed: its products with vectors are convolutions with
+    the taps, made by FFT, and these are all that the singular value decomposition asks for.
     """
     taps = taps[: 2 * _LONGEST]
     n = taps.shape[1]
