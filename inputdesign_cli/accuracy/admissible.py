@@ -26,14 +26,15 @@ class AdmissibleError(Protocol):
     """r_adm over frequency."""
 
     @property
-    def singularities(self) -> ComplexArray: ...
+    def singularities(self) -> ComplexArray:
+        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
 
     @property
-    def knots(self) -> Array: ...
+    def knots(self) -> Array:
+        """Frequencies at which r_adm may have a kink."""
 
     def at(self, w: ArrayLike) -> Array:
         """r_adm (n,) at frequencies `w` (n,)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,13 @@ class Relative:
 
     @cached_property
     def singularities(self) -> ComplexArray:
+        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         if self.entry is None:
             return self.model.singularities
         return self.model.entry_singularities(*self.entry)
 
     def at(self, w: ArrayLike) -> Array:
+        """r_adm (n,) at frequencies `w` (n,)."""
         G = self.model.plant_at(w)
         if self.entry is None:
             return self.fraction * np.linalg.norm(G, axis=(1, 2))
@@ -67,6 +70,7 @@ class Absolute:
     singularities = _NOWHERE.astype(complex)
 
     def at(self, w: ArrayLike) -> Array:
+        """r_adm (n,) at frequencies `w` (n,)."""
         return np.full(np.shape(w), self.level)
 
 
@@ -83,9 +87,11 @@ class Table:
 
     @property
     def knots(self) -> Array:
+        """Frequencies at which r_adm may have a kink."""
         return self.frequency
 
     def at(self, w: ArrayLike) -> Array:
+        """r_adm (n,) at frequencies `w` (n,)."""
         tiny = 1e-12
         x = np.log(np.maximum(self.frequency, tiny))
         return np.exp(np.interp(np.log(np.maximum(np.asarray(w, dtype=float), tiny)), x, np.log(self.value)))
@@ -106,9 +112,11 @@ class Sensitivity:
 
     @cached_property
     def singularities(self) -> ComplexArray:
+        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         return np.concatenate([self.loop.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
+        """r_adm (n,) at frequencies `w` (n,)."""
         S, applied = self.loop.sensitivity(w)
         left = 1.0 - np.abs(self.weight.at(w)) * largest_gain(S)
         return left / np.maximum(largest_gain(applied), _TINY)
@@ -123,13 +131,16 @@ class Weighted:
 
     @property
     def knots(self) -> Array:
+        """Frequencies at which r_adm may have a kink."""
         return self.inner.knots
 
     @cached_property
     def singularities(self) -> ComplexArray:
+        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
         return np.concatenate([self.inner.singularities, self.weight.singularities])
 
     def at(self, w: ArrayLike) -> Array:
+        """r_adm (n,) at frequencies `w` (n,)."""
         return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)
 
 

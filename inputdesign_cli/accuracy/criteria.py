@@ -32,14 +32,17 @@ class Criterion(OneCondition):
 
     @property
     def name(self) -> str:
+        """`criterion` and its letter, for reports."""
         return f"criterion {self.letter}"
 
     @property
     def definite(self) -> bool:
+        """Whether the criterion is worthless where M is singular: all but T."""
         return self.letter != "T"
 
     @property
     def criterion(self) -> Criterion:
+        """Itself."""
         return self
 
     @cached_property

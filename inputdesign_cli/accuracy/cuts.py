@@ -38,15 +38,14 @@ class Cut(Protocol):
     """
 
     @property
-    def frequency(self) -> float | None: ...
+    def frequency(self) -> float | None:
+        """Where the requirement asks for it."""
 
     def transformed(self, congruence: Array) -> Cut:
         """The same set for K M K^T, K = `congruence` (k, k) nonsingular."""
-        ...
 
     def blocks(self, size: int) -> list[CutBlock]:
         """Its cones, all with the same number of auxiliary unknowns; `size` is k."""
-        ...
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
         """(Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.
@@ -54,7 +53,6 @@ class Cut(Protocol):
         Args:
             multipliers: one array a block, suggestions of a solver; the inequality holds whatever they are.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -65,13 +63,16 @@ class MatrixCut:
     frequency: float | None = None
 
     def transformed(self, congruence: Array) -> MatrixCut:
+        """The same set for K M K^T, see `Cut`."""
         return replace(self, matrix=congruence @ self.matrix @ congruence.T)
 
     def blocks(self, size: int) -> list[CutBlock]:
+        """M - `matrix` positive semidefinite."""
         rows = svec_length(size)
         return [CutBlock("psd", size, -svec(self.matrix), sp.eye_array(rows, format="csc"), _none(rows))]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """tr(Y M) >= tr(Y matrix)."""
         Y = positive_part(smat(multipliers[0]))
         return Y, float(np.sum(Y * self.matrix))
 
@@ -88,9 +89,11 @@ class VarianceCut:
     frequency: float | None = None
 
     def transformed(self, congruence: Array) -> VarianceCut:
+        """The same set for K M K^T, see `Cut`."""
         return replace(self, directions=congruence @ self.directions)
 
     def blocks(self, size: int) -> list[CutBlock]:
+        """The Schur complement, and the trace of Z, which is the unknown."""
         q = self.directions.shape[1]
         order, aux = size + q, svec_length(q)
         corner = np.zeros((order, order))
@@ -107,6 +110,7 @@ class VarianceCut:
         ]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """tr(Y M) >= |Y^{1/2} V|_*^2."""
         size = self.directions.shape[0]
         Y = positive_part(smat(multipliers[0])[:size, :size])
         return Y, float(np.linalg.svd(_root(Y) @ self.directions, compute_uv=False).sum() ** 2)
@@ -125,10 +129,12 @@ class DeterminantCut:
     frequency: float | None = None
 
     def transformed(self, congruence: Array) -> DeterminantCut:
+        """The same set for K M K^T, see `Cut`."""
         _, logarithm = np.linalg.slogdet(congruence)
         return replace(self, level=self.level * float(np.exp(2.0 * logarithm / len(congruence))))
 
     def blocks(self, size: int) -> list[CutBlock]:
+        """The factorisation, the logarithms of diag(T), and their sum."""
         triangle, entries = svec_length(size), []
         rows, columns, scale = svec_layout(2 * size)
         # Entry (j, i) of T stands at (i, size + j) of the block [[M, T], [T^T, diag T]], j >= i.
@@ -164,6 +170,7 @@ class DeterminantCut:
         ]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """tr(Y M) >= k (det Y)^{1/k} level."""
         block = smat(multipliers[0])
         size = len(block) // 2
         Y = positive_part(block[:size, :size])
@@ -180,14 +187,17 @@ class TraceCut:
     frequency: float | None = None
 
     def transformed(self, congruence: Array) -> TraceCut:
+        """The same set for K M K^T, see `Cut`."""
         inverse = np.linalg.inv(congruence)
         return replace(self, weight=inverse.T @ self.weight @ inverse)
 
     def blocks(self, size: int) -> list[CutBlock]:
+        """The linear inequality itself."""
         row = sp.csc_matrix(svec(self.weight)[None, :])
         return [CutBlock("nonnegative", 1, -np.ones(1), row, _none(1))]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """A multiple of the inequality."""
         y = max(float(multipliers[0][0]), 0.0)
         return y * self.weight, y
 
@@ -206,11 +216,13 @@ class EllipsoidCut:
     frequency: float | None = None
 
     def transformed(self, congruence: Array) -> EllipsoidCut:
+        """The same set for K M K^T, see `Cut`."""
         corner = np.eye(len(self.form))
         corner[:-1, :-1] = congruence
         return replace(self, form=corner @ self.form @ corner.T)
 
     def blocks(self, size: int) -> list[CutBlock]:
+        """The matrix inequality of the S-procedure, and nu, which is the unknown."""
         order, entries = size + 1, svec_length(size)
         corner = np.zeros((order, order))
         corner[-1, -1] = -1.0
@@ -222,11 +234,17 @@ class EllipsoidCut:
         ]
 
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """tr(Z_11 M) / alpha^2 >= Z_22, from any Z >= 0 (k + 1, k + 1) with tr(Z Q) >= 0.
+
+        Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0, whatever nu is.
+        The solver's Z is made positive semidefinite first, and rounding may leave tr(Z Q) a little below
+        zero. Two changes of Z mend that and keep it positive semidefinite: to shrink its last row and
+        column, or to add to Z_11 the direction in which Q_11 is largest. The first proves more, where it
+        is possible.
+        """
         Z = positive_part(smat(multipliers[0]))
         missing = -float(np.sum(Z * self.form))
         if missing > 0.0:
-            # Rounding. Less weight on the corner restores tr(Z Q) >= 0, or more of the direction in which the
-            # form is largest; where the first can be had it proves more.
             shorter = _shortened(Z, self.form)
             if shorter is not None:
                 return shorter[:-1, :-1] / self.alpha**2, float(shorter[-1, -1])

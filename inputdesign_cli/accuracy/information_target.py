@@ -25,6 +25,7 @@ class InformationTarget(OneCondition):
 
     @property
     def name(self) -> str:
+        """`information`, `application` or `standard_deviation of` a parameter."""
         return self.label
 
     def ratio(self, information: Array) -> float:

@@ -34,18 +34,22 @@ class OnModelError(OverFrequency):
 
     @property
     def name(self) -> str:
+        """`model_error`."""
         return "model_error"
 
     @property
     def bounded_error(self) -> BoundedError:
+        """Itself."""
         return self
 
     @property
     def knots(self) -> Array:
+        """Those of r_adm."""
         return self.admissible.knots
 
     @property
     def own_singularities(self) -> ComplexArray:
+        """Those of r_adm."""
         return self.admissible.singularities
 
     def error_bound(self, information: Array, w: ArrayLike) -> Array:

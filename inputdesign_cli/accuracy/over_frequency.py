@@ -35,6 +35,7 @@ class OverFrequency(Requirement):
 
     @property
     def of_the_norm(self) -> bool:
+        """Whether no entry is named, of several."""
         return self.entry is None and self.experiment.model.outputs * self.experiment.model.inputs > 1
 
     @property

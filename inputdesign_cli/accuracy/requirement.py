@@ -32,46 +32,45 @@ class BoundedError(Protocol):
     @property
     def entry(self) -> Entry | None:
         """The entry (output, input) of G that it is about, from zero; None for the norm of all."""
-        ...
 
     @property
-    def band(self) -> tuple[float, float]: ...
+    def band(self) -> tuple[float, float]:
+        """(lo, hi): where it must hold."""
 
     @property
-    def grid(self) -> Array: ...
+    def grid(self) -> Array:
+        """Frequencies of the band, refined at resonances."""
 
     @property
-    def admissible(self) -> AdmissibleError: ...
+    def admissible(self) -> AdmissibleError:
+        """r_adm."""
 
     def error_bound(self, information: Array, w: ArrayLike) -> Array:
         """r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
-        ...
 
     def nominal_size(self, w: ArrayLike) -> Array:
         """|G| (n,) of the entry, or the Frobenius norm."""
-        ...
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """As `Requirement.violations`."""
-        ...
 
 
 class Level(Protocol):
     """A criterion as a level that must reach one; see `Requirement.criterion`."""
 
     @property
-    def letter(self) -> Literal["D", "A", "E", "T"]: ...
+    def letter(self) -> Literal["D", "A", "E", "T"]:
+        """Which criterion it is."""
 
     @property
-    def scaling(self) -> Array: ...
+    def scaling(self) -> Array:
+        """(k, k): what takes parameters to the quantities that count."""
 
     def level(self, information: Array) -> float:
         """The quantity that must reach one."""
-        ...
 
     def value(self, level: float) -> float:
         """What a level stands for: log det M, -tr M^-1, lambda_min(M) or tr M."""
-        ...
 
 
 class Requirement(ABC):

@@ -32,10 +32,12 @@ class WeightedVariance(OverFrequency):
 
     @property
     def name(self) -> str:
+        """`weighted_variance`."""
         return "weighted_variance"
 
     @property
     def own_singularities(self) -> ComplexArray:
+        """Those of the weight."""
         return self.weight.singularities
 
     def rows(self, w: ArrayLike) -> NDArray[np.float64]:

@@ -30,11 +30,9 @@ class Executor(Protocol):
     @property
     def shares_files(self) -> bool:
         """Whether the function sees the file system of the caller."""
-        ...
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer. `function` is importable by name; everything can be pickled."""
-        ...
 
 
 class WorkerLostError(Exception):

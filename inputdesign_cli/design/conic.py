@@ -65,7 +65,7 @@ _STATUS: dict[str, Literal["solved", "almost_solved", "infeasible", "unbounded",
 def solve_conic(
     q: Array, blocks: Sequence[Block], *, tolerance: float = 1e-9, max_iterations: int = 200
 ) -> ConicSolution:
-    """Solve by Clarabel's interior-point method.
+    """Solve by the interior-point method of [goulart-chen-2024].
 
     Args:
         q: (n,) linear cost.

@@ -20,12 +20,10 @@ class Panel(Protocol):
     @property
     def frequency(self) -> Array:
         """(n,) rad per time unit."""
-        ...
 
     @property
     def entry(self) -> tuple[int, int] | None:
         """Output and input from zero; None: the only entry, or all of them together."""
-        ...
 
 
 P = TypeVar("P", bound=Panel)

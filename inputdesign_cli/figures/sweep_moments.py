@@ -1,4 +1,4 @@
-"""moments.png: the designed moments of a regression over one key, as in Figures 1 and 2 of the MSE paper."""
+"""moments.png: the designed moments of a regression over one key, as in [eckhard-mse], Figures 1, 2."""
 
 from __future__ import annotations
 

@@ -28,6 +28,7 @@ class SweepTable:
 
     @property
     def rows(self) -> int:
+        """The number of points."""
         return len(self.columns["status"])
 
     @property

@@ -24,11 +24,9 @@ class Estimator(Protocol):
 
     def identify(self, u: Array, y: Array, start: Array | None, *, feedback: bool) -> Estimate:
         """From one record; see the function of this name."""
-        ...
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         """From many records; see the function of this name."""
-        ...
 
 
 @dataclass(frozen=True)

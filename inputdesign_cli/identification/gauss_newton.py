@@ -1,7 +1,8 @@
 """Gauss-Newton with Levenberg's damping on many prediction-error problems at once.
 
 Each run has its own damping and leaves the batch when it has settled. Steps that would make the predictor
-unstable are mirrored back by the problem. Ljung (1999), Section 10.2.
+unstable are mirrored back by the problem. The search is that of [ljung-1999], Section 10.2, the damping
+that of [levenberg-1944].
 """
 
 from __future__ import annotations
@@ -33,22 +34,18 @@ class Problem(Protocol):
     @property
     def errors(self) -> int:
         """Number of prediction errors of a run."""
-        ...
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
         """Cost (runs,), half its Hessian to first order (runs, k, k), minus half its gradient (runs, k).
 
         A cost that overflows is infinite.
         """
-        ...
 
     def stabilised(self, theta: Array) -> Array:
         """theta (runs, k), moved where its predictor would be unstable; a copy."""
-        ...
 
     def kept(self, runs: NDArray[np.bool_]) -> Self:
         """The same problem with some of its runs only."""
-        ...
 
 
 @dataclass(frozen=True)

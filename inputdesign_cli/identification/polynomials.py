@@ -1,8 +1,8 @@
 """Prediction-error estimates of polynomial models in q^-1, and of their noise.
 
 The covariance of e is estimated along with theta: the estimate minimises the determinant of the residuals'
-covariance, so that each residual is weighed by what the others tell of it; Ljung, System Identification
-(1999), Sections 7.2 and 15.2. With one output it is the sum of squares.
+covariance, so that each residual is weighed by what the others tell of it ([ljung-1999], Sections
+7.2 and 15.2). With one output it is the sum of squares.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Prediction errors of one output of a polynomial model and their exact gradient, for many runs at once.
 
-epsilon = (D/C)(A y - sum_j (B_j/F_j) u_j) and psi = -d epsilon / d theta; Ljung, System Identification
-(1999), Section 10.3. Signals are (samples, runs) and start from rest. They stream through in blocks of a
+epsilon = (D/C)(A y - sum_j (B_j/F_j) u_j) and psi = -d epsilon / d theta ([ljung-1999], Section
+10.3). Signals are (samples, runs) and start from rest. They stream through in blocks of a
 few samples, so that all that is made on the way stays in the cache.
 """
 

@@ -3,7 +3,7 @@
 With weights W (p, p) the cost is the sum over the samples of epsilon^T W epsilon. Without, it is
 N det(S / N)^(1/p), S the sum of epsilon epsilon^T, which with one output is S itself. Its minimiser is that
 of the cost with the inverse covariance of its own residuals, the maximum-likelihood estimate for Gaussian
-noise of unknown covariance; Ljung (1999), (7.87)-(7.96) and Section 15.2. Its gradient is that of the
+noise of unknown covariance ([ljung-1999], (7.87)-(7.96) and Section 15.2). Its gradient is that of the
 weighted cost at W = N det(S / N)^(1/p) S^-1 / p, and so is its Hessian up to what vanishes at the minimum.
 """
 
@@ -24,8 +24,11 @@ from inputdesign_cli.plant.polynomial import Array
 
 @dataclass(frozen=True)
 class Sums:
-    """Over the samples, for each run: epsilon epsilon^T (runs, p, p), psi epsilon^T (runs, m, p) and
-    psi psi^T (runs, m, m), psi the gradients of one output after the other, m in all."""
+    """Sums of products of residuals and gradients over the samples, for each run.
+
+    epsilon epsilon^T (runs, p, p), psi epsilon^T (runs, m, p) and psi psi^T (runs, m, m), psi the gradients
+    of one output after the other, m in all.
+    """
 
     errors: NDArray[np.float64]
     slopes: NDArray[np.float64]

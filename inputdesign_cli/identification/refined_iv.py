@@ -1,9 +1,7 @@
 """Simplified refined instrumental variables for transfer matrices in s (SRIVC), all entries at once.
 
-P. C. Young and A. J. Jakeman, Int. J. Control 31 (1980) 741-764; P. C. Young, H. Garnier and M. Gilson, in
-Garnier and Wang (eds.), Identification of Continuous-time Models from Sampled Data (2008), Chapter 4; for
-entries with denominators of their own H. Garnier, M. Gilson, P. C. Young and E. Huselstein, Control
-Engineering Practice 15 (2007) 471-486.
+[young-jakeman-1980]; [garnier-wang-2008], Chapter 4; for entries with denominators of their own
+[garnier-2007].
 
 Multiplied by a_ij / a_ij(previous) the output error of an entry is linear in its new a_ij and b_ij: a
 regression on outputs and inputs filtered by s^k / a_ij(previous). What the other entries cause is taken off

@@ -1,4 +1,4 @@
-"""Is what the model leaves unexplained white, and free of the past input? Ljung (1999), Section 16.6.
+"""Is what the model leaves unexplained white, and free of the past input? [ljung-1999], Section 16.6.
 
 Of several outputs all channels are tested at once, in units of the residuals' own covariance.
 """
@@ -41,8 +41,8 @@ class ResidualTest:
 def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
     """Correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
 
-    The portmanteau statistic of Hosking, J. American Statistical Association 75 (1980) 602-608, with the
-    weights of Ljung and Box, to which it reduces for one output.
+    The portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978], to which it reduces for
+    one output.
 
     Args:
         errors: (samples, p).

@@ -1,9 +1,9 @@
 """Where to begin a prediction-error search: estimates that need no search.
 
 A long ARX model gives an estimate of the noise and of the noise-free output. With the first, A, B and C
-follow by linear regression (Hannan and Rissanen, Biometrika 69 (1982) 81-94); with the second, B and F by
-Steiglitz and McBride's iteration (IEEE Trans. Automatic Control 10 (1965) 461-464) and C and D from what is
-left. With several inputs the iteration takes one at a time, on the output less what the others cause.
+follow by linear regression ([hannan-rissanen-1982]); with the second, B and F by the iteration of
+[steiglitz-mcbride-1965], and C and D from what is left. With several inputs the iteration takes one at a
+time, on the output less what the others cause.
 """
 
 from __future__ import annotations

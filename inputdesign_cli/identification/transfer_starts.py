@@ -1,10 +1,9 @@
 """Where to begin a search for a transfer matrix in s: estimates that need no start themselves.
 
 Output by output, derivatives of inputs and output are had through a state-variable filter
-1 / (s + cutoff)^m, and a model with one denominator for the whole row follows by least squares: Young and
-Jakeman (1980); Garnier and Wang (eds., 2008), Chapter 1. Entries of the orders asked for are then fitted
-to its frequency response by the iteration of Sanathanan and Koerner, IEEE Trans. Automatic Control 8 (1963)
-56-58.
+1 / (s + cutoff)^m, and a model with one denominator for the whole row follows by least squares
+([young-jakeman-1980]; [garnier-wang-2008], Chapter 1). Entries of the orders asked for are then fitted to its
+frequency response by the iteration of [sanathanan-koerner-1963].
 """
 
 from __future__ import annotations

@@ -27,10 +27,12 @@ class Named(Protocol):
     """A model, as far as its parameters go."""
 
     @property
-    def names(self) -> tuple[str, ...]: ...
+    def names(self) -> tuple[str, ...]:
+        """Of the k parameters."""
 
     @property
-    def theta(self) -> Array: ...
+    def theta(self) -> Array:
+        """(k,): their values."""
 
 
 class Coordinates:
@@ -42,7 +44,8 @@ class Coordinates:
     if TYPE_CHECKING:  # a field or a property of the experiment; a default here would become the field's
 
         @property
-        def model(self) -> Named: ...
+        def model(self) -> Named:
+            """What is to be identified."""
 
     @property
     def size(self) -> int:

@@ -46,6 +46,7 @@ class Experiment(Coordinates):
 
     @property
     def inputs(self) -> int:
+        """Number of inputs r."""
         return self.model.inputs
 
     @cached_property

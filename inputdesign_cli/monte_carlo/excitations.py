@@ -20,15 +20,14 @@ class Excitation(Protocol):
     """What the runs apply."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """How results call it."""
 
     def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
         """Records (runs, samples, r), each a realisation of its own."""
-        ...
 
     def information(self, experiment: Experiment) -> Array:
         """What it tells in theory, (k, k) in raw parameters, prior information included."""
-        ...
 
 
 @dataclass(frozen=True)

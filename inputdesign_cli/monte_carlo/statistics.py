@@ -11,7 +11,7 @@ _DRAWS = 2000
 
 
 def binomial_limits(successes: int, runs: int, *, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact two-sided confidence limits of a probability (Clopper and Pearson, Biometrika 26 (1934))."""
+    """Exact two-sided confidence limits of a probability, [clopper-pearson-1934]."""
     tail = 0.5 * (1.0 - confidence)
     lower = 0.0 if successes == 0 else scipy.special.betaincinv(successes, runs - successes + 1, tail)
     upper = 1.0 if successes == runs else scipy.special.betaincinv(successes + 1, runs - successes, 1 - tail)
@@ -23,7 +23,7 @@ def wishart_range(
 ) -> tuple[float, float]:
     """Where the eigenvalues of the sample covariance of `runs` vectors N(0, I) lie, all at once.
 
-    From draws of the Wishart distribution by Bartlett's decomposition.
+    From draws of the Wishart distribution by the decomposition of [bartlett-1933].
     """
     degrees = runs - 1
     lower = np.tril(rng.standard_normal((_DRAWS, size, size)), -1)

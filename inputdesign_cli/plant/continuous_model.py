@@ -58,10 +58,12 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @property
     def outputs(self) -> int:
+        """Number of outputs p."""
         return len(self.numerator)
 
     @property
     def inputs(self) -> int:
+        """Number of inputs r."""
         return len(self.numerator[0])
 
     @cached_property
@@ -123,9 +125,11 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
         return _frequency_plane(self.poles)
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
         return _frequency_plane(
             np.concatenate([polynomial_roots(p[output][input]) for p in (self.numerator, self.denominator)])
         )
@@ -147,6 +151,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return Fraction(numerator, self._below(s, output, input), above, below)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
         s = 1j * np.asarray(w, dtype=float)
         G = np.zeros((s.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
@@ -154,6 +159,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
         s = 1j * np.asarray(w, dtype=float)
         gradient = np.zeros((s.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
         for index, parameter in enumerate(self.parameters):

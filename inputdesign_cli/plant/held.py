@@ -35,6 +35,7 @@ class HeldEntry:
 
     @classmethod
     def of(cls, numerator: Array, denominator: Array, sample_time: float) -> HeldEntry:
+        """b / a, ascending in s, held over `sample_time`."""
         n = denominator.size - 1
         padded = np.zeros(n + 1)
         padded[: numerator.size] = numerator
@@ -54,14 +55,17 @@ class HeldEntry:
 
     @property
     def order(self) -> int:
+        """n, the degree of the denominator."""
         return self.denominator.size - 1
 
     @property
     def direct(self) -> float:
+        """What acts without delay: b / a at infinite frequency."""
         return float(self.numerator[-1])
 
     @cached_property
     def gain(self) -> Array:
+        """(2 order,): the row of what acts with a delay."""
         return self.row(self.numerator - self.direct * self.denominator, 1)
 
     def states(self, z: ComplexArray) -> ComplexArray:

@@ -20,8 +20,10 @@ _WELL_POSED = 1e-9
 
 @dataclass(frozen=True)
 class LoopResponse:
-    """Transfer functions (n,), of several channels matrices (n, to, from), from the excitation x (r in closed
-    loop, u in open loop) and from e."""
+    """Transfer functions (n, to, from) from the excitation x and from e.
+
+    x is r in closed loop and u in open loop.
+    """
 
     y_x: ComplexArray
     u_x: ComplexArray
@@ -176,7 +178,7 @@ def _refuse_instantaneous() -> None:
     """Raise `SpecError` (`algebraic-loop`): both plant and controller act at once.
 
     Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an estimate
-    from u and y, is biased. Ljung (1999), Chapter 13, asks for a delay in one of them.
+    from u and y, is biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
     """
     raise bad_spec(
         "algebraic-loop",

@@ -32,55 +32,50 @@ class Model(Protocol):
     continuous: bool
 
     @property
-    def inputs(self) -> int: ...
+    def inputs(self) -> int:
+        """Number of inputs r."""
 
     @property
-    def outputs(self) -> int: ...
+    def outputs(self) -> int:
+        """Number of outputs p."""
 
     @property
     def covariance(self) -> Array:
         """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
-        ...
 
     @property
-    def names(self) -> tuple[str, ...]: ...
+    def names(self) -> tuple[str, ...]:
+        """Names of the k parameters."""
 
     @property
-    def theta(self) -> Array: ...
+    def theta(self) -> Array:
+        """(k,): values of the parameters."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
         """(k,): the parameters on which G depends."""
-        ...
 
     @property
     def singularities(self) -> ComplexArray:
         """Poles of G and of all gradients, as points of the frequency plane."""
-        ...
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Poles and zeros of one entry of G, as points of the frequency plane."""
-        ...
 
     def is_fraction(self, output: int, input: int) -> bool:
         """Whether numerator and denominator of an entry of G are affine in theta."""
-        ...
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
         """One entry of G as such a fraction, where `is_fraction`."""
-        ...
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
-        ...
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
-        ...
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> Self:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
-        ...
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest.
@@ -88,15 +83,12 @@ class Model(Protocol):
         Args:
             step: time between samples of a plant in continuous time; others know theirs.
         """
-        ...
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r): the gradient of the one-step prediction that u causes."""
-        ...
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p): the gradient of the one-step prediction that e causes."""
-        ...
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
         """psi = -d epsilon / d theta (n, k, p, m) of the one-step prediction.
@@ -104,7 +96,6 @@ class Model(Protocol):
         `y` (n, p, m), `u` (n, r, m) and `e` (n, p, m) are the transfer functions from m common sources to
         outputs, inputs and prediction errors epsilon.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -119,6 +110,7 @@ class Parameter:
 
     @property
     def name(self) -> str:
+        """Letter, power and channels, as `b1` or `f2[1,2]`."""
         return f"{self.letter}{self.power}{self.label}"
 
 
@@ -133,14 +125,17 @@ class Parametrised:
     if TYPE_CHECKING:
 
         @property
-        def parameters(self) -> tuple[Parameter, ...]: ...
+        def parameters(self) -> tuple[Parameter, ...]:
+            """All of them, in the order of theta."""
 
     @cached_property
     def names(self) -> tuple[str, ...]:
+        """Names of the k parameters."""
         return tuple(parameter.name for parameter in self.parameters)
 
     @cached_property
     def theta(self) -> Array:
+        """(k,): values of the parameters."""
         return np.array([parameter.value for parameter in self.parameters])
 
 
@@ -150,21 +145,27 @@ class WhiteNoise:
     if TYPE_CHECKING:
 
         @property
-        def outputs(self) -> int: ...
+        def outputs(self) -> int:
+            """Number of outputs p."""
 
         @property
-        def theta(self) -> Array: ...
+        def theta(self) -> Array:
+            """(k,): values of the parameters."""
 
-        def plant_gradient(self, w: ArrayLike) -> ComplexArray: ...
+        def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+            """dG/dtheta (n, k, p, r)."""
 
     @property
     def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): all of them."""
         return np.ones(self.theta.size, dtype=bool)
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """(n, k, p, r): dG/dtheta."""
         return self.plant_gradient(w)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """(n, k, p, p): zero."""
         return np.zeros((np.size(w), self.theta.size, self.outputs, self.outputs), dtype=complex)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:

@@ -69,17 +69,21 @@ class PolynomialLoop(Loop):
 
     @property
     def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction."""
         m = self.model
         return join_roots(roots_in_z(p) for p in [*m.C, *m.D, *(f for row in m.F for f in row)])
 
     @property
     def instantaneous(self) -> Array:
+        """(p + r, p + r): what acts without delay."""
         return self._left[..., 0]
 
     def left_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p + r, p + r): the matrix on the left of `Loop`."""
         return at(self._left, unit_circle(w))
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """R H (n, p, p)."""
         m, q = self.model, unit_circle(w)
         found = np.zeros((q.size, m.outputs, m.outputs), dtype=complex)
         for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):
@@ -87,6 +91,7 @@ class PolynomialLoop(Loop):
         return found
 
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
         m, samples = self.model, r.shape[-2]
         right = np.empty((*r.shape[:-1], m.outputs + m.inputs))
         for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):

@@ -62,10 +62,12 @@ class PolynomialModel(Parametrised):
 
     @property
     def outputs(self) -> int:
+        """Number of outputs p."""
         return len(self.B)
 
     @property
     def inputs(self) -> int:
+        """Number of inputs r."""
         return len(self.B[0])
 
     @cached_property
@@ -123,6 +125,7 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
 
     def per_output(self, rows: Sequence[Array]) -> tuple[Array, ...]:
@@ -134,14 +137,17 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
         polynomials = [*self.A, *self.C, *self.D, *(p for row in self.F for p in row)]
         return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
         polynomials = (self._row(self.A, output), self.F[output][input], self.B[output][input])
         return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
         q = unit_circle(w)
         G = np.zeros((q.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
@@ -176,6 +182,7 @@ class PolynomialModel(Parametrised):
         return evaluate(self._row(self.A, i), q) * evaluate(self.F[i][j], q)
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
@@ -192,11 +199,13 @@ class PolynomialModel(Parametrised):
         return gradient
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dtheta (n, k, p, r)."""
         G = self.plant_at(w)
         u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (G.shape[0], self.inputs, self.inputs))
         return self.prediction_gradient(w, G, u, np.zeros_like(G))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dtheta (n, k, p, p)."""
         H = self.noise_at(w)
         e = np.broadcast_to(np.eye(self.outputs, dtype=complex), H.shape)
         return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)

@@ -42,20 +42,24 @@ class SampledLoop(Loop):
 
     @cached_property
     def closed_poles(self) -> ComplexArray:
+        """All poles of the loop in z."""
         A, B, C = self._states
         return np.linalg.eigvals(A + B @ np.linalg.solve(self.instantaneous, C)).astype(complex)
 
     @property
     def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction."""
         return self.model.poles
 
     @cached_property
     def instantaneous(self) -> Array:
+        """(p + r, p + r): what acts without delay."""
         p, r = self.model.outputs, self.model.inputs
         G, C = self.model.realisation.D, self.controller.realisation.D
         return np.block([[np.eye(p), -G], [C, np.eye(r)]])
 
     def left_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p + r, p + r): the matrix on the left of `Loop`."""
         (P, below), G = self.controller.fraction_at(w), self.model.plant_at(w)
         p, r = self.model.outputs, self.model.inputs
         left = np.zeros((len(G), p + r, p + r), dtype=complex)
@@ -64,10 +68,12 @@ class SampledLoop(Loop):
         return left
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """R H (n, p, p)."""
         p = self.model.outputs
         return np.broadcast_to(np.eye(p, dtype=complex), (np.size(w), p, p))
 
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
         A, B, C = self._states
         at_once = np.linalg.inv(self.instantaneous).T
         found = np.concatenate([e, r], axis=-1) @ at_once

@@ -32,22 +32,27 @@ class SampledModel(WhiteNoise):
 
     @property
     def outputs(self) -> int:
+        """Number of outputs p."""
         return self.continuous_plant.outputs
 
     @property
     def inputs(self) -> int:
+        """Number of inputs r."""
         return self.continuous_plant.inputs
 
     @property
     def covariance(self) -> Array:
+        """(p, p) of e."""
         return self.continuous_plant.covariance
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Names of the k parameters."""
         return self.continuous_plant.names
 
     @property
     def theta(self) -> Array:
+        """(k,): values of the parameters."""
         return self.continuous_plant.theta
 
     @cached_property
@@ -85,9 +90,11 @@ class SampledModel(WhiteNoise):
 
     @cached_property
     def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
         return logarithmic_distance(self.poles)
 
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
         entry = self._entries.get((output, input))
         return np.zeros(0, dtype=complex) if entry is None else logarithmic_distance(entry.roots)
 
@@ -100,6 +107,7 @@ class SampledModel(WhiteNoise):
         raise ValueError("a sampled entry is no fraction that is affine in the parameters of s")
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
         z = np.exp(1j * np.asarray(w))
         G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
         for (i, j), entry in self._entries.items():
@@ -107,6 +115,7 @@ class SampledModel(WhiteNoise):
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
         z = np.exp(1j * np.asarray(w))
         parameters = self.continuous_plant.parameters
         gradient = np.zeros((z.size, len(parameters), self.outputs, self.inputs), dtype=complex)

@@ -36,12 +36,10 @@ class ScalarTransfer(Protocol):
 
     def at(self, w: ArrayLike) -> ComplexArray:
         """Its value at frequencies `w`, same shape."""
-        ...
 
     @property
     def singularities(self) -> ComplexArray:
         """Poles and zeros as points of the frequency plane, frequency + j damping."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ class Row:
 
     @property
     def passed(self) -> bool:
+        """Whether it was computed and lies within its tolerance."""
         return self.deviation is not None and abs(self.deviation) <= self.quantity.tolerance
 
     def as_dict(self) -> dict[str, Json]:

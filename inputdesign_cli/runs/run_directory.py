@@ -103,8 +103,9 @@ def write_text(path: Path, text: str) -> None:
 
 
 def replace_text(path: Path, text: str | Iterable[str]) -> None:
-    """Write a text file (or one that comes in pieces) so that a reader finds the old one or the new one,
-    whole, whenever the writer is killed.
+    """Write a text file, or one that comes in pieces, so that it is whole whenever the writer is killed.
+
+    A reader finds the old one or the new one.
 
     Raises:
         OutputError: `output-not-writable`, `output-full`.

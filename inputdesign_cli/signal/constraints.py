@@ -59,9 +59,8 @@ def largest_move(values: Array) -> float:
 def compressed(values: Array, peak: float) -> Array:
     """The values (n,) of the same periodogram, and with their peak lowered towards `peak`.
 
-    Clip and restore: E. van der Ouderaa, J. Schoukens and J. Renneboog, IEEE Trans. Instrumentation and
-    Measurement 37 (1988) 145-147. The moduli of the discrete Fourier transform are kept, its phases
-    give way.
+    Clip and restore, [van-der-ouderaa-1988]: the moduli of the discrete Fourier transform are kept, its
+    phases give way.
     """
     best, least = values, float(np.abs(values).max())
     modulus = np.abs(np.fft.rfft(values))

@@ -1,7 +1,6 @@
 """Phases of a low crest factor: the p-norm of the record minimised for p rising.
 
-P. Guillaume, J. Schoukens, R. Pintelon and I. Kollar, IEEE Trans. Instrumentation and Measurement 40
-(1991) 982-989: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak
+[guillaume-1991]: minimising the p-norm for p = 4, 8, 16, .. leads past the poor local optima of the peak
 itself. Several signals that are linear in the same sinusoids (the output, the moves) may be kept low at
 once: the joint peak is that of all of them, each over its own bound.
 """

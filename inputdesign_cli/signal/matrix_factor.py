@@ -1,7 +1,7 @@
 """Causal factors of matrix spectra, by Wilson's method on a grid of the circle.
 
 Phi = psi psi^*, psi causal with causal inverse: white noise of covariance I through psi has the spectrum.
-G. Wilson, SIAM J. Appl. Math. 23 (1972) 420-426, in the form with FFTs.
+[wilson-1972], in the form with FFTs.
 """
 
 from __future__ import annotations

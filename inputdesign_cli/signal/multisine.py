@@ -39,8 +39,9 @@ def multisine_record(
 
     Args:
         vectors: `orthogonal`: r blocks, line vectors root(P) e^{j psi} q_b with q_b the columns of an
-            orthogonal matrix. `random`: one block, root(P) times independent uniform phases (spectral design
-            paper, Appendix B, its misprints mended: uniform phases, sqrt(N), H_im); P is met on average only.
+            orthogonal matrix. `random`: one block, root(P) times independent uniform phases
+            ([mohan-spectral], Appendix B, its misprints mended: uniform phases, sqrt(N), H_im); P is met on
+            average only.
         angles: (L,) the phases psi, drawn uniformly when not given.
     """
     number, r = lines.powers.shape[:2]

@@ -17,7 +17,7 @@ LimitedResponse = tuple[ComplexArray, float]
 
 
 def schroeder_phases(lines: Lines, samples: int) -> Array:
-    """(L,): Schroeder's phases of the total power, common to all inputs and periods."""
+    """(L,): the phases of [schroeder-1970] for the total power, common to all inputs and periods."""
     return _common(lines, samples, lines.totals).schroeder_phases()
 
 

@@ -1,7 +1,9 @@
 """Low-order rational filters from the taps of a causal factor, stable by construction.
 
-Balanced truncation of the tapped delay line: the leading singular vectors of the Hankel matrix of the taps
-give a state-space model whose poles lie inside the unit circle (Pernebo and Silverman 1982).
+The taps h_0 .. h_L are the impulse response of a filter of many states, a tapped delay line. Their Hankel
+matrix, with h_{i+j+1} in block (i, j), takes past inputs to future outputs. Its singular values tell how much
+each state carries, and keeping the largest is a balanced truncation ([pernebo-silverman-1982]), whose poles
+lie inside the unit circle. The model is read off the singular vectors as in [kung-1978].
 """
 
 from __future__ import annotations
@@ -73,7 +75,13 @@ class RationalFilter:
 
 
 def rational_filter(taps: Array, order: int) -> RationalFilter:
-    """The balanced truncation to `order` states for each input of the filter with `taps` (L, n, n)."""
+    """The filter with `taps` (L, n, n), cut down to `order` states for each input.
+
+    With the Hankel matrix H = U S V^T, cut to its largest singular values, U S^(1/2) stacks C, C A, C A^2, ..
+    and S^(1/2) V^T is [B, A B, A^2 B, ..]: C and B are their first blocks, and A is what takes the first
+    stack to itself moved up by one block. H is never formed: its products with vectors are convolutions with
+    the taps, made by FFT, and these are all that the singular value decomposition asks for.
+    """
     taps = taps[: 2 * _LONGEST]
     n = taps.shape[1]
     half = (taps.shape[0] - 1) // 2

@@ -57,9 +57,9 @@ class Sinusoids:
     def schroeder_phases(self) -> Array:
         """(L,): phases whose group delay follows the share of power below each line.
 
-        phi_n = phi_1 - 2 pi sum_{l<n} (n - l) p_l with the relative powers p_l: M. R. Schroeder, IEEE
-        Trans. Information Theory 16 (1970) 85-89. It presumes equally spaced lines; for others the
-        phase is the integral of that group delay over frequency, which is the same thing.
+        [schroeder-1970]: phi_n = phi_1 - 2 pi sum_{l<n} (n - l) p_l with the relative powers p_l. It presumes
+        equally spaced lines; for others the phase is the integral of that group delay over frequency, which
+        is the same thing.
         """
         share = self.powers / self.powers.sum()
         below = np.cumsum(share) - 0.5 * share

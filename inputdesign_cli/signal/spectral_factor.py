@@ -1,7 +1,7 @@
 """Spectral factors of FIR spectra by Wilson's method.
 
 Phi(w) = |a_0 + a_1 e^{-jw} + .. + a_m e^{-jmw}|^2 with a of minimum phase: white noise of variance
-one through a has the autocovariances c_0 .. c_m. G. Wilson, SIAM J. Numer. Anal. 6 (1969) 1-7.
+one through a has the autocovariances c_0 .. c_m. [wilson-1969].
 """
 
 from __future__ import annotations

@@ -27,8 +27,10 @@ def json_schema() -> dict[str, Plain]:
 
 
 def _tidy(node: Plain) -> Plain:
-    """Without what pydantic adds for Python alone: null for absent keys, class names as titles, defaults
-    that are whole sections."""
+    """Without what pydantic adds for Python alone.
+
+    That is null for absent keys, class names as titles, and defaults that are whole sections.
+    """
     if isinstance(node, list):
         return [_tidy(item) for item in node]
     if not isinstance(node, dict):

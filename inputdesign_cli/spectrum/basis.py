@@ -83,81 +83,63 @@ class Basis(Protocol):
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        ...
 
     @property
     def inputs(self) -> int:
         """Number of inputs r."""
-        ...
 
     @property
     def has_density(self) -> bool:
         """Whether the family has a density over frequency (else it consists of sinusoids)."""
-        ...
 
     @property
     def free(self) -> bool:
         """Whether it grows to every spectrum whatever."""
-        ...
 
     @property
     def degree(self) -> int:
         """How fast a density may oscillate over the band, as the degree of a polynomial."""
-        ...
 
     @property
     def knots(self) -> Array:
         """Frequencies at which the density may have a kink."""
-        ...
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:
         """Phi at frequencies `w` (n,)."""
-        ...
 
     def lines(self, x: Array) -> tuple[Array, ComplexArray]:
         """Frequencies (L,), ascending, and power matrices (L, r, r) of the sinusoids that carry power."""
-        ...
 
     def spread(self, powers: Array) -> Array:
         """(size,): excitation with these powers (r,) of the channels, uncorrelated, flat over the family."""
-        ...
 
     @property
     def even(self) -> Array:
         """(size,): the same of total power one, even over the channels."""
-        ...
 
     def in_units(self, units: Array) -> Basis:
         """The family for channels of these units (r,); only where that changes where a design begins."""
-        ...
 
     def moving_average(self, x: Array) -> Array | None:
         """c_0 .. c_m of one input, where a moving average has this spectrum; else None."""
-        ...
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
-        ...
 
     def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
         """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function."""
-        ...
 
     def coarser(self) -> Sequence[Basis]:
         """Smaller families to design first, from coarse to fine; x of each is the head of x of the next."""
-        ...
 
     def first_face(self, price: Functional) -> Face:
         """A face rich enough to identify every parameter, scaled so that each column has a like price."""
-        ...
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """How far the dual point may be scaled, and where it is tightest."""
-        ...
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[Basis, Face]:
         """A face that holds the current solution `y` and the `directions` (the basis may grow with it)."""
-        ...
 
     def described(self, x: Array, unit: float) -> Mapping[str, object]:
         """The type of the family and what it takes to restate the spectrum, as plain data and arrays.
@@ -165,7 +147,6 @@ class Basis(Protocol):
         Args:
             unit: what frequencies are divided by to be those of the user.
         """
-        ...
 
 
 class DensityFamily:
@@ -178,9 +159,11 @@ class DensityFamily:
     if TYPE_CHECKING:
 
         @property
-        def inputs(self) -> int: ...
+        def inputs(self) -> int:
+            """Number of inputs r."""
 
-        def spread(self, powers: Array) -> Array: ...
+        def spread(self, powers: Array) -> Array:
+            """See `Basis`."""
 
     @property
     def even(self) -> Array:

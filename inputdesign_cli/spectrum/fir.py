@@ -41,10 +41,12 @@ class FirBasis(DensityFamily):
 
     @property
     def size(self) -> int:
+        """Number of unknowns."""
         return self.order + 1
 
     @property
     def degree(self) -> int:
+        """That of the trigonometric polynomial."""
         return self.order
 
     def spread(self, powers: Array) -> Array:

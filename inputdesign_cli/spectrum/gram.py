@@ -46,6 +46,7 @@ class GramBasis(DensityFamily, ABC):
 
     @property
     def degree(self) -> int:
+        """That of the polynomial."""
         return self.order
 
     @property

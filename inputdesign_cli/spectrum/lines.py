@@ -76,10 +76,12 @@ class LinesBasis:
 
     @property
     def size(self) -> int:
+        """Number of unknowns."""
         return self.frequencies.size
 
     @property
     def inputs(self) -> int:
+        """Number of inputs r."""
         return self.directions.shape[1]
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:

@@ -27,6 +27,7 @@ class MatrixFirBasis(GramBasis):
 
     @property
     def size(self) -> int:
+        """Number of unknowns."""
         return svec_length(self.inputs) + self.order * self.inputs**2
 
     def spread(self, powers: Array) -> Array:
@@ -37,6 +38,7 @@ class MatrixFirBasis(GramBasis):
         return flat
 
     def of_order(self, order: int) -> MatrixFirBasis:
+        """The same with a lower order."""
         return MatrixFirBasis(self.inputs, order)
 
     def autocovariances(self, x: Array) -> NDArray[np.float64]:

@@ -43,6 +43,7 @@ class PolynomialBasis(GramBasis):
 
     @property
     def size(self) -> int:
+        """Number of unknowns."""
         n = self.gram_order
         return n * n if self.hermitian else svec_length(n)
 
@@ -53,6 +54,7 @@ class PolynomialBasis(GramBasis):
         return hvec(flat.astype(complex)) if self.hermitian else svec(flat)
 
     def of_order(self, order: int) -> PolynomialBasis:
+        """The same with a lower order."""
         return replace(self, order=order)
 
     def functions(self, w: ArrayLike) -> Array:
@@ -103,9 +105,11 @@ class PolynomialBasis(GramBasis):
         return hvec(outer) if self.hermitian else svec(outer.real)
 
     def gram(self, vector: Array) -> NDArray:
+        """The matrix that stands for a functional."""
         return self.matrix(vector)
 
     def products(self, generators: NDArray) -> Array:
+        """See `GramBasis`."""
         rows, columns, scale, imaginary = self._layout()
         left, right, pair_scale = svec_layout(generators.shape[1])
         above, below = generators[rows], generators[columns].conj()

@@ -53,7 +53,7 @@ def hvec_layout(order: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, 
 
 
 def hvec(matrix: NDArray[np.complex128]) -> Array:
-    """(..., k, k) Hermitian -> (..., k^2) real, by columns; tr(A B) = hvec(A) . hvec(B)."""
+    """Hermitian matrices (..., k, k) as real vectors (..., k^2), by columns; tr(A B) is the inner product."""
     rows, columns, scale, imaginary = hvec_layout(matrix.shape[-1])
     entries = matrix[..., rows, columns] * scale
     return np.where(imaginary, entries.imag, entries.real)

@@ -34,10 +34,12 @@ class TabulatedSpectrum(DensityFamily):
 
     @property
     def knots(self) -> Array:  # type: ignore[override]
+        """The frequencies of the table."""
         return self.frequency
 
     @property
     def inputs(self) -> int:
+        """Number of inputs r."""
         return self.phi.shape[1]
 
     def density(self, x: Array, w: ArrayLike) -> NDArray:

@@ -104,8 +104,7 @@ def parse_settings(settings: Sequence[str]) -> tuple[list[str], list[Axis]]:
 
 
 def build_grid(block: Sweep | None, axes: Sequence[Axis], *, zipped: bool) -> Grid:
-    """The grid of the spec's `sweep` block, in which the axes of the command line replace or join those
-    of the block.
+    """The grid of the spec's `sweep` block; axes of the command line replace those of the block or join them.
 
     Raises:
         SpecError: `sweep-empty`, `sweep-lengths`, `sweep-too-large`.

@@ -1,4 +1,4 @@
-"""`spectrum.factor_columns`: the design held to a factor of few columns, as in the spectral design paper."""
+"""`spectrum.factor_columns`: the design held to a factor of few columns, as in [mohan-spectral]."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Climbed:
 def restrict_columns(asked: FewColumns, design: Design) -> Climbed:
     """Climb from the optimum cut to so few columns and from random factors.
 
-    The bound of the design over all factors stays: it is the paper's upper bound.
+    The bound of the design over all factors stays: it is the upper bound of [mohan-spectral].
     """
     problem, x = design.problem, design.result.x
     basis, criterion = problem.basis, problem.requirements[0].criterion

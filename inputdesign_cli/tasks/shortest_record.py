@@ -19,7 +19,8 @@ _FINE = 0.01
 class MakeRecord(Protocol):
     """Makes the best record of a length, of so many candidates."""
 
-    def __call__(self, samples: int, candidates: int | None = None) -> Record: ...
+    def __call__(self, samples: int, candidates: int | None = None) -> Record:
+        """The best record of `samples`; `candidates` are as many as usual when not given."""
 
 
 def shortest_record(

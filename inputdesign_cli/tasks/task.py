@@ -17,11 +17,9 @@ class Task(Protocol):
 
     def check(self) -> None:
         """Whatever can be wrong before anything long is computed; building has checked the rest."""
-        ...
 
     def solve(self) -> Results:
         """The answer: a design with its proof, or what a given excitation buys."""
-        ...
 
     def simulate(self, executor: Executor | None = None) -> Results:
         """The answer, with the experiment tried many times on the true system.
@@ -29,4 +27,3 @@ class Task(Protocol):
         Args:
             executor: where batches of runs are computed (default: in this process).
         """
-        ...

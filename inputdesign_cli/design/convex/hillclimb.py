@@ -1,6 +1,6 @@
 """Spectra with a factor of few columns by the bilinear hill-climb of [mohan-spectral], Figure 3.
 
-Phi = 1/2 W H H^T W^T with H (n, c): M is quadratic in H. The paper fixes one argument of the bilinear
+Phi = 1/2 W H H^T W^T with H (n, c): M is quadratic in H. The source fixes one argument of the bilinear
 form M(X, Y) and climbs in the other, which need not climb (for E it can lose). Since M(X - Y, X - Y) >= 0,
 M(X) >= 2 M(X, Y) - M(Y): making the criterion best of the right-hand side, which is affine in X, never
 loses. What it reaches is a lower bound of the best over all spectra; it depends on the start, so there

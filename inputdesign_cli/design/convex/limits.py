@@ -26,6 +26,7 @@ class PowerLimit:
 
     @property
     def key(self) -> str:
+        """Its name in the spec."""
         return f"limits.{self.kind}_power"
 
 
@@ -64,8 +65,11 @@ class DensityPlace:
 
 @dataclass(frozen=True)
 class DensityBreach:
-    """How a density limit is used at a place: `ratio` is v^* Phi v over the level, or for a lower limit two
-    minus that, so that it exceeds one where the limit is missed and is affine in Phi."""
+    """How a density limit is used at a place.
+
+    `ratio` is v^* Phi v over the level, or for a lower limit two minus that, so that it exceeds one where the
+    limit is missed and is affine in Phi.
+    """
 
     place: DensityPlace
     ratio: float

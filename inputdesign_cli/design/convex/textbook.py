@@ -1,4 +1,4 @@
-"""The papers' own program: one LMI per grid frequency, positivity by a Gram matrix or the KYP lemma, cvxpy.
+"""The program of the literature: one LMI per grid frequency, positivity by a Gram matrix or the KYP lemma.
 
 [bombois-least-costly], (13) and (19) with footnote 2; the lemma: [rantzer-1996]. It guarantees nothing
 between the grid frequencies; its multipliers still prove a lower bound for the problem at every frequency,

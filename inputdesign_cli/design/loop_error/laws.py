@@ -32,19 +32,15 @@ class ControlLaw(Protocol):
     @property
     def target(self) -> TransferMatrix | None:
         """T where the law gives it whatever the plant; None where it follows from the plant."""
-        ...
 
     def complementary(self, w: ArrayLike) -> ComplexArray:
         """T = G C (I + G C)^-1, the loop that the true plant would give."""
-        ...
 
     def controller(self, G: ComplexArray, w: ArrayLike) -> ComplexArray:
         """C(G)."""
-        ...
 
     def noise_jacobian(self, G: ComplexArray, w: ArrayLike) -> ComplexArray | None:
         """d vec C / d vec H: (K, n^2, n^2); None where C ignores the noise model."""
-        ...
 
     def check(self, plant: MatrixPlant, *, key: str) -> None:
         """The controller can run on this plant: it is causal, stable, and finite on the circle.
@@ -52,12 +48,10 @@ class ControlLaw(Protocol):
         Raises:
             SpecError: see `checks`.
         """
-        ...
 
     @property
     def singularities(self) -> ComplexArray:
         """Poles, and zeros of S, as points of the frequency plane."""
-        ...
 
 
 def propagation(law: ControlLaw, G: ComplexArray, w: ArrayLike) -> ComplexArray:

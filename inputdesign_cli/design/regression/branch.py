@@ -1,6 +1,7 @@
 """Branch and bound over rho_1 .. rho_{m-1}: a proof that no Toeplitz shape has less than a given error.
 
-Where these are fixed the problem is convex (`steps.extend`), and the lift of a small box is nearly exact.
+The method is [horst-tuy-1996]. Where all of these are fixed the problem is convex (`steps.extend`), and the
+lift of a small box is nearly exact.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ def design_toeplitz(
         energy: the trace of R; the error is minimised.
         tolerance: the relative gap to be proved; larger gaps are proved where it cannot be.
         most_nodes: how many boxes the proof may bound; None: what takes seconds.
-        alternating: the paper's alternation, run from white, in place of sequential convex programming;
+        alternating: that of [eckhard-mse], run from white, in place of sequential convex programming;
             its design is kept as it is and only the bound comes from here.
 
     Raises:

@@ -136,6 +136,7 @@ class Weight:
     biased: bool = True
 
     def __call__(self, shape: Autocorrelations) -> float:
+        """The weighted sum for a shape."""
         bias = shape.bias_squared if self.biased else 0.0
         return bias + self.kappa * shape.v
 

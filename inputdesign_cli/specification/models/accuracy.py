@@ -37,6 +37,9 @@ Deviations = Annotated[
     Wording("a mapping", "write parameter names and numbers: {b1: 0.01}"),
 ]
 
+# Every other key of `accuracy` is a requirement; the mean-squared error is one where it has a target.
+_NO_REQUIREMENTS = ("criterion", "scale", "closed_loop_error", "mean_squared_error")
+
 
 class Sensitivity(Section):
     """An admissible error that keeps the sensitivity S of a control loop: |W S| <= 1, or |S| below a peak."""
@@ -188,7 +191,7 @@ class Accuracy(Section):
     @property
     def requirements(self) -> tuple[str, ...]:
         """The keys of the requirements that are given, in the order of the contract."""
-        names = ("model_error", "information", "application", "weighted_variance", "standard_deviation")
+        names = (key for key in type(self).model_fields if key not in _NO_REQUIREMENTS)
         bounded = self.at("mean_squared_error", "target") is not None
         return self.stated(*names, *(("mean_squared_error",) if bounded else ()))
 

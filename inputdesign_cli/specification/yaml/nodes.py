@@ -26,8 +26,10 @@ _FORBIDDEN = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000
 
 @dataclass
 class Node:
-    """A scalar (`value` is its text), a list of nodes, a mapping (keys and values in turn), or an alias of
-    another node; where it stands is counted from 1 in the text that the parser saw."""
+    """A scalar (`value` is its text), a list of nodes, a mapping (keys and values in turn), or an alias.
+
+    Where it stands is counted from 1 in the text that the parser saw.
+    """
 
     kind: str
     value: Plain

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,22 +36,7 @@ def build_requirements(spec: Spec, experiment: Experiment) -> list[RequirementFa
             cannot be met or is not supported.
         DataError: a table cannot be used.
     """
-    accuracy, names = spec.accuracy, experiment.model.names
-    makers = [_moved(error) for error in build_model_errors(spec, experiment)]
-    if accuracy.information is not None:
-        stated, key = accuracy.information, "accuracy.information"
-        makers.append(_target(spec, names, stated.matrix, stated.parameters, key, "information"))
-    if accuracy.application is not None:
-        # M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over.
-        asked, key = accuracy.application, "accuracy.application"
-        chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
-        hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
-        makers.append(_target(spec, names, hessian, asked.parameters, key, "application"))
-    makers += [_moved(variance) for variance in _weighted_variances(spec, experiment)]
-    for name, deviation in (accuracy.standard_deviation or {}).items():
-        key, precision = "accuracy.standard_deviation", np.array([[1.0 / deviation**2]])
-        makers.append(_target(spec, names, precision, (name,), key, f"standard_deviation of {name}"))
-    return makers
+    return [make for key in spec.accuracy.requirements for make in BUILDERS[key](spec, experiment)]
 
 
 def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | None:
@@ -82,6 +67,35 @@ def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | 
     return make
 
 
+def _model_errors(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    return [_moved(error) for error in build_model_errors(spec, experiment)]
+
+
+def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    stated = spec.accuracy.information
+    assert stated is not None
+    names = experiment.model.names
+    return [_target(spec, names, stated.matrix, stated.parameters, "accuracy.information", "information")]
+
+
+def _application(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    """M >= (chi2 gamma / 2) V'', chi2 the quantile for all parameters that the hessian is over."""
+    asked = spec.accuracy.application
+    assert asked is not None
+    chi2 = confidence_factor(asked.confidence, len(asked.parameters)) ** 2
+    hessian = 0.5 * chi2 * asked.gamma * np.array(asked.hessian, dtype=float)
+    names = experiment.model.names
+    return [_target(spec, names, hessian, asked.parameters, "accuracy.application", "application")]
+
+
+def _standard_deviations(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+    key, names = "accuracy.standard_deviation", experiment.model.names
+    return [
+        _target(spec, names, np.array([[1.0 / most**2]]), (name,), key, f"standard_deviation of {name}")
+        for name, most in (spec.accuracy.standard_deviation or {}).items()
+    ]
+
+
 def _moved(requirement: OverFrequency) -> RequirementFactory:
     return lambda experiment: replace(requirement, experiment=experiment)
 
@@ -98,11 +112,10 @@ def _target(
     return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)
 
 
-def _weighted_variances(spec: Spec, experiment: Experiment) -> list[WeightedVariance]:
+def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
     """`accuracy.weighted_variance` of every entry of G that is not zero."""
     stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
-    if stated is None:
-        return []
+    assert stated is not None
     weight = build_weight(spec, stated.weight, f"{key}.weight")
     band = required_band(spec, experiment, stated.band)
     found = [
@@ -120,7 +133,7 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[WeightedVari
         check_bounded(spec, variance, key)
         if stated.relative:
             _check_nowhere_zero(spec, variance)
-    return found
+    return [_moved(variance) for variance in found]
 
 
 def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
@@ -136,3 +149,13 @@ def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
             hint="restrict `band` to the frequencies that matter",
             key="accuracy.weighted_variance",
         )
+
+
+BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
+    "model_error": _model_errors,
+    "information": _information,
+    "application": _application,
+    "weighted_variance": _weighted_variances,
+    "standard_deviation": _standard_deviations,
+}
+"""What makes the requirement of each key of `accuracy`; a new requirement adds its own."""

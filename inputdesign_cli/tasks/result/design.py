@@ -39,6 +39,7 @@ class Designed:
 
     @property
     def units(self) -> Units:
+        """Those of the header."""
         return self.header.units
 
     @property

@@ -1,0 +1,133 @@
+"""The promise of docs/CONTRIBUTING.md: what its examples add from outside is designed and proved."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import cvxpy as cp
+import numpy as np
+import pydantic
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification import loading
+from inputdesign_cli.specification.models import accuracy as words
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.tasks.build import requirements as builders
+from inputdesign_cli.tasks.build.task import build_task
+
+PAGE = (Path(__file__).parent.parent / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
+SAMPLES, VARIANCE, ORDER = 200, 0.5, 6
+
+SPEC = """
+plant: {{B: [0, 1, 0.5, 0.2]}}
+noise: {{variance: 0.5}}
+experiment: {{samples: 200}}
+accuracy: {accuracy}
+spectrum: {{type: fir, order: 6}}
+signal: {{seed: 1}}
+"""
+
+
+def run_block(file, names, old="", new=""):
+    """Run the block of the page that belongs to this file of the package; `names` is what the file holds."""
+    (block,) = re.findall(rf"<!-- {re.escape(file)} -->\n```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    exec(compile(block.replace(old, new) if old else block, file, "exec", dont_inherit=True), names)
+    return names
+
+
+@pytest.fixture
+def total_variance(monkeypatch):
+    """The package with the requirement of the page."""
+    requirement = run_block("accuracy/total_variance.py", {"__name__": "total_variance"})["TotalVariance"]
+    # On the page a line is added to `Accuracy`; from outside, a class that has the line takes its place.
+    more = run_block(
+        "specification/models/accuracy.py",
+        dict(vars(words)),
+        old="class Accuracy(Section)",
+        new="class Accuracy(Accuracy)",
+    )["Accuracy"]
+    monkeypatch.setattr(
+        loading, "Spec", pydantic.create_model("Spec", __base__=Spec, accuracy=(more, more()))
+    )
+    table = dict(builders.BUILDERS)
+    names = {**vars(builders), "BUILDERS": table, "TotalVariance": requirement}
+    run_block("tasks/build/requirements.py", names)
+    monkeypatch.setattr(builders, "BUILDERS", table)
+
+
+def spec_of(accuracy):
+    return parse_spec(SPEC.format(accuracy=accuracy))
+
+
+def autocovariances():
+    """r_0 .. r_m of a FIR spectrum in cvxpy: traces along the diagonals of a positive Gram matrix."""
+    gram = cp.Variable((ORDER + 1, ORDER + 1), PSD=True)
+    return [cp.trace(np.eye(ORDER + 1, k=-lag) @ gram) for lag in range(ORDER + 1)]
+
+
+def information_of(r):
+    """Of the three parameters of B, per sample and variance: the Toeplitz matrix of the autocovariances."""
+    return cp.bmat([[r[abs(i - j)] for j in range(3)] for i in range(3)])
+
+
+def least_power(weights, most):
+    """By a plain program, sum_i w_i e_i^T M^-1 e_i <= most."""
+    r = autocovariances()
+    spread = cp.matrix_frac(np.diag(np.sqrt(weights)), information_of(r))
+    problem = cp.Problem(cp.Minimize(r[0]), [spread <= most * SAMPLES / VARIANCE])
+    return problem.solve(solver="CLARABEL")
+
+
+@pytest.mark.usefixtures("total_variance")
+def test_equal_weights_are_best_served_by_white_input():
+    """tr R^-1 >= k^2 / tr R with equality for R in proportion to I: the power is k sigma^2 / (N max)."""
+    result = solve(spec_of("{total_variance: {weights: {b1: 1, b2: 1, b3: 1}, max: 0.01}}")).result
+    assert result["cost"] == pytest.approx(3 * VARIANCE / (SAMPLES * 0.01), rel=1e-7)
+    assert result["objective"]["relative_gap"] < 1e-6
+    assert result["status"] == "optimal"
+
+
+@pytest.mark.usefixtures("total_variance")
+def test_the_optimum_is_that_of_a_plain_program():
+    found = solve(spec_of("{total_variance: {weights: {b1: 1, b2: 9, b3: 2}, max: 0.02}}"))
+    result = found.result
+    assert result["cost"] == pytest.approx(least_power([1.0, 9.0, 2.0], 0.02), rel=1e-5)
+    assert result["objective"]["relative_gap"] < 1e-6
+    assert result["objective"]["lower_bound"] <= result["cost"] * (1 + 1e-12)
+    (listed,) = result["requirements"]
+    assert listed["name"] == "total_variance"
+    assert listed["worst_ratio"] == pytest.approx(1.0, abs=1e-6)
+    variances = np.array([result["information"]["standard_deviation"][f"b{i}"] for i in (1, 2, 3)]) ** 2
+    assert variances @ [1.0, 9.0, 2.0] == pytest.approx(0.02, rel=1e-5)
+    # The record is judged by it as well: chosen to meet it with its own samples.
+    assert result["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+@pytest.mark.usefixtures("total_variance")
+def test_its_words_are_checked_like_all_others():
+    with pytest.raises(SpecError, match="max"):
+        spec_of("{total_variance: {weights: {b1: 1}, max: -1}}")
+    with pytest.raises(SpecError, match='no parameter "b9"'):
+        build_task(spec_of("{total_variance: {weights: {b9: 1}, max: 1}}"))
+
+
+def test_a_new_family_of_spectra_is_designed_and_proved():
+    """Powers in three bands: M is a sum of Toeplitz matrices of sin(k w) / k, and the rest plain cvxpy."""
+    edges, target = np.array([0.0, 0.5, 1.4, np.pi]), [[60, 35, 5], [35, 60, 35], [5, 35, 60]]
+    made = run_block("spectrum/pieces.py", {"__name__": "pieces"})["PiecesBasis"](1, tuple(edges))
+    task = build_task(spec_of(f"{{information: {target}}}"))
+    found = replace(task, question=replace(task.question, basis=made)).solve().result
+
+    powers = cp.Variable(3, nonneg=True)
+    lags = np.arange(3)[:, None]
+    primitive = np.where(lags == 0, edges, np.sin(lags * edges) / np.maximum(lags, 1))
+    shares = np.diff(primitive) / np.diff(edges)
+    M = SAMPLES / VARIANCE * information_of([shares[lag] @ powers for lag in range(3)])
+    plain = cp.Problem(cp.Minimize(cp.sum(powers)), [M >> np.array(target)])
+    plain.solve(solver="CLARABEL")
+
+    assert found["cost"] == pytest.approx(plain.value, rel=1e-6)
+    assert found["objective"]["relative_gap"] < 1e-6
+    assert found["spectrum"]["powers"] == pytest.approx(powers.value, abs=1e-5 * plain.value)
