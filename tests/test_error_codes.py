@@ -41,11 +41,7 @@ def codes_in(source: str) -> set[str]:
 def test_the_scan_finds_codes():
     assert codes_in(
         "raise bad_spec('a-b', 'm')\nx.complain('c', 'm')\nDiagnostic(code='d-e', message='')"
-    ) == {
-        "a-b",
-        "c",
-        "d-e",
-    }
+    ) == {"a-b", "c", "d-e"}
     everything = set().union(*(codes_in(p.read_text()) for p in (PACKAGE / "specification").rglob("*.py")))
     assert {
         "unknown-key",

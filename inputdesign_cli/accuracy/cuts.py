@@ -157,11 +157,7 @@ class DeterminantCut:
         none = sp.csc_matrix((3 * size, triangle))
         return [
             CutBlock(
-                "psd",
-                2 * size,
-                np.zeros(rows.size),
-                sp.eye_array(rows.size, triangle, format="csc"),
-                unknown,
+                "psd", 2 * size, np.zeros(rows.size), sp.eye_array(rows.size, triangle, format="csc"), unknown
             ),
             CutBlock("exponential", size, np.tile([0.0, 1.0, 0.0], size), none, logarithms),
             CutBlock(

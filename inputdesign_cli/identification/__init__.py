@@ -1,10 +1,10 @@
 """From samples to models: prediction-error estimates with their covariance, and tests of the residuals."""
 
-from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate
-from inputdesign_cli.identification.estimate import Estimate as Estimate
-from inputdesign_cli.identification.estimators import fit_batch as fit_batch
-from inputdesign_cli.identification.estimators import identify as identify
+from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
+from inputdesign_cli.identification.estimators import fit_batch as fit_batch, identify as identify
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
-from inputdesign_cli.identification.residual_tests import ResidualTest as ResidualTest
-from inputdesign_cli.identification.residual_tests import cross_correlations as cross_correlations
-from inputdesign_cli.identification.residual_tests import whiteness as whiteness
+from inputdesign_cli.identification.residual_tests import (
+    ResidualTest as ResidualTest,
+    cross_correlations as cross_correlations,
+    whiteness as whiteness,
+)

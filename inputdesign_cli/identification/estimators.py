@@ -9,13 +9,7 @@ from typing import Protocol
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.polynomials import fit_polynomials, identify_polynomials
 from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices, identify_transfer_matrix
-from inputdesign_cli.plant import (
-    ContinuousModel,
-    Intersample,
-    Model,
-    PolynomialModel,
-    SampledModel,
-)
+from inputdesign_cli.plant import ContinuousModel, Intersample, Model, PolynomialModel, SampledModel
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -78,13 +72,7 @@ def _(model: SampledModel, step: float) -> Estimator:
 
 
 def identify(
-    model: Model,
-    u: Array,
-    y: Array,
-    step: float = 1.0,
-    *,
-    start: Array | None = None,
-    feedback: bool = False,
+    model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array | None = None, feedback: bool = False
 ) -> Estimate:
     """The structure of `model` estimated from one record.
 

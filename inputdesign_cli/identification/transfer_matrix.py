@@ -89,12 +89,7 @@ def identify_transfer_matrix(
 
 
 def fit_transfer_matrices(
-    model: ContinuousModel,
-    u: ArrayLike,
-    y: ArrayLike,
-    between: Intersample,
-    *,
-    start: ArrayLike,
+    model: ContinuousModel, u: ArrayLike, y: ArrayLike, between: Intersample, *, start: ArrayLike
 ) -> BatchEstimate:
     """The estimates of `identify_transfer_matrix` for many records, each from its one start, without checks.
 

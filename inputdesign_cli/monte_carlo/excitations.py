@@ -61,13 +61,7 @@ class Redrawn:
 
     @classmethod
     def flat(
-        cls,
-        name: str,
-        method: Method,
-        powers: Array,
-        band: tuple[float, float],
-        samples: int,
-        step: float,
+        cls, name: str, method: Method, powers: Array, band: tuple[float, float], samples: int, step: float
     ) -> Redrawn:
         """Independent inputs of these powers (r,), each flat over a band in the unit of the experiment."""
         white = TabulatedSpectrum.white(powers, band)

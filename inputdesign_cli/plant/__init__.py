@@ -1,25 +1,22 @@
 """Plants: G, H, their parameter gradients and the loop around them, at any frequencies."""
 
 from inputdesign_cli.plant.continuous_model import ContinuousModel as ContinuousModel
-from inputdesign_cli.plant.frequencies import graded_grid as graded_grid
-from inputdesign_cli.plant.frequencies import local_maxima as local_maxima
-from inputdesign_cli.plant.frequencies import logarithmic_distance as logarithmic_distance
+from inputdesign_cli.plant.frequencies import (
+    graded_grid as graded_grid,
+    local_maxima as local_maxima,
+    logarithmic_distance as logarithmic_distance,
+)
 from inputdesign_cli.plant.intersample import Intersample as Intersample
-from inputdesign_cli.plant.loop import Loop as Loop
-from inputdesign_cli.plant.loop import LoopResponse as LoopResponse
-from inputdesign_cli.plant.loop import close_loop as close_loop
-from inputdesign_cli.plant.model import Fraction as Fraction
-from inputdesign_cli.plant.model import Model as Model
-from inputdesign_cli.plant.model import Parameter as Parameter
+from inputdesign_cli.plant.loop import Loop as Loop, LoopResponse as LoopResponse, close_loop as close_loop
+from inputdesign_cli.plant.model import Fraction as Fraction, Model as Model, Parameter as Parameter
 from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop
 from inputdesign_cli.plant.polynomial_model import PolynomialModel as PolynomialModel
 from inputdesign_cli.plant.sampled_loop import SampledLoop as SampledLoop
 from inputdesign_cli.plant.sampled_model import SampledModel as SampledModel
-from inputdesign_cli.plant.sampling import hold_entries as hold_entries
-from inputdesign_cli.plant.sampling import zero_order_hold as zero_order_hold
-from inputdesign_cli.plant.transfer import ContinuousRational as ContinuousRational
-from inputdesign_cli.plant.transfer import Rational as Rational
-from inputdesign_cli.plant.transfer import ScalarTransfer as ScalarTransfer
-from inputdesign_cli.plant.transfer import TransferMatrix as TransferMatrix
-
-TransferMatrix = TransferMatrix
+from inputdesign_cli.plant.sampling import hold_entries as hold_entries, zero_order_hold as zero_order_hold
+from inputdesign_cli.plant.transfer import (
+    ContinuousRational as ContinuousRational,
+    Rational as Rational,
+    ScalarTransfer as ScalarTransfer,
+    TransferMatrix as TransferMatrix,
+)

@@ -122,9 +122,7 @@ class TransferMatrix:
 
     @classmethod
     def build(
-        cls,
-        numerator: Sequence[Sequence[Coefficients]],
-        denominator: Sequence[Sequence[Coefficients]],
+        cls, numerator: Sequence[Sequence[Coefficients]], denominator: Sequence[Sequence[Coefficients]]
     ) -> TransferMatrix:
         """From entries with a denominator each; zero entries have no poles."""
         rows, below = [], []

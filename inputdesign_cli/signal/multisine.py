@@ -28,12 +28,7 @@ def blocks_of(vectors: LineVectors, inputs: int) -> int:
 
 
 def multisine_record(
-    lines: Lines,
-    samples: int,
-    rng: np.random.Generator,
-    vectors: LineVectors,
-    *,
-    angles: Array | None = None,
+    lines: Lines, samples: int, rng: np.random.Generator, vectors: LineVectors, *, angles: Array | None = None
 ) -> Array:
     """(samples, r): one block after the other, each with the same random phase a line.
 

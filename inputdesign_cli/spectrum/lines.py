@@ -15,12 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
-from inputdesign_cli.spectrum.directions import (
-    best_directions,
-    directed_scale,
-    first_directions,
-    matrices,
-)
+from inputdesign_cli.spectrum.directions import best_directions, directed_scale, first_directions, matrices
 
 _FIRST_LINES = 24
 _MOST_NEW = 16

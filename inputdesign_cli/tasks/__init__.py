@@ -10,8 +10,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.assessment import Assessment
-from inputdesign_cli.tasks.assessment import assess as assess_record
+from inputdesign_cli.tasks.assessment import Assessment, assess as assess_record
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.task import build_task

@@ -233,11 +233,7 @@ class GivenTask:
         return Redrawn("design", SignalGenerator(spectrum, request.settings, samples, request.band), basis, x)
 
     def _in_phase(
-        self,
-        frequencies: Array,
-        amplitudes: Array,
-        experiment: Experiment,
-        ratio: Callable[[Array], float],
+        self, frequencies: Array, amplitudes: Array, experiment: Experiment, ratio: Callable[[Array], float]
     ) -> Record | None:
         """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
         request = self.record

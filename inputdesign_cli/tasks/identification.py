@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from inputdesign_cli.accuracy import ModelError, Requirement
-from inputdesign_cli.identification import Estimate
-from inputdesign_cli.identification import identify as estimate_model
+from inputdesign_cli.identification import Estimate, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array

@@ -16,11 +16,7 @@ from inputdesign_cli.tasks.loop_error_signal import (
     realise,
     white_lines,
 )
-from inputdesign_cli.tasks.result.loop_error import (
-    LoopErrorTerms,
-    design_result,
-    spectrum_results,
-)
+from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms, design_result, spectrum_results
 from inputdesign_cli.tasks.result.losses import loss_results
 from inputdesign_cli.tasks.result.plain_signal import signal_entry, signal_results
 

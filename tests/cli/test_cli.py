@@ -46,13 +46,7 @@ RESULT = {
     "model_error": {"worst_ratio": 1.0, "worst_frequency": 3.14159, "alpha": 2.45},
     "spectrum": {"type": "fir"},
     "baseline": {"white": {"cost": 1.705495, "ratio": 6.597711}},
-    "signal": {
-        "samples": 500,
-        "power": [0.26],
-        "peak": [1.5],
-        "crest_factor": [2.94],
-        "worst_ratio": 1.02,
-    },
+    "signal": {"samples": 500, "power": [0.26], "peak": [1.5], "crest_factor": [2.94], "worst_ratio": 1.02},
 }
 
 

@@ -10,10 +10,7 @@ import scipy.signal
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.refined_iv import refine
-from inputdesign_cli.identification.transfer_matrix import (
-    fit_transfer_matrices,
-    identify_transfer_matrix,
-)
+from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices, identify_transfer_matrix
 from inputdesign_cli.identification.transfer_problem import evaluate
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.information import Experiment, FiniteRecord

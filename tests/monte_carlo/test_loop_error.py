@@ -118,13 +118,7 @@ def test_least_squares_is_weighted_with_the_noise():
 def test_the_loss_of_the_column_agrees_with_theory():
     problem = column()
     samples, runs = 4000, 150
-    found = study_losses(
-        problem,
-        {"white": flat(samples)},
-        samples=samples,
-        runs=runs,
-        seed=0,
-    )["white"]
+    found = study_losses(problem, {"white": flat(samples)}, samples=samples, runs=runs, seed=0)["white"]
     assert found.unstable == 0
     error = found.loss.std(ddof=1) / np.sqrt(runs)
     assert found.loss.mean() == pytest.approx(0.002835, abs=4 * error)
@@ -149,13 +143,7 @@ def test_unstable_loops_are_counted_and_left_out():
     problem = LoopErrorProblem(
         noisy, ModelReference(target(1, matrix=False)), (PowerLimit("input", 1.0),), np.ones(1)
     )
-    found = study_losses(
-        problem,
-        {"white": flat(60, 1)},
-        samples=60,
-        runs=80,
-        seed=0,
-    )["white"]
+    found = study_losses(problem, {"white": flat(60, 1)}, samples=60, runs=80, seed=0)["white"]
     assert found.unstable > 0
     assert found.loss.size == 80 - found.unstable
     assert np.all(np.isfinite(found.loss))

@@ -156,11 +156,7 @@ SPECS = Path(__file__).parents[2] / "specs"
             "regression",
             ["experiment.samples=100"],
             solve,
-            [
-                "bias and variance together, must not exceed 1",
-                "Asked: the least energy",
-                "No moments at all",
-            ],
+            ["bias and variance together, must not exceed 1", "Asked: the least energy", "No moments at all"],
         ),
         (
             "first_order",

@@ -6,8 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text, json_text, plain, read_csv
@@ -48,11 +47,7 @@ def test_read_csv_of_a_table_without_rows(tmp_path):
 
 @pytest.mark.parametrize(
     "columns",
-    [
-        {"a": np.zeros(2), "b": np.zeros(3)},
-        {"a": np.zeros((2, 2))},
-        {"a": np.zeros(2, dtype=complex)},
-    ],
+    [{"a": np.zeros(2), "b": np.zeros(3)}, {"a": np.zeros((2, 2))}, {"a": np.zeros(2, dtype=complex)}],
 )
 def test_csv_refuses_what_is_no_table(columns):
     with pytest.raises(ValueError, match="column"):

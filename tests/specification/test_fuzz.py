@@ -7,8 +7,7 @@ import json
 from pathlib import Path
 
 import yaml
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.diagnostics import as_json, render
 from inputdesign_cli.error_codes import explanations

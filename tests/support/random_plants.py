@@ -84,11 +84,7 @@ class Case:
     def requirement(self, experiment: Experiment) -> ModelError:
         """Its accuracy, in the coordinates of an experiment."""
         return ModelError(
-            experiment=experiment,
-            band=self.band,
-            entry=(0, 0),
-            admissible=self.admissible,
-            alpha=self.alpha,
+            experiment=experiment, band=self.band, entry=(0, 0), admissible=self.admissible, alpha=self.alpha
         )
 
 

@@ -3,8 +3,7 @@
 import itertools
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import Sweep, parse_spec

@@ -191,10 +191,7 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
             "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [-11], denominator: [1]}}",
             "unstable-loop",
         ),
-        (
-            "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [[[9]]]}}",
-            "wrong-shape",
-        ),
+        ("accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [[[9]]]}}", "wrong-shape"),
     ],
 )
 def test_what_cannot_be_asked_is_explained(override, code):

@@ -9,12 +9,7 @@ import pytest
 from inputdesign_cli import solve
 from inputdesign_cli.accuracy import Absolute, Sensitivity
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.plant import (
-    PolynomialLoop,
-    PolynomialModel,
-    Rational,
-    TransferMatrix,
-)
+from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, Rational, TransferMatrix
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 

@@ -142,11 +142,7 @@ def least_error(
 
 
 def _restricted(
-    criterion: ParametricCriterion,
-    lines: Array,
-    metrics: ComplexArray,
-    limits: Array,
-    near: Array | None,
+    criterion: ParametricCriterion, lines: Array, metrics: ComplexArray, limits: Array, near: Array | None
 ) -> tuple[ComplexArray, Array]:
     """The best power matrices at given lines and the multipliers of the limits, by a semidefinite program.
 

@@ -15,8 +15,7 @@ from inputdesign_cli.design.loop_error.laws import ControlLaw, kronecker, propag
 from inputdesign_cli.design.loop_error.limits import LimitedDesign, design_within
 from inputdesign_cli.design.loop_error.parametric import LineDesign, ParametricCriterion, least_error
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
-from inputdesign_cli.design.loop_error.weight import adjoint
-from inputdesign_cli.design.loop_error.weight import weight as weight_from
+from inputdesign_cli.design.loop_error.weight import adjoint, weight as weight_from
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import graded_grid, logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray

@@ -92,10 +92,7 @@ Name = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("a parameter name"
 Several = Annotated[tuple[T, ...], Field(min_length=1)]
 Numbers = Annotated[Several[Number], Wording("a list of numbers")]
 Names = Annotated[Several[Name], Wording("a list of parameter names")]
-PerChannel = Annotated[
-    Annotated[T, tag("one")] | Annotated[Several[T], tag("list")],
-    _LIST_OR_NOT,
-]
+PerChannel = Annotated[Annotated[T, tag("one")] | Annotated[Several[T], tag("list")], _LIST_OR_NOT]
 """One value, or a list with one per channel."""
 Band = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(two_frequencies), AfterValidator(ascending)]
 Frequencies = Annotated[Several[NonNegative], AfterValidator(rising), Wording("a list of frequencies")]

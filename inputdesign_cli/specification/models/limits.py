@@ -8,14 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import (
-    Band,
-    Cap,
-    Count,
-    FileName,
-    NonNegative,
-    PerChannel,
-)
+from inputdesign_cli.specification.models.fields import Band, Cap, Count, FileName, NonNegative, PerChannel
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind

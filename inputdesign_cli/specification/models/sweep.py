@@ -89,6 +89,5 @@ class Sweep(Section):
         examples=[{"experiment.samples": [250, 500, 1000]}],
     )
     zip: Flag = Field(
-        default=False,
-        description="Take the values side by side, not in every combination (default false).",
+        default=False, description="Take the values side by side, not in every combination (default false)."
     )

@@ -20,13 +20,7 @@ from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix, hold_entries, zero_order_hold
-from inputdesign_cli.specification import (
-    ClosedLoopError,
-    Noise,
-    Simulation,
-    SimulationNoise,
-    Spec,
-)
+from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.tasks.build.header import build_header
@@ -90,12 +84,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), trial, refusal)
 
 
-def _plant(
-    spec: Spec,
-    plant: TruePlant,
-    noise: Noise | SimulationNoise,
-    key: str,
-) -> MatrixPlant:
+def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
     """The matrix of polynomials of `plant` or of the true system `simulation.plant`."""
     if noise.variance is None:
         raise bad_spec(

@@ -21,8 +21,7 @@ from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, Rational
-from inputdesign_cli.specification import ModelError as StatedError
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.tasks.build.bound_table import read_bound
 from inputdesign_cli.tasks.build.header import build_units
@@ -90,11 +89,7 @@ def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
 
 
 def _on_entry(
-    spec: Spec,
-    error: StatedError,
-    experiment: Experiment,
-    band: tuple[float, float],
-    entry: Entry | None,
+    spec: Spec, error: StatedError, experiment: Experiment, band: tuple[float, float], entry: Entry | None
 ) -> OnModelError:
     admissible = _admissible(spec, error, experiment.model, band, entry)
     if error.weight is not None:
@@ -180,11 +175,7 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
 
 
 def _admissible(
-    spec: Spec,
-    error: StatedError,
-    model: Model,
-    band: tuple[float, float],
-    entry: Entry | None,
+    spec: Spec, error: StatedError, model: Model, band: tuple[float, float], entry: Entry | None
 ) -> AdmissibleError:
     """r_adm; of a table its column r_adm_21 for an entry, or r_adm for all alike."""
     if error.relative is not None:

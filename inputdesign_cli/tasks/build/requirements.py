@@ -101,12 +101,7 @@ def _moved(requirement: OverFrequency) -> RequirementFactory:
 
 
 def _target(
-    spec: Spec,
-    known: Sequence[str],
-    matrix: ArrayLike,
-    names: Sequence[str] | None,
-    key: str,
-    label: str,
+    spec: Spec, known: Sequence[str], matrix: ArrayLike, names: Sequence[str] | None, key: str, label: str
 ) -> RequirementFactory:
     full = embedded(spec, known, np.array(matrix, dtype=float), names, key)
     return lambda experiment: InformationTarget(experiment.whiten_matrix(full), label)

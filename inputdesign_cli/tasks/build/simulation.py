@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.specification import Simulation as SimulationSection
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.system import build_cost

@@ -15,14 +15,7 @@ from inputdesign_cli.specification.models.spectrum import (
     PolynomialSpectrum,
     WhiteSpectrum,
 )
-from inputdesign_cli.spectrum import (
-    Basis,
-    FirBasis,
-    FlatBasis,
-    LinesBasis,
-    MatrixFirBasis,
-    PolynomialBasis,
-)
+from inputdesign_cli.spectrum import Basis, FirBasis, FlatBasis, LinesBasis, MatrixFirBasis, PolynomialBasis
 
 _DEFAULT_ORDER = 20
 _SAME = 1e-9

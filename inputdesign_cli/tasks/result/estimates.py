@@ -60,11 +60,7 @@ def _deviations(estimate: Estimate) -> dict[str, float]:
 
 
 def _test(test: ResidualTest) -> dict[str, Json]:
-    return {
-        "statistic": test.statistic,
-        "degrees_of_freedom": test.freedom,
-        "probability": test.probability,
-    }
+    return {"statistic": test.statistic, "degrees_of_freedom": test.freedom, "probability": test.probability}
 
 
 def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Estimate) -> list[str]:

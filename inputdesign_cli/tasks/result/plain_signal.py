@@ -14,12 +14,7 @@ def signal_entry(u: Array) -> dict[str, object]:
     power = np.mean(u * u, axis=0)
     peak = np.abs(u).max(axis=0)
     crest = np.divide(peak, np.sqrt(power), out=np.ones_like(peak), where=power > 0.0)
-    return {
-        "samples": len(u),
-        "power": power.tolist(),
-        "peak": peak.tolist(),
-        "crest_factor": crest.tolist(),
-    }
+    return {"samples": len(u), "power": power.tolist(), "peak": peak.tolist(), "crest_factor": crest.tolist()}
 
 
 def signal_results(units: Units, u: Array) -> tuple[Table, SignalCurves]:
