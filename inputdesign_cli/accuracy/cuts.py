@@ -40,7 +40,7 @@ class Cut(Protocol):
     @property
     def frequency(self) -> float | None: ...
 
-    def moved(self, congruence: Array) -> Cut:
+    def transformed(self, congruence: Array) -> Cut:
         """The same set for K M K^T, K = `congruence` (k, k) nonsingular."""
         ...
 
@@ -64,7 +64,7 @@ class MatrixCut:
     matrix: Array
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> MatrixCut:
+    def transformed(self, congruence: Array) -> MatrixCut:
         return replace(self, matrix=congruence @ self.matrix @ congruence.T)
 
     def blocks(self, size: int) -> list[CutBlock]:
@@ -87,7 +87,7 @@ class VarianceCut:
     directions: Array
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> VarianceCut:
+    def transformed(self, congruence: Array) -> VarianceCut:
         return replace(self, directions=congruence @ self.directions)
 
     def blocks(self, size: int) -> list[CutBlock]:
@@ -124,7 +124,7 @@ class DeterminantCut:
     level: float = 1.0
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> DeterminantCut:
+    def transformed(self, congruence: Array) -> DeterminantCut:
         _, logarithm = np.linalg.slogdet(congruence)
         return replace(self, level=self.level * float(np.exp(2.0 * logarithm / len(congruence))))
 
@@ -179,7 +179,7 @@ class TraceCut:
     weight: Array
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> TraceCut:
+    def transformed(self, congruence: Array) -> TraceCut:
         inverse = np.linalg.inv(congruence)
         return replace(self, weight=inverse.T @ self.weight @ inverse)
 
@@ -205,7 +205,7 @@ class EllipsoidCut:
     alpha: float
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> EllipsoidCut:
+    def transformed(self, congruence: Array) -> EllipsoidCut:
         corner = np.eye(len(self.form))
         corner[:-1, :-1] = congruence
         return replace(self, form=corner @ self.form @ corner.T)

@@ -14,7 +14,12 @@ from inputdesign_cli.design.convex.problem import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.model_error import build_model_errors, confidence_factor, required_band
+from inputdesign_cli.tasks.build.model_error import (
+    build_model_errors,
+    check_bounded,
+    confidence_factor,
+    required_band,
+)
 from inputdesign_cli.tasks.build.system import embedded
 from inputdesign_cli.tasks.build.weights import build_weight
 
@@ -111,8 +116,9 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[WeightedVari
         )
         for entry in active_entries(experiment.model, band[1])
     ]
-    if stated.relative:
-        for variance in found:
+    for variance in found:
+        check_bounded(spec, variance, key)
+        if stated.relative:
             _check_nowhere_zero(spec, variance)
     return found
 
