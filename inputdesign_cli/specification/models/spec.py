@@ -136,9 +136,11 @@ class Spec(Section):
 
     def place(self, error: _Error) -> _Error:
         """An error of the same type whose keyed diagnostics point at their lines."""
-        places = [d.location or (self.locate(d.key) if d.key else None) for d in error.diagnostics]
-        pairs = zip(error.diagnostics, places, strict=True)
-        placed = type(error)([replace(d, location=place) for d, place in pairs])
+        found = [
+            one if one.location or not one.key else replace(one, location=self.locate(one.key))
+            for one in error.diagnostics
+        ]
+        placed = type(error)(found)
         placed.__cause__ = error.__cause__
         return placed
 
