@@ -1,7 +1,7 @@
 """Optimal experiments for system identification.
 
     from inputdesign_cli import load_spec, solve
-    outcome = solve(load_spec("specs/first_order.yaml", ["spectrum.order=10"]))
+    results = solve(load_spec("specs/first_order.yaml", ["spectrum.order=10"]))
 
 The verbs are resolved at first use, so that importing the package costs nothing.
 """
@@ -9,14 +9,15 @@ The verbs are resolved at first use, so that importing the package costs nothing
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:
     from inputdesign_cli.specification import load_spec, parse_spec
     from inputdesign_cli.sweep.running import sweep
     from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, validate
 
-__version__ = "0.1.0"
 
 __all__ = [
     "__version__",
@@ -44,10 +45,10 @@ _HOME = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    return vars(import_module(_HOME[name]))[name]
 
 
 def __dir__() -> list[str]:

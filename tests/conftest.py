@@ -1,11 +1,8 @@
-"""Plants that several tests share."""
+"""Experiments that several tests share; what they import is in `tests/support`."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from inputdesign_cli.compute.threads import use_one_thread
 

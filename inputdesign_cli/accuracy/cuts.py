@@ -41,7 +41,7 @@ class Cut(Protocol):
     def frequency(self) -> float | None:
         """Where the requirement asks for it."""
 
-    def moved(self, congruence: Array) -> Cut:
+    def transformed(self, congruence: Array) -> Cut:
         """The same set for K M K^T, K = `congruence` (k, k) nonsingular."""
 
     def blocks(self, size: int) -> list[CutBlock]:
@@ -62,7 +62,7 @@ class MatrixCut:
     matrix: Array
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> MatrixCut:
+    def transformed(self, congruence: Array) -> MatrixCut:
         """The same set for K M K^T, see `Cut`."""
         return replace(self, matrix=congruence @ self.matrix @ congruence.T)
 
@@ -88,7 +88,7 @@ class VarianceCut:
     directions: Array
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> VarianceCut:
+    def transformed(self, congruence: Array) -> VarianceCut:
         """The same set for K M K^T, see `Cut`."""
         return replace(self, directions=congruence @ self.directions)
 
@@ -128,7 +128,7 @@ class DeterminantCut:
     level: float = 1.0
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> DeterminantCut:
+    def transformed(self, congruence: Array) -> DeterminantCut:
         """The same set for K M K^T, see `Cut`."""
         _, logarithm = np.linalg.slogdet(congruence)
         return replace(self, level=self.level * float(np.exp(2.0 * logarithm / len(congruence))))
@@ -186,7 +186,7 @@ class TraceCut:
     weight: Array
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> TraceCut:
+    def transformed(self, congruence: Array) -> TraceCut:
         """The same set for K M K^T, see `Cut`."""
         inverse = np.linalg.inv(congruence)
         return replace(self, weight=inverse.T @ self.weight @ inverse)
@@ -215,7 +215,7 @@ class EllipsoidCut:
     alpha: float
     frequency: float | None = None
 
-    def moved(self, congruence: Array) -> EllipsoidCut:
+    def transformed(self, congruence: Array) -> EllipsoidCut:
         """The same set for K M K^T, see `Cut`."""
         corner = np.eye(len(self.form))
         corner[:-1, :-1] = congruence

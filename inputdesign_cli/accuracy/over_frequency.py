@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.requirement import Entry, Requirement, Violation, inverse_factor, worst
+from inputdesign_cli.errors import Diagnostic, InaccurateError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -71,12 +72,16 @@ class OverFrequency(Requirement):
         return np.linalg.norm(G, axis=(1, 2))
 
     @cached_property
-    def grid(self) -> Array:
-        """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
+    def grid_singularities(self) -> ComplexArray:
+        """Points of the frequency plane near which G, the requirement or the loop change fast."""
         model = self.experiment.model
         plant = model.singularities if self.entry is None else model.entry_singularities(*self.entry)
-        near = np.concatenate([plant, self.experiment.singularities, self.own_singularities])
-        return graded_grid(near, *self.band, knots=self.knots)
+        return np.concatenate([plant, self.experiment.singularities, self.own_singularities])
+
+    @cached_property
+    def grid(self) -> Array:
+        """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
+        return graded_grid(self.grid_singularities, *self.band, knots=self.knots)
 
     @cached_property
     def _grid_rows(self) -> NDArray[np.float64]:
@@ -90,6 +95,16 @@ class OverFrequency(Requirement):
         """Local maxima of the ratio over the band, polished between the grid points."""
         turn = inverse_factor(information).T
         on_grid = self.measure(self._grid_rows @ turn, self.grid)
+        if not np.all(np.isfinite(on_grid)):
+            raise InaccurateError(
+                Diagnostic(
+                    "ratio-not-finite",
+                    f"{self.name} has no finite value at {self.grid[~np.isfinite(on_grid)][0]:.6g} (in the "
+                    "unit of the experiment)",
+                    hint="restrict the band of the requirement, and rescale signals of extreme units",
+                    key="accuracy",
+                )
+            )
         w, ratio = local_maxima(
             lambda w: self.measure(self.rows(w) @ turn, w), self.grid, on_grid, above=above
         )

@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli import __version__
 from inputdesign_cli.cli.analyse import analyse
 from inputdesign_cli.cli.assess import assess
 from inputdesign_cli.cli.check import check
@@ -24,6 +23,7 @@ from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
 from inputdesign_cli.compute.threads import use_one_thread
+from inputdesign_cli.version import __version__
 
 app = typer.Typer(
     name="idesign",

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from inputdesign_cli import __version__
 from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
 from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.version import __version__
 
 _AHEAD = 2  # jobs on their way for each thread of the cluster
 
@@ -105,9 +105,7 @@ class Cluster:
 
 
 def _version() -> str:
-    import inputdesign_cli
-
-    return inputdesign_cli.__version__
+    return __version__
 
 
 def _threads(client: Any) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from inputdesign_cli import __version__
+from inputdesign_cli.version import __version__
 
 
 def render(template: str, directory: Path, content: Mapping[str, object]) -> str:

@@ -6,7 +6,7 @@ import platform
 from functools import cache
 from importlib import metadata
 
-from inputdesign_cli import __version__
+from inputdesign_cli.version import __version__
 
 LIBRARIES = ("numpy", "scipy", "cvxpy", "clarabel")
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
-from inputdesign_cli import __version__
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
 from inputdesign_cli.sweep.point import PointJob
 from inputdesign_cli.sweep.verbs import Verb
+from inputdesign_cli.version import __version__
 
 _KEY_LENGTH = 24
 _TRIED = 50

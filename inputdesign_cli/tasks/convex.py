@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Results, Table
+from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
@@ -123,7 +123,7 @@ class ConvexTask:
         generator = redrawn(self.record, done.design, record)
         return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
 
-    def designed(self) -> tuple[Designed, dict[str, Any]]:
+    def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.
 
         Raises:
@@ -139,7 +139,7 @@ class ConvexTask:
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
         return Designed(self.header, self.question, design, experiment, self.cost, self.alpha), how
 
-    def _by_exchange(self) -> tuple[Design, dict[str, Any]]:
+    def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
         try:
             design = solve_design(self.question, tolerance=self.tolerance)
         except UnreachableError as unreachable:
@@ -165,7 +165,7 @@ class ConvexTask:
             "any_spectrum_gap": design.any_spectrum.gap,
         }
 
-    def _by_grid(self, method: GridMethod) -> tuple[Design, dict[str, Any]]:
+    def _by_grid(self, method: GridMethod) -> tuple[Design, dict[str, Json]]:
         white = replace(self.question, basis=flat_basis(self.experiment))
         baseline = solve_design(white, tolerance=self.tolerance)
         basis = self.question.basis
@@ -187,7 +187,7 @@ class ConvexTask:
         how = {"method": "lmi", "status": "optimal_on_grid", "grid": method.lines}
         return replace(baseline, problem=problem, result=on_grid), how
 
-    def _check_length(self, result: dict[str, Any]) -> None:
+    def _check_length(self, result: dict[str, Json]) -> None:
         """Raise `InfeasibleError` when even the shortest experiment is longer than limits.samples."""
         most = self.most_samples
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
@@ -203,7 +203,7 @@ class ConvexTask:
             )
         )
 
-    def _signal_entry(self, done: Designed, record: Record) -> dict[str, Any]:
+    def _signal_entry(self, done: Designed, record: Record) -> dict[str, Json]:
         design = done.design
         return signal_entry(
             self.record,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.spectrum import PolynomialBasis, hvec, svec
 
 _STARTS = 3
@@ -30,8 +30,8 @@ class Climbed:
     """The design of few columns, with what the result says of the climb."""
 
     design: Design
-    how: dict[str, Any]
-    entry: dict[str, Any]
+    how: dict[str, Json]
+    entry: dict[str, Json]
 
 
 def restrict_columns(asked: FewColumns, design: Design) -> Climbed:

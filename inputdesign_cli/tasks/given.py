@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Results, Table
+from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
@@ -181,9 +180,9 @@ class GivenTask:
 
     def _result(
         self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
-    ) -> dict[str, Any]:
+    ) -> dict[str, Json]:
         met = all(worst(r.violations(information)).ratio <= 1.0 + _ROUNDING for r in requirements)
-        result: dict[str, Any] = {
+        result: dict[str, Json] = {
             "format": 1,
             "title": self.header.title,
             "status": "given" if not requirements else "met" if met else "missed",
@@ -193,9 +192,9 @@ class GivenTask:
         nowhere = np.zeros(0)
         return result | requirements_entry(self.header.units, self.alpha, requirements, information, nowhere)
 
-    def _spectrum_entry(self) -> dict[str, Any]:
+    def _spectrum_entry(self) -> dict[str, Json]:
         excitation, units = self.excitation, self.header.units
-        entry: dict[str, Any] = {"type": "given", "given": excitation.kind}
+        entry: dict[str, Json] = {"type": "given", "given": excitation.kind}
         if excitation.sinusoids is not None and excitation.basis is not None and excitation.x is not None:
             frequencies, powers = excitation.basis.lines(excitation.x)
             entry["frequencies"] = frequencies / units.frequency

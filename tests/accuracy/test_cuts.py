@@ -9,22 +9,31 @@ from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.spectrum import svec, svec_length
 
 K = 3
-RNG = np.random.default_rng(0)
 
 
-def random_matrix(rank=K + 2):
-    root = RNG.normal(size=(K, rank))
+def random_matrix(rng, rank=K + 2):
+    root = rng.normal(size=(K, rank))
     return root @ root.T
 
 
-R = random_matrix(2)
-V = RNG.normal(size=(K, 2))
-W = random_matrix()
-Z, C = RNG.normal(size=(2, 2, K))
-FORM = np.zeros((K + 1, K + 1))
-FORM[:K, :K] = Z.T @ Z - C.T @ C
-FORM[:K, K] = FORM[K, :K] = -C[0]
-FORM[K, K] = -1.0
+def fixed():
+    """R, V, W and the form of the ellipsoid, for the cuts below."""
+    rng = np.random.default_rng(0)
+    R, V, W = random_matrix(rng, 2), rng.normal(size=(K, 2)), random_matrix(rng)
+    Z, C = rng.normal(size=(2, 2, K))
+    form = np.zeros((K + 1, K + 1))
+    form[:K, :K] = Z.T @ Z - C.T @ C
+    form[:K, K] = form[K, :K] = -C[0]
+    form[K, K] = -1.0
+    return R, V, W, form
+
+
+R, V, W, FORM = fixed()
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1)
 
 
 def ellipsoid_scale(M, alpha):
@@ -67,27 +76,27 @@ def least_scale(cut, M):
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_cones_are_the_set(name):
+def test_cones_are_the_set(name, rng):
     cut, definition = CUTS[name]
     for _ in range(3):
-        M = random_matrix()
+        M = random_matrix(rng)
         scale, _ = least_scale(cut, M)
         assert scale == pytest.approx(definition(M), rel=2e-3 if name == "ellipsoid" else 1e-6)
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_proofs_hold_whatever_the_multipliers(name):
+def test_proofs_hold_whatever_the_multipliers(name, rng):
     """tr(Y M) >= r for every M of the set: random multipliers, random members on the boundary."""
     cut, _ = CUTS[name]
-    boundary = [least_scale(cut, M)[0] * M for M in (random_matrix() for _ in range(6))]
+    boundary = [least_scale(cut, M)[0] * M for M in (random_matrix(rng) for _ in range(6))]
     for _ in range(20):
         multipliers = []
         for block in cut.blocks(K):
             if block.kind == "psd":
-                root = RNG.normal(size=(block.order, block.order))
-                multipliers.append(svec(root @ root.T + 0.3 * RNG.normal() * np.eye(block.order)))
+                root = rng.normal(size=(block.order, block.order))
+                multipliers.append(svec(root @ root.T + 0.3 * rng.normal() * np.eye(block.order)))
             else:
-                multipliers.append(RNG.normal(size=block.constant.size))
+                multipliers.append(rng.normal(size=block.constant.size))
         Y, r = cut.proof(multipliers)
         assert np.linalg.eigvalsh(Y)[0] >= -1e-9 * max(np.trace(Y), 1)
         for M in boundary:
@@ -95,20 +104,20 @@ def test_proofs_hold_whatever_the_multipliers(name):
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_proofs_are_tight_at_the_optimum(name):
+def test_proofs_are_tight_at_the_optimum(name, rng):
     """With the solver's own multipliers the inequality is an equality: strong duality."""
     cut, _ = CUTS[name]
-    M = random_matrix()
+    M = random_matrix(rng)
     scale, multipliers = least_scale(cut, M)
     Y, r = cut.proof(list(multipliers))
     assert np.sum(Y * M) * scale == pytest.approx(r, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", CUTS)
-def test_moved_cuts_describe_the_same_set(name):
+def test_moved_cuts_describe_the_same_set(name, rng):
     cut, _ = CUTS[name]
-    M, congruence = random_matrix(), RNG.normal(size=(K, K))
-    moved, _ = least_scale(cut.moved(congruence), congruence @ M @ congruence.T)
+    M, congruence = random_matrix(rng), rng.normal(size=(K, K))
+    moved, _ = least_scale(cut.transformed(congruence), congruence @ M @ congruence.T)
     assert moved == pytest.approx(least_scale(cut, M)[0], rel=1e-6)
 
 

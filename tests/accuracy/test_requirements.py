@@ -13,9 +13,11 @@ from inputdesign_cli.accuracy import (
 )
 from inputdesign_cli.accuracy.admissible import Absolute
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Loop, PolynomialModel, Rational
+from inputdesign_cli.plant import PolynomialModel, Rational
 
 DENSE = np.unique(np.concatenate([np.linspace(0.0, np.pi, 20001), np.geomspace(1e-4, np.pi, 20001)]))
+
+BAND = (0.0, np.pi)
 
 
 def information(size, seed, scale=1.0):
@@ -53,20 +55,22 @@ def test_weighted_variance_is_the_definition(flexible):
     model = flexible.model
     M = information(6, 5, 1e3)
     for relative in (False, True):
-        requirement = WeightedVariance(flexible, W, 0.01, relative=relative)
-        gradient = model.plant_gradient(DENSE)
+        requirement = WeightedVariance(
+            experiment=flexible, band=BAND, entry=(0, 0), weight=W, limit=0.01, relative=relative
+        )
+        gradient = model.plant_gradient(DENSE)[:, :, 0, 0]
         expected = np.einsum("ni,ij,nj->n", gradient.conj(), np.linalg.inv(M), gradient).real
         expected *= np.abs(W.at(DENSE)) ** 2 / 0.01
         if relative:
-            expected /= np.abs(model.plant_at(DENSE)) ** 2
+            expected /= np.abs(model.plant_at(DENSE)[:, 0, 0]) ** 2
         np.testing.assert_allclose(requirement.ratios(M, DENSE) ** 2, expected, rtol=1e-9)
         worst = max(v.ratio for v in requirement.violations(M))
         assert worst**2 >= expected.max() * (1 - 1e-9)
 
 
 def models():
-    one = PolynomialModel.single(B=np.array([0, 3.6]), F=np.array([1, -0.7]), C=np.array([1, -0.9]))
-    two = PolynomialModel.single(A=np.array([1, -1.5, 0.7]), B=np.array([0, 1.0, 0.5]), variance=0.1)
+    one = PolynomialModel.single([0, 3.6], F=[1, -0.7], C=[1, -0.9])
+    two = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.5, 0.7], variance=0.1)
     return [one, two]
 
 
@@ -74,11 +78,13 @@ def models():
 @pytest.mark.parametrize("model", models(), ids=["bj", "arx"])
 def test_ellipsoid_bound_holds_on_the_ellipsoid_and_is_attained(model, against):
     """Models sampled on the ellipsoid r^2 M never exceed the bound, and come close to it."""
-    experiment = Experiment(Loop(model), 500)
+    experiment = Experiment(model, 500)
     k = experiment.size
     M = information(k, 7, 300.0)
     admissible = Relative(model, 0.3) if against == "relative" else Absolute(0.4)
-    requirement = EllipsoidError(experiment, admissible, 2.0, against)
+    requirement = EllipsoidError(
+        experiment=experiment, band=BAND, entry=(0, 0), admissible=admissible, alpha=2.0, against=against
+    )
     w = np.array([0.0, 0.2, 1.0, 2.5])
     ratio = requirement.ratios(M, w)
     half = np.linalg.inv(np.linalg.cholesky(M))
@@ -96,8 +102,8 @@ def test_ellipsoid_bound_holds_on_the_ellipsoid_and_is_attained(model, against):
                 value = value + (c + change) * q**lag
             return value
 
-        G = polynomial("b", model.B) / (polynomial("a", model.A) * polynomial("f", model.F))
-        G0 = model.plant_at(np.array([at]))[0]
+        G = polynomial("b", model.B[0][0]) / (polynomial("a", model.A[0]) * polynomial("f", model.F[0][0]))
+        G0 = model.plant_at(np.array([at])).item()
         error = np.abs(G - G0) / (np.abs(G) * 0.3 if against == "relative" else 0.4)
         assert error.max() <= 1 + 1e-9
         assert error.max() >= 0.97
@@ -106,9 +112,13 @@ def test_ellipsoid_bound_holds_on_the_ellipsoid_and_is_attained(model, against):
 def test_ellipsoid_bound_is_the_first_order_one_in_the_limit():
     """For a vanishing ellipsoid the linearisation is exact."""
     model = models()[0]
-    experiment = Experiment(Loop(model), 500)
+    experiment = Experiment(model, 500)
     M = information(3, 9)
     w = np.linspace(0.0, np.pi, 50)
-    exact = EllipsoidError(experiment, Relative(model, 1e-5), 2.0).ratios(M, w)
-    linear = ModelError(experiment, Relative(model, 1e-5), 2.0).ratios(M, w)
+    exact, linear = (
+        kind(
+            experiment=experiment, band=BAND, entry=(0, 0), admissible=Relative(model, 1e-5), alpha=2.0
+        ).ratios(M, w)
+        for kind in (EllipsoidError, ModelError)
+    )
     np.testing.assert_allclose(exact, linear, rtol=1e-4)

@@ -7,9 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-import jobs
 import pytest
-from sweep_files import SPEC, timeless_files, timeless_rows
 
 from inputdesign_cli import load_spec, simulate
 from inputdesign_cli.compute.cluster import Cluster
@@ -17,13 +15,15 @@ from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.sweep.running import sweep
+from tests.support import jobs
+from tests.support.sweep_files import SPEC, timeless_files, timeless_rows
 
 pytest.importorskip("distributed")
 # Dask's own warnings are not ours to mend.
 pytestmark = pytest.mark.filterwarnings("default")
 
 SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-PATHS = os.pathsep.join(str(Path(__file__).parents[up]) for up in (0, 2))
+PATHS = str(Path(__file__).parents[2])
 
 
 class Loopback:

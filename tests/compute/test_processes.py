@@ -5,12 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
-import jobs
 import pytest
 
 from inputdesign_cli.compute.executor import InProcess, WorkerLostError
 from inputdesign_cli.compute.processes import Processes
+from tests.support import jobs
 
 
 @pytest.mark.parametrize("executor", [InProcess(), Processes(1), Processes(2)])
@@ -54,10 +55,11 @@ def test_a_process_computes_on_one_thread_and_the_caller_keeps_its_settings(monk
     assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
 
 
+ROOT = Path(__file__).parents[2]
 CALLER = """
 import sys
 sys.path.insert(0, sys.argv[1])
-import jobs
+from tests.support import jobs
 from inputdesign_cli.compute.processes import Processes
 if __name__ == "__main__":
     for f in Processes(2).run(jobs.slow_identity, range(100)):
@@ -68,9 +70,7 @@ if __name__ == "__main__":
 def test_processes_end_with_a_killed_caller(tmp_path):
     script = tmp_path / "caller.py"
     script.write_text(CALLER)
-    caller = subprocess.Popen(
-        [sys.executable, str(script), os.path.dirname(jobs.__file__)], stdout=subprocess.PIPE, text=True
-    )
+    caller = subprocess.Popen([sys.executable, str(script), str(ROOT)], stdout=subprocess.PIPE, text=True)
     pids = {int(caller.stdout.readline()) for _ in range(4)}
     caller.send_signal(signal.SIGKILL)
     caller.communicate()

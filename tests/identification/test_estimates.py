@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 import scipy.optimize
 import scipy.signal
-from identification_systems import SYSTEMS, data, one_channel, row_of
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify
@@ -11,6 +10,7 @@ from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.spectrum import FirBasis
+from tests.support.identification_systems import SYSTEMS, data, one_channel, row_of
 
 
 def theory(name, samples):

@@ -2,10 +2,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from identification_systems import SYSTEMS, data
 
 from inputdesign_cli.identification import fit_batch, identify
 from inputdesign_cli.identification.estimators import estimator
+from tests.support.identification_systems import SYSTEMS, data
 
 
 @dataclass(frozen=True)

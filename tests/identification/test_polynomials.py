@@ -2,8 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from channel_plants import arrays, arx, box_jenkins
-from channel_records import shifted, simulated
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify, identify_polynomials
@@ -12,6 +10,8 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.spectrum import MatrixFirBasis
+from tests.support.plants import arrays, arx, box_jenkins
+from tests.support.records import shifted, simulated
 
 
 def theory(model, samples):

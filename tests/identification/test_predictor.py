@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 import scipy.signal
-from identification_systems import SYSTEMS, data, row_of
 
 from inputdesign_cli.identification.filters import Stream
 from inputdesign_cli.identification.predictor import errors_and_gradient, prediction_errors
+from tests.support.identification_systems import SYSTEMS, data, row_of
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

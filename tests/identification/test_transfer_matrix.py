@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.optimize
 import scipy.signal
-from channel_plants import descending, two_by_two
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.errors import SpecError
@@ -20,6 +19,7 @@ from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
+from tests.support.plants import descending, two_by_two
 
 STEP = 0.4
 SPECS = Path(__file__).parents[2] / "specs"

@@ -5,47 +5,48 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays, arx, paper_experiment
-from plants import random_case
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.information.record_transforms import RecordTransforms
 from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix
 from inputdesign_cli.signal import grid_lines, multisine_record
+from tests.support.plants import arrays, arx, paper_experiment
+from tests.support.random_plants import random_case
 
 
 @pytest.mark.parametrize("seed", [1, 5, 7, 9, 15])
 def test_prediction_gradient_is_the_derivative_of_the_prediction_error(seed):
     """Finite differences of epsilon = (D/C)(A y - (B/F) u) on noise-free data, open and closed loop."""
     case = random_case(seed)
-    experiment = Experiment(case.loop, 50)
-    model = case.loop.model
+    model, loop = case.model, case.loop
+    A, B, C, D, F = model.A[0], model.B[0][0], model.C[0], model.D[0], model.F[0][0]
     r = np.random.default_rng(seed).normal(size=50)
-    controller = case.loop.controller
     u, y = np.zeros(50), np.zeros(50)
-    den, nc = (controller.denominator_polynomial, controller.numerator) if controller else ([1.0], [0.0])
-    plant = np.convolve(model.A, model.F)
+    above, below = ([0.0], [1.0])
+    if loop is not None:
+        above, below = loop.controller.numerator[0, 0], loop.controller.denominator[0]
+    plant = np.convolve(A, F)
     feedback = np.zeros(50)
     for t in range(50):  # the loop, sample by sample
-        y[t] = sum(model.B[i] * u[t - i] for i in range(1, len(model.B)) if t >= i) - sum(
+        y[t] = sum(B[i] * u[t - i] for i in range(1, len(B)) if t >= i) - sum(
             plant[i] * y[t - i] for i in range(1, len(plant)) if t >= i
         )
-        feedback[t] = sum(nc[i] * y[t - i] for i in range(len(nc)) if t >= i) - sum(
-            den[i] * feedback[t - i] for i in range(1, len(den)) if t >= i
+        feedback[t] = sum(above[i] * y[t - i] for i in range(len(above)) if t >= i) - sum(
+            below[i] * feedback[t - i] for i in range(1, len(below)) if t >= i
         )
         u[t] = r[t] - feedback[t]
 
     def residual(theta):
         values = dict(zip(model.names, theta, strict=True))
-        p = {}
-        for letter in "ABCDF":
-            p[letter] = np.array(getattr(model, letter), dtype=float)
-            for lag in range(len(p[letter])):
-                p[letter][lag] = values.get(f"{letter.lower()}{lag}", p[letter][lag])
+        p = {
+            letter: [values.get(f"{letter.lower()}{lag}", c) for lag, c in enumerate(own)]
+            for letter, own in {"A": A, "B": B, "C": C, "D": D, "F": F}.items()
+        }
         clean = scipy.signal.lfilter(p["A"], [1.0], y) - scipy.signal.lfilter(p["B"], p["F"], u)
         return scipy.signal.lfilter(p["D"], p["C"], clean)
 
-    found = FiniteRecord(experiment, 50).gradient(r[:, None])[:, :, 0] * np.sqrt(model.variance)
+    experiment = case.experiment(50)
+    found = FiniteRecord(experiment, 50).gradient(r[:, None])[:, :, 0] * np.sqrt(model.covariance[0, 0])
     h = 1e-6
     for k in range(len(model.names)):
         if model.names[k][0] in "cd":
@@ -158,7 +159,7 @@ def test_the_adjoint_of_an_output():
 @pytest.mark.parametrize("seed", range(8))
 def test_difference_equations_and_transforms_agree(seed):
     """Open and closed loops of one channel: signals, their adjoints and gradients, two ways."""
-    experiment = Experiment(random_case(seed).loop, 200)
+    experiment = random_case(seed).experiment(200)
     fast, general = FiniteRecord(experiment, 200), RecordTransforms(experiment, 200, 1.0)
     record, weights = np.random.default_rng(seed).normal(size=(2, 200, 1))
     for kind in ("input", "output"):

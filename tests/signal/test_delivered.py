@@ -1,14 +1,13 @@
 """The delivered records of random designs: they meet the accuracy by themselves, at little extra power."""
 
 import pytest
-from plants import random_case
 
-from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.design.convex.designs import Question, solve_design
-from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
 from inputdesign_cli.spectrum import FirBasis
 from inputdesign_cli.tasks.record import worst_ratio
+from tests.support.random_plants import random_case
 
 EXTRA = {500: 0.10, 5000: 0.03}
 
@@ -16,12 +15,8 @@ EXTRA = {500: 0.10, 5000: 0.03}
 def delivered(seed, samples, **settings):
     """The design of a random case for so many samples, its record, and what that attains, all recomputed."""
     case = random_case(seed)
-
-    def requirement(experiment):
-        return ModelError(experiment, case.admissible, case.alpha, case.band)
-
     question = Question(
-        Experiment(case.loop, samples), FirBasis(case.order), "cost", [requirement], cost=case.cost
+        case.experiment(samples), FirBasis(case.order), "cost", [case.requirement], cost=case.cost
     )
     design = solve_design(question, tolerance=1e-6)
     problem, x = design.problem, design.result.x

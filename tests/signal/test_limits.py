@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from channel_plants import arx
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.signal import (
@@ -18,6 +17,7 @@ from inputdesign_cli.signal import (
 from inputdesign_cli.signal.constraints import compressed, slow_moves
 from inputdesign_cli.signal.level_search import first_level, last_level, least_level, level_of_power
 from inputdesign_cli.spectrum import FirBasis
+from tests.support.plants import arx
 
 COLOURED = np.array([1.0, 0.7, 0.3])
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweep_files import SPEC
 
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.runs.results import Results, Table
+from tests.support.sweep_files import SPEC
 
 
 @pytest.fixture

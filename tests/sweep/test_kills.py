@@ -8,7 +8,8 @@ import sys
 import time
 
 import pytest
-from sweep_files import timeless_files, timeless_rows
+
+from tests.support.sweep_files import timeless_files, timeless_rows
 
 
 def command(spec, out, points):

@@ -6,13 +6,13 @@ import subprocess
 import sys
 
 import pytest
-from sweep_files import rows, timeless_files, timeless_rows
 
 from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import InfeasibleError, OutputError, SpecError
 from inputdesign_cli.sweep.layout import Layout
 from inputdesign_cli.sweep.running import list_points, sweep
 from inputdesign_cli.sweep.table import scalars
+from tests.support.sweep_files import rows, timeless_files, timeless_rows
 
 
 def test_every_point_is_a_row_and_a_run(spec, stub, tmp_path):

@@ -7,13 +7,13 @@ import cvxpy as cp
 import numpy as np
 import pytest
 import scipy.integrate
-from channel_plants import arx
 
 from inputdesign_cli import load_spec, solve, validate
 from inputdesign_cli.errors import EXIT_BAD_INPUT, SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
+from tests.support.plants import arx
 
 SPECS = Path(__file__).parents[2] / "specs"
 

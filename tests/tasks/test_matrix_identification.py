@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import scipy.signal
 import yaml
-from channel_records import simulated
 from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, validate
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.tasks.build.system import build_experiment, build_model
+from tests.support.records import simulated
 
 SPEC = "specs/two_by_two_arx.yaml"
 SHORT = ["spectrum.order=4", "accuracy.model_error.relative=0.3"]

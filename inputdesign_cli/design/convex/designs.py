@@ -25,6 +25,8 @@ from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
 
 _ANY_SPECTRUM_TOLERANCE = 1e-6
 _KEEPS = 1e-9
+# Shares of the least eigenvalue of the information that lines may take with them.
+_ROUNDING, _FAINT = 1e-12, 1e-9
 _FAR_BELOW = 1e-12
 _UNEXCITED = 1e-13
 _PLENTY = 1e9
@@ -85,7 +87,7 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     if power == 0.0 and not problem.has_floors:
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
     within = excess(flat, white) <= _KEEPS
-    result = _solve(problem, problem.basis.spread(powers), tolerance)
+    result = _without_faint_lines(problem, _solve(problem, problem.basis.spread(powers), tolerance))
     if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
     loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
@@ -172,6 +174,31 @@ def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
     same = basis is problem.basis
     problem = replace(problem, basis=basis, finer=problem if same else None)
     return exchange(problem, start, tolerance=tolerance, interior=interior)
+
+
+def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:
+    """The same design without the sinusoids that together hardly change its information.
+
+    The solver leaves a little power everywhere. Power alone does not tell what can go: in a loop with
+    integral action power near frequency zero is almost free of charge, and dwarfs that of lines that matter.
+    Where the cost is sought the other lines make up for those that go.
+    """
+    if found.basis.has_density or problem.has_floors or not found.x.any():
+        return found
+    at = problem.on(found.basis)
+    told = found.x * np.linalg.norm(at.information_map, axis=(1, 2))
+    least = max(float(np.linalg.eigvalsh(found.information)[0]), 0.0)
+    order = np.argsort(told)
+    lost = np.cumsum(told[order])
+    faint = lost <= (_ROUNDING if problem.scaled else _FAINT) * least
+    if not np.any(faint):
+        return found
+    x = found.x.copy()
+    x[order[faint]] = 0.0
+    if problem.scaled:
+        return replace(found, x=x)
+    x *= 1.0 + 2.0 * lost[faint][-1] / least
+    return replace(found, x=x, objective=at.price.at(x), information=at.information(x))
 
 
 def _white(question: Question, flat: Problem, power: float) -> Candidate:

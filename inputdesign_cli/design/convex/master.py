@@ -96,8 +96,8 @@ def solve_master(
     congruence = _congruence(best.information, definite=problem.needs_definite)
     objective, worth = best.objective, problem.price.at(best.z)
     scaled = 1 if problem.scaled else 0
-    moved = [cut.moved(congruence) for cut, _ in cuts]
-    parts = [cut.blocks(k) for cut in moved]
+    transformed = [cut.transformed(congruence) for cut, _ in cuts]
+    parts = [cut.blocks(k) for cut in transformed]
     widths = [blocks[0].auxiliary.shape[1] for blocks in parts]
     starts = np.concatenate([[0], np.cumsum(widths)]).astype(int) + number + entries + scaled
     total = number + entries + scaled + sum(widths)
@@ -143,7 +143,7 @@ def solve_master(
     kept = worth * np.maximum(solution.x[inside:number], 0.0)
     remaining = list(solution.multipliers[first:])
     proofs = []
-    for cut, conic in zip(moved, parts, strict=True):
+    for cut, conic in zip(transformed, parts, strict=True):
         mine, remaining = remaining[: len(conic)], remaining[len(conic) :]
         Y, r = cut.proof(mine)
         proofs.append((objective * congruence.T @ Y @ congruence, objective * r))

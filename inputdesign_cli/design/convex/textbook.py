@@ -60,7 +60,7 @@ def solve_on_grid(
     maps = inverse @ problem.information_map @ inverse.T
     offset = inverse @ problem.baseline_information @ inverse.T
     information = offset + sum(power * c[i] * _symmetric(maps[i]) for i in range(basis.size))
-    cuts = [r.cut(float(w)).moved(inverse) for r in requirements for w in frequencies]
+    cuts = [r.cut(float(w)).transformed(inverse) for r in requirements for w in frequencies]
     lmis = [information - _symmetric(cut.matrix) >> 0 for cut in cuts]
     program = cp.Problem(cp.Minimize((power / unit_cost) * problem.price.vector @ c), constraints + lmis)
     try:

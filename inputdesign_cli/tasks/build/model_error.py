@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.special
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import (
     Absolute,
@@ -17,6 +18,7 @@ from inputdesign_cli.accuracy import (
     active_entries,
 )
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
+from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.specification import ModelError as StatedError
@@ -29,6 +31,9 @@ from inputdesign_cli.tasks.build.tables import has_column
 from inputdesign_cli.tasks.build.weights import build_weight, rational
 
 _KEY = "accuracy.model_error"
+# A pole this near to the circle is on it, as far as an estimate can tell.
+_ON_THE_CIRCLE = 1e-9
+_GROWS = 5.0
 
 
 def confidence_factor(probability: float, parameters: int) -> float:
@@ -108,9 +113,50 @@ def _on_entry(
             alpha=alpha,
             against="absolute" if error.relative is None else "relative",
         )
+    check_bounded(spec, made, _KEY)
     units = build_units(spec)
     check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
     return made
+
+
+def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
+    """Raise `SpecError` (`unbounded-error`) where no information is enough for the requirement.
+
+    That is at a pole of G on the unit circle: the estimated pole is off by a little, and the error of G
+    there grows faster than G itself.
+    """
+    lo, hi = requirement.band
+    units = build_units(spec)
+    for point in requirement.grid_singularities:
+        at = float(point.real)
+        if point.imag > _ON_THE_CIRCLE or not lo <= at <= hi:
+            continue
+        near = at + np.array([1e-5, 1e-6]) * hi * (1.0 if at + 1e-5 * hi <= hi else -1.0)
+        # A zero of G makes relative rows grow, and a weight may hide a pole: both must grow.
+        if all(_grows(rows) for rows in (requirement.plant_rows(near), requirement.rows(near))):
+            where = f"{at / units.frequency:.6g} {units.per_time}"
+            raise spec.complain(
+                "unbounded-error",
+                f"G has a pole on the unit circle, at {where}, that is estimated: no experiment bounds the "
+                "error there",
+                hint="leave that frequency out, such as "
+                f"{key}.band: [{_beside(at, lo, hi, units.frequency)}]",
+                key=key,
+            )
+
+
+def _grows(rows: NDArray[np.float64]) -> bool:
+    """Whether the second of two rows (2, q, k), ten times nearer to a point, is far larger than the first."""
+    far, close = np.abs(rows).max(axis=(1, 2))
+    return not np.isfinite(close) or bool(close > _GROWS * far)
+
+
+def _beside(at: float, lo: float, hi: float, unit: float) -> str:
+    """The larger part of the band without the frequency, in the user's unit."""
+    margin = 1e-2 * (hi - lo)
+    left, right = (lo, at - margin), (at + margin, hi)
+    edges = right if right[1] - right[0] >= left[1] - left[0] else left
+    return ", ".join(f"{edge / unit:.4g}" for edge in edges)
 
 
 def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:

@@ -14,7 +14,12 @@ from inputdesign_cli.design.convex.problem import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.model_error import build_model_errors, confidence_factor, required_band
+from inputdesign_cli.tasks.build.model_error import (
+    build_model_errors,
+    check_bounded,
+    confidence_factor,
+    required_band,
+)
 from inputdesign_cli.tasks.build.system import embedded
 from inputdesign_cli.tasks.build.weights import build_weight
 
@@ -63,7 +68,7 @@ def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | 
 
 
 def _model_errors(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    return [_moved(error) for error in build_model_errors(spec, experiment)]
+    return [_maker(error) for error in build_model_errors(spec, experiment)]
 
 
 def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
@@ -91,7 +96,7 @@ def _standard_deviations(spec: Spec, experiment: Experiment) -> list[Requirement
     ]
 
 
-def _moved(requirement: OverFrequency) -> RequirementFactory:
+def _maker(requirement: OverFrequency) -> RequirementFactory:
     return lambda experiment: replace(requirement, experiment=experiment)
 
 
@@ -124,10 +129,11 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
         )
         for entry in active_entries(experiment.model, band[1])
     ]
-    if stated.relative:
-        for variance in found:
+    for variance in found:
+        check_bounded(spec, variance, key)
+        if stated.relative:
             _check_nowhere_zero(spec, variance)
-    return [_moved(variance) for variance in found]
+    return [_maker(variance) for variance in found]
 
 
 def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:

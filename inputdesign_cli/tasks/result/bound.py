@@ -37,7 +37,8 @@ def bound_curves(
         label: what gave r_u.
     """
     binding = np.zeros(0) if active is None else active
-    w = _axis(errors, information, binding)
+    peaks = _peaks(errors, information) if stated else np.zeros(0)
+    w = _axis(errors, np.concatenate([binding, peaks]))
     frequency = w / units.frequency
     columns: dict[str, Array] = {units.frequency_header: frequency}
     panels = []
@@ -66,10 +67,13 @@ def bound_curves(
     return Table(columns), BoundCurves(tuple(panels))
 
 
-def _axis(errors: Sequence[BoundedError], information: Array, active: Array) -> Array:
-    """Frequencies of the band with all peaks of the ratios, and what shows the shape of resonances."""
-    peaks = [v.frequency for error in errors for v in error.violations(information, above=_NEARLY)]
+def _peaks(errors: Sequence[BoundedError], information: Array) -> Array:
+    found = [v.frequency for error in errors for v in error.violations(information, above=_NEARLY)]
+    return np.array([w for w in found if w is not None])
+
+
+def _axis(errors: Sequence[BoundedError], extra: Array) -> Array:
+    """Frequencies of the band with the `extra` ones, and what shows the shape of resonances."""
     grid = np.unique(np.concatenate([error.grid for error in errors]))
     shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]
-    extra = np.concatenate([active, shape, np.array([w for w in peaks if w is not None])])
-    return axis(*errors[0].band, extra)
+    return axis(*errors[0].band, np.concatenate([extra, shape]))

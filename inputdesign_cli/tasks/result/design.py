@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from inputdesign_cli.design.convex.designs import Design, Question
 from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
@@ -48,7 +48,7 @@ class Designed:
         return self.design.problem.on(self.design.result.basis)
 
 
-def design_result(done: Designed, how: dict[str, Any], tolerance: float) -> dict[str, Any]:
+def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dict[str, Json]:
     """The content of `result.json` but for signal and timing.
 
     Args:
@@ -57,7 +57,7 @@ def design_result(done: Designed, how: dict[str, Any], tolerance: float) -> dict
     found, problem = done.design.result, done.design.problem
     status = how.pop("status")
     cost = _cost(done, found.basis, found.x)
-    result: dict[str, Any] = {
+    result: dict[str, Json] = {
         "format": 1,
         "title": done.header.title,
         "status": status,
@@ -80,9 +80,9 @@ def design_result(done: Designed, how: dict[str, Any], tolerance: float) -> dict
     return result
 
 
-def information_entry(experiment: Experiment, information: Array) -> dict[str, Any]:
+def information_entry(experiment: Experiment, information: Array) -> dict[str, Json]:
     """The information matrix in raw parameters, its inverse and the predicted standard deviations."""
-    entry: dict[str, Any] = {
+    entry: dict[str, Json] = {
         "parameters": list(experiment.model.names),
         "matrix": experiment.to_raw(information),
     }
@@ -99,10 +99,10 @@ def information_entry(experiment: Experiment, information: Array) -> dict[str, A
 
 def requirements_entry(
     units: Units, alpha: float, requirements: Sequence[Requirement], information: Array, active: Array
-) -> dict[str, Any]:
+) -> dict[str, Json]:
     """`model_error` of the contract, and the worst ratio of each requirement."""
-    listed: list[dict[str, Any]] = []
-    entry: dict[str, Any] = {"alpha": alpha}
+    listed: list[dict[str, Json]] = []
+    entry: dict[str, Json] = {"alpha": alpha}
     for requirement in requirements:
         if requirement.criterion is not None:
             continue
@@ -116,10 +116,10 @@ def requirements_entry(
     return {"model_error": entry, "requirements": listed} if listed else {"model_error": entry}
 
 
-def requirement_entry(units: Units, requirement: Requirement, information: Array) -> dict[str, Any]:
+def requirement_entry(units: Units, requirement: Requirement, information: Array) -> dict[str, Json]:
     """A requirement with its worst ratio, and where that is."""
     violation = requirement.worst(information)
-    item: dict[str, Any] = {"name": requirement.name, "worst_ratio": violation.ratio}
+    item: dict[str, Json] = {"name": requirement.name, "worst_ratio": violation.ratio}
     if violation.frequency is not None:
         item["frequency"] = violation.frequency / units.frequency
     if requirement.entry is not None and not units.single:
@@ -144,7 +144,7 @@ def _cost(done: Designed, basis: Basis, x: Array) -> float:
     return total
 
 
-def _objective(design: Design) -> dict[str, Any]:
+def _objective(design: Design) -> dict[str, Json]:
     found, anything = design.result, design.any_spectrum
     value, bound, any_bound = found.objective, found.certificate.bound, anything.certificate.bound
     criterion, goal = design.problem.stated_criterion, design.problem.goal
@@ -178,12 +178,12 @@ def _information(done: Designed) -> Array:
     return candidate_at(done.problem, samples * done.design.result.x, samples).information
 
 
-def _white(done: Designed, cost: float) -> dict[str, Any]:
+def _white(done: Designed, cost: float) -> dict[str, Json]:
     """Flat excitation that meets the same requirements, or exhausts the same limits."""
     design, problem = done.design, done.design.problem
     basis, x = flat_basis(problem.experiment), np.array([design.white_power])
     white_cost = _cost(done, basis, x)
-    entry: dict[str, Any] = {
+    entry: dict[str, Json] = {
         "cost": white_cost,
         "power": powers(problem, basis, x),
         "ratio": white_cost / cost if cost > 0 else 1.0,
@@ -199,14 +199,14 @@ def _white(done: Designed, cost: float) -> dict[str, Any]:
     return entry
 
 
-def _limits(done: Designed) -> list[dict[str, Any]]:
+def _limits(done: Designed) -> list[dict[str, Json]]:
     """Each power limit with what the design uses of it, and the tightest place of density limits."""
     x, at = done.design.result.x, done.problem
-    entries: list[dict[str, Any]] = []
+    entries: list[dict[str, Json]] = []
     for limit in done.question.limits:
         value = at.power(limit.kind, limit.channel).at(x)
         slack = (limit.bound - value) if limit.upper else (value - limit.bound)
-        entry: dict[str, Any] = {"name": f"{limit.kind}_power"}
+        entry: dict[str, Json] = {"name": f"{limit.kind}_power"}
         if limit.channel is not None:
             entry["channel"] = limit.channel + 1
         entry |= {

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.information import PowerKind
+from inputdesign_cli.runs.results import Json
 
 _ROUNDING = 1e-9
 
@@ -27,7 +27,7 @@ class StatedLimits:
 
 
 def broken_limits(
-    limits: StatedLimits, samples: int, power: Mapping[PowerKind, list[float]], signal: Mapping[str, Any]
+    limits: StatedLimits, samples: int, power: Mapping[PowerKind, list[float]], signal: Mapping[str, Json]
 ) -> list[str]:
     """A note for each limit that the excitation does not keep.
 
@@ -50,7 +50,7 @@ def _powers(limits: StatedLimits, power: Mapping[PowerKind, list[float]]) -> Ite
             yield f"{limit.key} is not kept: the power of {of} is {value:.6g}, {side} {limit.bound:.6g}"
 
 
-def _single_samples(limits: StatedLimits, signal: Mapping[str, Any]) -> Iterator[str]:
+def _single_samples(limits: StatedLimits, signal: Mapping[str, Json]) -> Iterator[str]:
     stated = (
         ("limits.amplitude.input", limits.input, "input_peak"),
         ("limits.amplitude.output", limits.output, "output_peak"),

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import SignalCurves, Table
+from inputdesign_cli.runs.results import Json, SignalCurves, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import DesignedSpectrum, Lines, Record
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
@@ -28,7 +27,7 @@ def signal_entry(
     *,
     designed: Array | None = None,
     spectrum: DesignedSpectrum | None = None,
-) -> dict[str, Any]:
+) -> dict[str, Json]:
     """What `result.json` says of a record: powers and peaks by channel, and what it achieves.
 
     For a criterion that is the criterion that the record reaches, per as many samples as the experiment has,
@@ -40,7 +39,7 @@ def signal_entry(
     """
     samples = record.samples
     plant = FiniteRecord(experiment, len(samples), units.step)
-    entry: dict[str, Any] = {"type": record.method}
+    entry: dict[str, Json] = {"type": record.method}
     if record.method == "multisine":
         entry["phases"] = request.settings.phases
     entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
@@ -91,7 +90,7 @@ def other_files(request: RecordRequest, units: Units, record: Record) -> dict[st
         import scipy.io
 
         table, _ = signal_curves(request, units, record)
-        content: dict[str, Any] = {name: values[:, None] for name, values in table.columns.items()}
+        content: dict[str, Json] = {name: values[:, None] for name, values in table.columns.items()}
         buffer = io.BytesIO()
         scipy.io.savemat(buffer, content | {"sample_time": units.sample_time})
         # The first 116 bytes are a text with the date, which would make equal runs differ.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import OptimalityCurves, SpectrumCurves, Table
+from inputdesign_cli.runs.results import Json, OptimalityCurves, SpectrumCurves, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum, best_directions, matrices
 
@@ -136,12 +135,12 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
     return table, OptimalityCurves(frequency, ratio, marks / units.frequency)
 
 
-def spectrum_entry(units: Units, basis: Basis, x: Array) -> dict[str, Any]:
+def spectrum_entry(units: Units, basis: Basis, x: Array) -> dict[str, Json]:
     """What `result.json` says of a designed spectrum."""
     return {name: plain_complex(value) for name, value in basis.described(x, units.frequency).items()}
 
 
-def plain_complex(values: Any) -> Any:
+def plain_complex(values: Json) -> Json:
     """Complex numbers as {re, im}; all else as it is."""
     if not isinstance(values, np.ndarray) or not np.iscomplexobj(values):
         return values

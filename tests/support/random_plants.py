@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Absolute, AdmissibleError, Relative, Sensitivity, Table
-from inputdesign_cli.plant import Loop, PolynomialModel, Rational
+from inputdesign_cli.accuracy import Absolute, AdmissibleError, ModelError, Relative, Sensitivity, Table
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Loop, PolynomialModel, Rational, TransferMatrix, close_loop
 
 STRUCTURES = ("oe", "arx", "armax", "bj", "fir", "general")
 
@@ -46,17 +47,17 @@ def random_model(rng: np.random.Generator, structure: str, order: int) -> Polyno
     return PolynomialModel.single(A=A, B=B, C=C, D=D, F=F, variance=float(rng.uniform(0.1, 2.0)))
 
 
-def random_loop(rng: np.random.Generator, model: PolynomialModel, *, closed: bool) -> Loop:
-    """Open loop, or a random low-order controller at a gain that keeps the loop well inside stability."""
+def random_loop(rng: np.random.Generator, model: PolynomialModel, *, closed: bool) -> Loop | None:
+    """None for open loop, or a random low-order controller at a gain well inside stability."""
     if not closed:
-        return Loop(model)
+        return None
     pole = rng.uniform(0.2, 0.995)
     shape = np.array([1.0, -rng.uniform(0.0, 0.9)])
+    slowest = max(np.abs(np.roots(np.convolve(model.A[0], model.F[0][0]))).max(initial=0.0), pole)
     gain = 1.0
     for _ in range(80):
-        loop = Loop(model, Rational.build(list(gain * shape), [1.0, -pole]))
-        poles = np.roots(loop.characteristic)
-        if np.abs(poles).max(initial=0.0) < 0.5 + 0.5 * max(np.abs(model.poles).max(initial=0.0), pole):
+        loop = close_loop(model, TransferMatrix.build([[gain * shape]], [[[1.0, -pole]]]))
+        if np.abs(loop.closed_poles).max(initial=0.0) < 0.5 + 0.5 * slowest:
             return loop
         gain *= 0.7
     raise AssertionError("a small enough gain never destabilises a stable plant")
@@ -67,13 +68,28 @@ class Case:
     """One random design problem."""
 
     name: str
-    loop: Loop
+    model: PolynomialModel
+    loop: Loop | None
     admissible: AdmissibleError
     alpha: float
     samples: int
     order: int
     cost: dict[str, float]
     band: tuple[float, float]
+
+    def experiment(self, samples: int | None = None) -> Experiment:
+        """Its experiment, of another length if one is given."""
+        return Experiment(self.model, samples or self.samples, loop=self.loop)
+
+    def requirement(self, experiment: Experiment) -> ModelError:
+        """Its accuracy, in the coordinates of an experiment."""
+        return ModelError(
+            experiment=experiment,
+            band=self.band,
+            entry=(0, 0),
+            admissible=self.admissible,
+            alpha=self.alpha,
+        )
 
 
 def random_case(seed: int) -> Case:
@@ -85,23 +101,25 @@ def random_case(seed: int) -> Case:
     loop = random_loop(rng, model, closed=closed)
     kind = ("relative", "absolute", "table", "sensitivity" if closed else "relative")[(seed // 3) % 4]
     w = np.geomspace(1e-3, np.pi, 25)
-    level = float(np.median(np.abs(model.plant_at(w))))
+    size = np.abs(model.plant_at(w)[:, 0, 0])
+    level = float(np.median(size))
     admissible: AdmissibleError
     if kind == "absolute":
         admissible = Absolute(0.05 * level)
     elif kind == "table":
-        admissible = Table(w, 0.1 * np.abs(model.plant_at(w)) * np.exp(0.3 * rng.normal(size=w.size)))
+        admissible = Table(w, 0.1 * size * np.exp(0.3 * rng.normal(size=w.size)))
     elif kind == "sensitivity":
-        controller = loop.controller
+        assert loop is not None
         grid = np.linspace(0, np.pi, 20001)
-        C, G = controller.at(grid), model.plant_at(grid)
+        C, G = loop.controller.at(grid)[:, 0, 0], model.plant_at(grid)[:, 0, 0]
         peak = float(np.max(1 / np.abs(1 + C * G)))
-        admissible = Sensitivity(model, controller, Rational.build([0.8 / peak], [1.0]))
+        admissible = Sensitivity(loop, Rational.build([0.8 / peak], [1.0]))
     else:
-        admissible = Relative(model, float(rng.choice([0.01, 0.1, 0.25])))
+        admissible = Relative(model, float(rng.choice([0.01, 0.1, 0.25])), (0, 0))
     weights = {"input": float(rng.uniform(0, 1)), "output": float(rng.uniform(0, 1)), "excitation": 0.01}
     return Case(
         name=f"{seed}-{structure}-{'closed' if closed else 'open'}-{kind}",
+        model=model,
         loop=loop,
         admissible=admissible,
         alpha=float(rng.uniform(1.5, 4.0)),

@@ -21,8 +21,9 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Loop, PolynomialModel, zero_order_hold
+from inputdesign_cli.plant import PolynomialModel, zero_order_hold
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from tests.support.on_grid import OnGrid
 
 GRID = np.unique(np.concatenate([np.linspace(0.0, np.pi, 4001), np.geomspace(1e-4, np.pi, 4001)]))
 ORDER = 8
@@ -36,8 +37,18 @@ def solve(experiment, goal="cost", requirements=(), order=ORDER, **more):
     return solve_design(question, tolerance=1e-7)
 
 
+def model_error(experiment, fraction, alpha, kind=ModelError):
+    """The error of G of one input and output, relative to |G|, at every frequency."""
+    admissible = Relative(experiment.model, fraction, (0, 0))
+    return kind(experiment=experiment, band=(0.0, np.pi), entry=(0, 0), admissible=admissible, alpha=alpha)
+
+
 def relative(fraction=0.01, alpha=2.45):
-    return [lambda e: ModelError(e, Relative(e.model, fraction), alpha)]
+    return [lambda e: model_error(e, fraction, alpha)]
+
+
+def anywhere():
+    return LinesBasis.anywhere(0.0, np.pi, 1)
 
 
 def criterion(letter):
@@ -80,8 +91,8 @@ def gram_program(problem, order, unit=1.0):
 @pytest.mark.parametrize("letter", ["D", "A", "E", "T"])
 def test_criteria_agree_with_a_plain_program(letter):
     """log_det, tr_inv, lambda_min and trace of cvxpy under two power limits."""
-    model = PolynomialModel.single(A=np.array([1, -0.8]), B=np.array([0, 1.0, 0.4]), variance=0.5)
-    experiment = Experiment(Loop(model), 100)
+    model = PolynomialModel.single([0, 1.0, 0.4], A=[1, -0.8], variance=0.5)
+    experiment = Experiment(model, 100)
     limits = [PowerLimit("input", 1.0), PowerLimit("output", 2.5)]
     design = solve(experiment, "factor", criterion(letter), limits=limits)
     check(design)
@@ -101,8 +112,8 @@ def test_criteria_agree_with_a_plain_program(letter):
 
 def resonant():
     """A lightly damped OE system, where cheap inputs and quiet outputs are different things."""
-    model = PolynomialModel.single(B=np.array([0, 1.0, 0.3]), F=np.array([1, -1.4, 0.81]), variance=0.2)
-    return Experiment(Loop(model), 300)
+    model = PolynomialModel.single([0, 1.0, 0.3], F=[1, -1.4, 0.81], variance=0.2)
+    return Experiment(model, 300)
 
 
 def test_capped_least_cost_agrees_with_a_plain_program():
@@ -261,20 +272,20 @@ def test_contradictory_limits_are_proved(first_order):
     """Input power times the peak of |G|^2 is the most output power there is."""
     floors = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
     with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), basis=LinesBasis.anywhere(GRID), limits=floors)
+        solve(first_order, requirements=relative(), basis=anywhere(), limits=floors)
     assert caught.value.limits_alone
     assert caught.value.nearest.certificate.bound == pytest.approx(288.0 / 144.0, rel=1e-4)
 
 
 def test_too_few_lines_are_refused():
-    model = PolynomialModel.single(A=np.array([1, -0.5, 0.3]), B=np.array([0, 1.0, 0.5]))
-    experiment = Experiment(Loop(model), 100000)
-    oe = Experiment(Loop(dataclasses.replace(model, A=np.ones(1), F=model.A)), 100)
+    B, A = [0, 1.0, 0.5], [1, -0.5, 0.3]
+    experiment = Experiment(PolynomialModel.single(B, A=A), 100000)
+    oe = Experiment(PolynomialModel.single(B, F=A), 100)
     with pytest.raises(SpecError) as caught:
-        solve(oe, requirements=relative(0.1), basis=LinesBasis(np.array([0.4])))
+        solve(oe, requirements=relative(0.1), basis=LinesBasis.at(np.array([0.4]), 1))
     assert caught.value.diagnostics[0].code == "too-few-lines"
     # ARX learns from the noise as well, so that a modest accuracy is within reach of a single line.
-    line = LinesBasis(np.array([0.4]))
+    line = LinesBasis.at(np.array([0.4]), 1)
     assert solve(experiment, requirements=relative(0.3), basis=line).result.gap <= 1e-6
     with pytest.raises(InfeasibleError):
         solve(experiment, requirements=relative(0.001), basis=line)
@@ -285,7 +296,7 @@ def test_too_few_lines_are_refused():
 
 def test_application_example_of_the_peer():
     """y = 10 u(t-1) - 9 u(t-2) + e: chi2(0.95, 2) * 100 / 2 * 2 = N c_0 for b2, by hand 1.1982929."""
-    experiment = Experiment(Loop(PolynomialModel.single(B=np.array([0, 10.0, -9.0]))), 500)
+    experiment = Experiment(PolynomialModel.single([0, 10.0, -9.0]), 500)
     target = 5.991464547107979 * 100 / 2 * np.diag([0.0, 2.0])
     design = solve(experiment, requirements=[lambda e: InformationTarget(e.whiten_matrix(target))], order=19)
     check(design)
@@ -295,7 +306,7 @@ def test_application_example_of_the_peer():
 
 @pytest.mark.parametrize(("letter", "value"), [("A", -1.0412035), ("E", 1.0), ("D", 4.6912898)])
 def test_criteria_of_the_peer(letter, value):
-    experiment = Experiment(Loop(PolynomialModel.single(A=np.array([1, 0.95]), B=np.ones(1))), 1)
+    experiment = Experiment(PolynomialModel.single([1.0], A=[1, 0.95]), 1)
     design = solve(experiment, "factor", criterion(letter), order=19, limits=[PowerLimit("input", 1.0)])
     check(design)
     ours = Criterion(letter, np.eye(2))
@@ -306,12 +317,14 @@ def test_criteria_of_the_peer(letter, value):
 
 def weighted_example():
     model = PolynomialModel.single(
-        A=np.array([1, -1.99185, 2.20265, -1.84083, 0.89413]),
-        B=np.array([0, 0, 0, 0.10276, 0.18123]),
-        variance=0.05,
+        [0, 0, 0, 0.10276, 0.18123], A=[1, -1.99185, 2.20265, -1.84083, 0.89413], variance=0.05
     )
     T = zero_order_hold([0.16], [1, 0.56, 0.16], 1.0)
-    return Experiment(Loop(model), 500), [lambda e: WeightedVariance(e, T, 0.01, relative=True)]
+    return Experiment(model, 500), [
+        lambda e: WeightedVariance(
+            experiment=e, band=(0.0, np.pi), entry=(0, 0), weight=T, limit=0.01, relative=True
+        )
+    ]
 
 
 def test_weighted_variance_example_of_the_peer():
@@ -323,17 +336,8 @@ def test_weighted_variance_example_of_the_peer():
     requirement = design.problem.requirements[0]
     grid = np.linspace(1e-3, np.pi, 100)
 
-    class OnGrid:
-        name = "on a grid"
-        ratios, cut = requirement.ratios, requirement.cut
-
-        def violations(self, information, *, above=-np.inf):
-            found = requirement.ratios(information, grid)
-            kind = type(requirement.violations(information)[0])
-            return [kind(float(r), float(w)) for r, w in zip(found, grid, strict=True) if r > above]
-
-    coarse = dataclasses.replace(design.problem, requirements=(OnGrid(),))
-    answer = exchange(coarse, design.white_power * coarse.basis.white, tolerance=1e-7)
+    coarse = dataclasses.replace(design.problem, requirements=(OnGrid(requirement, grid),))
+    answer = exchange(coarse, design.white_power * coarse.basis.even, tolerance=1e-7)
     assert answer.objective == pytest.approx(0.5692322, rel=1e-5)
 
 
@@ -342,7 +346,7 @@ def test_weighted_variance_example_of_the_peer():
 
 def test_free_optimum_of_the_first_order_system(first_order):
     """docs/errata.md: 0.1925467, one line at 0.1553."""
-    design = solve(first_order, requirements=relative(), basis=LinesBasis.anywhere(GRID))
+    design = solve(first_order, requirements=relative(), basis=anywhere())
     check(design)
     assert design.result.objective == pytest.approx(0.1925467, rel=1e-6)
     basis, x = design.result.basis, design.result.x
@@ -354,7 +358,7 @@ def test_more_lines_cost_less(first_order):
     """Lines of a period within those of its double; all above the optimum over every spectrum."""
     costs = [
         solve(
-            first_order, requirements=relative(), basis=LinesBasis(np.pi * np.arange(1, n + 1) / n)
+            first_order, requirements=relative(), basis=LinesBasis.at(np.pi * np.arange(1, n + 1) / n, 1)
         ).result.objective
         for n in (10, 20, 40, 80)
     ]
@@ -372,7 +376,7 @@ def test_order_300(first_order):
 def test_ellipsoid_needs_more_than_the_linearisation(first_order):
     """A third of |G| is far from linear: the exact region costs more; one per cent barely differs."""
     exact, linear = (
-        solve(first_order, requirements=[lambda e, f=f, kind=kind: kind(e, Relative(e.model, f), 2.45)])
+        solve(first_order, requirements=[lambda e, f=f, kind=kind: model_error(e, f, 2.45, kind)])
         for f, kind in ((0.01, EllipsoidError), (0.01, ModelError))
     )
     check(exact)

@@ -1,25 +1,19 @@
-"""Several channels in closed loop: against simulated impulses and finite differences, and against SISO."""
+"""The loop around polynomial plants: against simulated impulses, finite differences and plain algebra."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays
-from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import (
-    Loop,
-    PolynomialLoop,
-    PolynomialModel,
-    Rational,
-    TransferMatrix,
-)
-from inputdesign_cli.spectrum import FirBasis, MatrixFirBasis
+from inputdesign_cli.plant import PolynomialLoop, PolynomialModel, TransferMatrix, close_loop
+from inputdesign_cli.spectrum import MatrixFirBasis
+from tests.support.loop_checks import check_information, check_signals
+from tests.support.plants import arrays
 
-LONG = 160
+LONG = 400
 STEP = 1e-6
 
 
@@ -54,12 +48,14 @@ def moved(plant, theta):
     )
 
 
-NUMERATOR = [[[0.4, -0.32], [0.05]], [[0.0], [0.1, 0.05]], [[0.1], [0.0]]]
-DENOMINATOR = [[[1, -1], [1, -1]], [[1], [1, -0.3]], [[1, 0.2], [1]]]
+def single():
+    """Every polynomial but F, one input and one output."""
+    return PolynomialModel.single([0, 0.3, 0.2], A=[1, -1.2, 0.5], C=[1, -0.4], D=[1, 0.3], variance=0.7)
 
 
-def controller():
-    return TransferMatrix.build(NUMERATOR, DENOMINATOR)
+# The controllers by the number of inputs: entries (input, output).
+NUMERATOR = {1: [[[1.1, -0.7]]], 3: [[[0.4, -0.32], [0.05]], [[0.0], [0.1, 0.05]], [[0.1], [0.0]]]}
+DENOMINATOR = {1: [[[1, -1]]], 3: [[[1, -1], [1, -1]], [[1], [1, -0.3]], [[1, 0.2], [1]]]}
 
 
 def simulated(plant, r, e):
@@ -80,7 +76,7 @@ def simulated(plant, r, e):
             y[t, i] = v[t, i] + x[t, i].sum() - past
         for j in range(inputs):
             for i in range(p):
-                top, bottom = NUMERATOR[j][i], DENOMINATOR[j][i]
+                top, bottom = NUMERATOR[inputs][j][i], DENOMINATOR[inputs][j][i]
                 k[t, j, i] = sum(c * y[t - lag, i] for lag, c in enumerate(top) if t >= lag)
                 k[t, j, i] -= sum(c * k[t - lag, j, i] for lag, c in enumerate(bottom) if 0 < lag <= t)
             u[t, j] = r[t, j] - k[t, j].sum()
@@ -118,10 +114,11 @@ def impulse_gradients(plant, source):
     return np.stack(parts, axis=-1)
 
 
-@pytest.fixture(scope="module")
-def experiment():
-    plant = box_jenkins()
-    loop = PolynomialLoop(plant, controller())
+@pytest.fixture(scope="module", params=[box_jenkins, single])
+def experiment(request):
+    plant = request.param()
+    controller = TransferMatrix.build(NUMERATOR[plant.inputs], DENOMINATOR[plant.inputs])
+    loop = PolynomialLoop(plant, controller)
     loop.check_stability()
     return Experiment(plant, 7, loop=loop)
 
@@ -132,17 +129,18 @@ def test_information_is_that_of_simulated_impulses(experiment):
 
 def test_powers_are_those_of_simulated_impulses(experiment):
     plant = experiment.model
-    c = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 0.5]])
-    basis = MatrixFirBasis(3, 0)
-    x = np.array([2.0, 0.3, 1.0, 0.0, -0.2, 0.5])
+    inputs, outputs = plant.inputs, plant.outputs
+    c = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 0.5]])[:inputs, :inputs]
+    basis = MatrixFirBasis(inputs, 0)
+    x = np.array([2.0, 0.3, 1.0, 0.0, -0.2, 0.5])[: basis.size]
     np.testing.assert_array_equal(basis.autocovariances(x)[0], c)
     runs = [
-        simulated(plant, np.eye(3)[m] * (np.arange(LONG) == 0)[:, None], np.zeros((LONG, 2)))
-        for m in range(3)
+        simulated(plant, np.eye(inputs)[m] * (np.arange(LONG) == 0)[:, None], np.zeros((LONG, outputs)))
+        for m in range(inputs)
     ]
     y, u = (np.stack([run[part] for run in runs], axis=-1) for part in (0, 1))
     for kind, response in (("output", y), ("input", u)):
-        for channel in (None, 1):
+        for channel in (None, min(inputs, outputs) - 1):
             rows = response if channel is None else response[:, channel : channel + 1]
             expected = np.einsum("tpm,mn,tpn->", rows, c, rows)
             unit = basis.integrals(
@@ -152,40 +150,19 @@ def test_powers_are_those_of_simulated_impulses(experiment):
             assert unit @ x == pytest.approx(expected, rel=1e-8)
 
 
-def test_one_channel_is_the_siso_loop():
-    A, B, F = [1, -1.2, 0.5], [0, 0.3, 0.2], [1]
-    C, D = [1, -0.4], [1, 0.3]
-    numerator, denominator = [1.1, -0.7], [1, -1]
-    siso = PolynomialModel.single(*(np.array(p, dtype=float) for p in (B, A, C, D, F)), 0.7)
-    one = Experiment(Loop(siso, Rational.build(numerator, denominator)), 50)
-    one.loop.check_stability()
-    plant = PolynomialModel(
-        arrays([[B]]), (np.array(A),), arrays([[F]]), (np.array(C),), (np.array(D),), np.array([[0.7]])
-    )
-    loop = PolynomialLoop(plant, TransferMatrix.build([[numerator]], [[denominator]]))
-    loop.check_stability()
-    several = Experiment(plant, 50, loop=loop)
-    assert several.model.names == one.model.names
-    np.testing.assert_allclose(several.noise_information, one.noise_information, rtol=1e-9)
-    basis = FirBasis(6)
-    for density in ("information_density",):
-        maps = [basis.integrals(getattr(e, density), e.singularities) for e in (one, several)]
-        np.testing.assert_allclose(maps[1], maps[0], rtol=1e-9, atol=1e-9 * np.abs(maps[0]).max())
-    for kind in ("input", "output", "excitation"):
-        powers = [
-            basis.integrals(lambda w, e=e, kind=kind: e.power_density(kind, w), e.singularities)
-            for e in (one, several)
-        ]
-        np.testing.assert_allclose(powers[1], powers[0], rtol=1e-9, atol=1e-9 * np.abs(powers[0]).max())
+def test_closed_poles_are_the_roots_of_the_characteristic_polynomial():
+    loop = close_loop(single(), TransferMatrix.build(NUMERATOR[1], DENOMINATOR[1]))
+    expected = np.roots(np.polyadd(np.polymul([1, -1.2, 0.5], [1, -1]), np.polymul([0.3, 0.2], [1.1, -0.7])))
     poles = np.sort_complex(loop.closed_poles[np.abs(loop.closed_poles) > 1e-6])
-    np.testing.assert_allclose(poles, np.sort_complex(np.roots(one.loop.characteristic)), atol=1e-9)
+    np.testing.assert_allclose(poles, np.sort_complex(expected), atol=1e-9)
 
 
 def test_responses_are_those_of_matrix_algebra(experiment):
     w = np.array([0.3, 1.0, 2.5])
     t = experiment.loop.responses(w)
     G, H, K = experiment.model.plant_at(w), experiment.model.noise_at(w), experiment.loop.controller.at(w)
-    inner, outer = np.linalg.inv(np.eye(3) + K @ G), np.linalg.inv(np.eye(2) + G @ K)
+    inputs, outputs = np.eye(experiment.model.inputs), np.eye(experiment.model.outputs)
+    inner, outer = np.linalg.inv(inputs + K @ G), np.linalg.inv(outputs + G @ K)
     for found, expected in ((t.y_x, G @ inner), (t.u_x, inner), (t.y_e, outer @ H), (t.u_e, -K @ outer @ H)):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
 
@@ -194,16 +171,42 @@ def test_signals_are_those_of_the_equations_sample_by_sample(experiment):
     check_signals(experiment.loop, simulated)
 
 
-def test_unstable_and_algebraic_loops_are_refused():
+def test_an_unstable_plant_that_is_left_alone_is_refused():
     plant = box_jenkins()
     with pytest.raises(SpecError) as caught:
         PolynomialLoop(
             plant, TransferMatrix.build([[[0.0], [0.0]]] * 3, [[[1.0], [1.0]]] * 3)
         ).check_stability()
     assert caught.value.diagnostics[0].code == "unstable-loop"
-    direct = PolynomialModel(
-        arrays([[[1.0]]]), (np.ones(1),), arrays([[[1.0]]]), (np.ones(1),), (np.ones(1),), np.eye(1)
-    )
+
+
+def looped(model, numerator):
+    return close_loop(model, TransferMatrix.build([[numerator]], [[[1.0]]]))
+
+
+def test_unstable_plant_in_a_stable_loop_has_finite_gradients():
+    """An ARX plant with an integrator: S G and the gradients stay finite at DC."""
+    loop = looped(PolynomialModel.single([0.0, 1.0], A=[1.0, -1.0]), [0.5])
+    loop.check_stability()
+    t = loop.responses(np.array([0.0]))
+    assert t.y_x.item() == pytest.approx(2.0)  # 1 / C at DC
+    assert abs(t.u_x.item()) == pytest.approx(0.0)
+    assert np.all(np.isfinite(loop.excitation_gradient(np.array([0.0]))))
+
+
+def test_unstable_and_algebraic_loops_are_refused():
+    with pytest.raises(SpecError) as unstable:
+        looped(PolynomialModel.single([0.0, 1.0], A=[1.0, -0.9]), [-0.5]).check_stability()
+    assert unstable.value.diagnostics[0].code == "unstable-loop"
+    with pytest.raises(SpecError) as algebraic:
+        looped(PolynomialModel.single([1.0, 0.5]), [-1.0]).check_stability()
+    assert algebraic.value.diagnostics[0].code == "algebraic-loop"
+
+
+def test_an_input_that_answers_the_noise_at_once_is_refused_where_the_plant_has_no_delay():
+    direct, delayed = PolynomialModel.single([1.0, 0.5]), PolynomialModel.single([0.0, 1.0])
     with pytest.raises(SpecError) as caught:
-        PolynomialLoop(direct, TransferMatrix.build([[[-1.0, 0.5]]], [[[1.0]]])).check_stability()
+        looped(direct, [0.3]).check_delay()
     assert caught.value.diagnostics[0].code == "algebraic-loop"
+    looped(direct, [0.0, 0.3]).check_delay()
+    looped(delayed, [0.3]).check_delay()

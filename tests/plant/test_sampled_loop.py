@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays, descending
-from loop_checks import check_information, check_signals
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
@@ -17,6 +15,8 @@ from inputdesign_cli.plant import (
     TransferMatrix,
 )
 from inputdesign_cli.spectrum import MatrixFirBasis
+from tests.support.loop_checks import check_information, check_signals
+from tests.support.plants import arrays, descending
 
 T = 0.4
 LONG = 420

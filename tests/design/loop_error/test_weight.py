@@ -8,7 +8,15 @@ from inputdesign_cli.design.loop_error.closed_form import best_spectrum, error_o
 from inputdesign_cli.design.loop_error.laws import propagation, sensitivity
 from inputdesign_cli.design.loop_error.weight import weight
 from inputdesign_cli.plant import TransferMatrix
-from loop_error.column import GAINS, adjoint, column, jacobian, kronecker, random_complex, random_hermitian
+from tests.support.loop_error import (
+    GAINS,
+    adjoint,
+    column,
+    jacobian,
+    kronecker,
+    random_complex,
+    random_hermitian,
+)
 
 W = np.linspace(0.05, 3.0, 40)
 

@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from plants import random_case
 
 from inputdesign_cli.accuracy import ModelError, Relative
 from inputdesign_cli.design.convex.designs import Question, solve_design
@@ -12,6 +11,8 @@ from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import FirBasis
+from tests.support.on_grid import OnGrid
+from tests.support.random_plants import random_case
 
 DENSE = np.unique(np.concatenate([np.linspace(0.0, np.pi, 50001), np.geomspace(1e-5, np.pi, 50001)]))
 
@@ -21,7 +22,8 @@ def least_cost(experiment, basis, cost, factories, *, tolerance):
 
 
 def relative(model, fraction, alpha, band=(0.0, np.pi)):
-    return [lambda experiment: ModelError(experiment, Relative(model, fraction), alpha, band)]
+    admissible = Relative(model, fraction, (0, 0))
+    return [lambda e: ModelError(experiment=e, band=band, entry=(0, 0), admissible=admissible, alpha=alpha)]
 
 
 def design(experiment, order, fraction=0.01, alpha=2.45, cost=None):
@@ -36,9 +38,9 @@ def design(experiment, order, fraction=0.01, alpha=2.45, cost=None):
 
 def solve_case(seed):
     case = random_case(seed)
-    experiment = Experiment(case.loop, case.samples)
-    factories = [lambda e: ModelError(e, case.admissible, case.alpha, case.band)]
-    return case, least_cost(experiment, FirBasis(case.order), case.cost, factories, tolerance=1e-7)
+    return case, least_cost(
+        case.experiment(), FirBasis(case.order), case.cost, [case.requirement], tolerance=1e-7
+    )
 
 
 def check(case, solution):
@@ -54,7 +56,7 @@ def check(case, solution):
     assert requirement.ratios(result.information, w).max() <= 1 + 1e-6, case.name
     phi = problem.basis.density(result.x, DENSE)
     assert phi.min() >= -1e-6 * phi.max(), case.name
-    assert result.cost <= problem.price.at(solution.white_power * problem.basis.white) * (1 + 1e-9)
+    assert result.cost <= problem.price.at(solution.white_power * problem.basis.even) * (1 + 1e-9)
     assert solution.any_spectrum.certificate.bound <= result.cost * (1 + 1e-9)
     # The bound over every spectrum against the cost of a spectrum of sinusoids that meets the accuracy.
     anything = solution.any_spectrum
@@ -80,8 +82,10 @@ def test_grid_program_agrees_where_the_grid_holds_the_active_frequencies(first_o
     solution = design(first_order, order)
     active = solution.result.active_frequencies
     grid = np.union1d(np.linspace(0.01, np.pi, 25), active)
-    start = solution.white_power * solution.problem.basis.white
-    answer = solve_on_grid(solution.problem, grid, start, positivity=positivity)
+    start = solution.white_power * solution.problem.basis.even
+    answer = solve_on_grid(
+        solution.problem, solution.problem.requirements, grid, start, positivity=positivity
+    )
     assert answer.cost == pytest.approx(solution.result.cost, rel=1e-5)
     assert answer.certificate.bound == pytest.approx(solution.result.cost, rel=1e-4)
 
@@ -92,8 +96,9 @@ def test_grid_program_agrees_with_several_active_frequencies(flexible):
     solution = least_cost(flexible, FirBasis(10), {"input": 1.0, "output": 1.0}, factories, tolerance=1e-7)
     active = solution.result.active_frequencies
     assert len(active) >= 3
-    start = solution.white_power * solution.problem.basis.white
-    answer = solve_on_grid(solution.problem, np.union1d(active, np.geomspace(1e-3, np.pi, 20)), start)
+    start = solution.white_power * solution.problem.basis.even
+    grid = np.union1d(active, np.geomspace(1e-3, np.pi, 20))
+    answer = solve_on_grid(solution.problem, solution.problem.requirements, grid, start)
     assert answer.cost == pytest.approx(solution.result.cost, rel=1e-5)
 
 
@@ -105,18 +110,8 @@ def test_a_plain_grid_understates_the_cost_of_a_resonant_plant(flexible):
     requirement = solution.problem.requirements[0]
     grid = np.geomspace(1e-3, np.pi, 1000)
 
-    class OnGrid:
-        name = "on a grid"
-        ratios, cut = requirement.ratios, requirement.cut
-
-        def violations(self, information, *, above=-np.inf):
-            found = requirement.ratios(information, grid)
-            best = np.argsort(-found)[:5]
-            kind = requirement.violations(information)[0].__class__
-            return [kind(float(found[i]), float(grid[i])) for i in best if found[i] > above]
-
-    problem = dataclasses.replace(solution.problem, requirements=(OnGrid(),))
-    coarse = exchange(problem, solution.white_power * problem.basis.white, tolerance=1e-7)
+    problem = dataclasses.replace(solution.problem, requirements=(OnGrid(requirement, grid, most=5),))
+    coarse = exchange(problem, solution.white_power * problem.basis.even, tolerance=1e-7)
     assert coarse.cost == pytest.approx(361.3817, abs=6e-4)
     assert solution.result.cost > 1.02 * coarse.cost
 
@@ -157,10 +152,9 @@ def test_richer_spectra_cost_less(first_order):
 def test_scaling_laws(first_order):
     """Box-Jenkins without noise information on G: cost goes as variance / N and as (alpha / fraction)^2."""
     base = design(first_order, 6).result.cost
-    louder = dataclasses.replace(first_order.model, variance=4.0)
-    loop = dataclasses.replace(first_order.loop, model=louder)
-    assert design(Experiment(loop, 500), 6).result.cost == pytest.approx(4 * base, rel=1e-6)
-    assert design(Experiment(first_order.loop, 1000), 6).result.cost == pytest.approx(base / 2, rel=1e-6)
+    louder = dataclasses.replace(first_order.model, covariance=np.array([[4.0]]))
+    assert design(Experiment(louder, 500), 6).result.cost == pytest.approx(4 * base, rel=1e-6)
+    assert design(Experiment(first_order.model, 1000), 6).result.cost == pytest.approx(base / 2, rel=1e-6)
     assert design(first_order, 6, fraction=0.02).result.cost == pytest.approx(base / 4, rel=1e-6)
     assert design(first_order, 6, alpha=4.9).result.cost == pytest.approx(4 * base, rel=1e-6)
     assert design(first_order, 6, cost={"input": 3.0}).result.cost == pytest.approx(3 * base, rel=1e-6)

@@ -5,7 +5,7 @@ import pytest
 
 from inputdesign_cli.design.loop_error import PowerLimit, design_within
 from inputdesign_cli.design.loop_error.closed_form import error_of, power_of
-from loop_error.column import adjoint, column, random_complex, random_hermitian
+from tests.support.loop_error import adjoint, column, random_complex, random_hermitian
 
 
 def case(n, K, seed):

@@ -1,4 +1,4 @@
-"""Gradients of models with several channels against complex steps; sampling against matrix exponentials."""
+"""Gradients of models against finite differences; sampling against scipy and python-control."""
 
 from dataclasses import replace
 
@@ -6,9 +6,9 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from channel_plants import arrays, arx, box_jenkins, descending, two_by_two
 
 from inputdesign_cli.plant import ContinuousModel, PolynomialModel, SampledModel
+from tests.support.plants import arrays, arx, box_jenkins, descending, two_by_two
 
 W = np.array([0.05, 0.4, 1.3, 2.9])
 COMMON = ContinuousModel.monic(
@@ -17,7 +17,9 @@ COMMON = ContinuousModel.monic(
     np.eye(2),
     common=True,
 )
+SINGLE = PolynomialModel.single([0, 2.0, 0.3], A=[1, -0.5], C=[1, 0.2], D=[1, 0.6], F=[1, -0.1, 0.4])
 MODELS = {
+    "one channel": SINGLE,
     "arx": arx(),
     "common arx": arx(per_output=False),
     "box-jenkins": box_jenkins(),
@@ -84,7 +86,7 @@ def noise_filter(model, w):
     return H
 
 
-@pytest.mark.parametrize("name", ["arx", "common arx", "box-jenkins"])
+@pytest.mark.parametrize("name", ["one channel", "arx", "common arx", "box-jenkins"])
 def test_prediction_gradients_are_those_of_plant_and_noise_filter(name):
     model, step = MODELS[name], 1e-5
     inverse = np.linalg.inv(noise_filter(model, W))
@@ -104,18 +106,6 @@ def test_names_carry_output_and_input():
     assert COMMON.names == ("b0[1,1]", "b1[1,1]", "b0[1,2]", "b0[2,2]", "b1[2,2]", "b2[2,2]", "a0", "a1")
     single = ContinuousModel.monic(descending([[[2.0]]]), descending([[[1.0, 3.0]]]), np.eye(1))
     assert single.names == ("b0", "a0")
-
-
-def test_one_channel_is_the_siso_model():
-    A, B, C, D, F = (np.array(p) for p in ([1, -0.5], [0, 2.0, 0.3], [1, 0.2], [1, 0.6], [1, -0.1, 0.4]))
-    siso = PolynomialModel.single(A=A, B=B, C=C, D=D, F=F)
-    one = PolynomialModel(((B,),), (A,), ((F,),), (C,), (D,), np.eye(1))
-    assert one.names == siso.names
-    np.testing.assert_allclose(one.theta, siso.theta)
-    np.testing.assert_allclose(one.plant_gradient(W)[:, :, 0, 0], siso.plant_gradient(W), atol=1e-13)
-    H = siso.response(W).H[:, 0, 0]
-    expected = siso.noise_gradient(W) / H[:, None]
-    np.testing.assert_allclose(one.noise_gradient(W)[:, :, 0, 0], expected, atol=1e-13)
 
 
 @pytest.mark.parametrize("model", [two_by_two(), COMMON], ids=["strictly proper", "biproper"])

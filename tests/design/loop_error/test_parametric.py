@@ -13,7 +13,7 @@ from inputdesign_cli.design.loop_error import (
 from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
 from inputdesign_cli.plant import Rational, TransferMatrix
-from loop_error.column import adjoint, column, matrix_plant, random_hermitian, random_plant
+from tests.support.loop_error import adjoint, column, matrix_plant, random_hermitian, random_plant
 
 W = np.array([0.05, 0.4, 1.3, 2.8])
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import scipy.signal
-from channel_plants import arrays
 
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant import PolynomialModel
+from tests.support.plants import arrays
 
 
 def one_channel(B, A=(1,), C=(1,), D=(1,), F=(1,), variance=0.5):

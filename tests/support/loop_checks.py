@@ -1,4 +1,4 @@
-"""What a loop with three inputs and two outputs must agree with: brute force in time."""
+"""What a loop must agree with, whatever its channels: brute force in time."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ def check_information(experiment, from_r, from_e):
     inverse = np.linalg.inv(covariance)
     noise = np.einsum("tkpm,mn,pq,tlqn->kl", from_e, covariance, inverse, from_e, optimize=True)
     close(experiment.noise_information, samples * noise)
-    basis = MatrixFirBasis(3, 1)
+    basis = MatrixFirBasis(experiment.inputs, 1)
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     x = np.random.default_rng(0).standard_normal(basis.size)
     c = basis.autocovariances(x)
@@ -24,7 +24,8 @@ def check_information(experiment, from_r, from_e):
 def check_signals(loop, simulated):
     """The recursion over many runs against `simulated(model, r, e)`, sample by sample."""
     rng = np.random.default_rng(0)
-    r, e = rng.standard_normal((2, 150, 3)), rng.standard_normal((2, 150, 2))
+    r = rng.standard_normal((2, 150, loop.model.inputs))
+    e = rng.standard_normal((2, 150, loop.model.outputs))
     y, u = loop.signals(r, e)
     for run in range(2):
         expected = simulated(loop.model, r[run], e[run])

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from channel_plants import paper_experiment
-from spectral_oracle import Spectral
 
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, criterion_value, hill_climb
 from inputdesign_cli.spectrum import PolynomialBasis
+from tests.support.plants import paper_experiment
+from tests.support.spectral_oracle import Spectral
 
 
 def design(problem, criterion):

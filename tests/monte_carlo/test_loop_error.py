@@ -14,7 +14,7 @@ from inputdesign_cli.plant import Rational, TransferMatrix
 from inputdesign_cli.plant.polynomial_matrix import determinant_and_adjugate, multiply
 from inputdesign_cli.signal.lines import grid_lines
 from inputdesign_cli.signal.periodic import harmonics
-from loop_error.column import column, random_plant
+from tests.support.loop_error import column, random_plant
 
 W = np.linspace(0.05, 3.1, 9)
 

@@ -6,7 +6,6 @@ import cvxpy as cp
 import numpy as np
 import pytest
 import scipy.optimize
-from cases import mse
 
 from inputdesign_cli.design.regression import (
     Regression,
@@ -17,6 +16,7 @@ from inputdesign_cli.design.regression import (
     least_energy,
     least_error,
 )
+from tests.support.regression import mse
 
 ONE = Regression(np.array([1.0]), np.array([1.0]), 1.0, 1.0)
 

@@ -14,7 +14,7 @@ from inputdesign_cli.signal.periodic import (
     shaped_noise,
 )
 from inputdesign_cli.signal.rational import rational_filter
-from loop_error.column import adjoint, column, random_hermitian
+from tests.support.loop_error import adjoint, column, random_hermitian
 
 TAPS = np.array([[[2.0, 0.0], [0.5, 1.0]], [[0.6, 0.3], [-0.4, 0.2]]])
 

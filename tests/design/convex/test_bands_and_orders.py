@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from channel_plants import arrays, two_by_two
 
 from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.design.convex.designs import Question, white_power, whitened_problem
@@ -11,6 +10,7 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.spectrum import PolynomialBasis
+from tests.support.plants import arrays, two_by_two
 
 
 def random_plant(rng):
@@ -31,11 +31,10 @@ def solved(model, band, order, criterion, *, hermitian=False):
         "factor",
         [lambda experiment: Criterion(criterion, experiment.factor)],
         limits=[PowerLimit("input", 1000.0), PowerLimit("output", 1000.0)],
-        band=band,
     )
     power = white_power(question)
-    problem = whitened_problem(question, power)
-    return problem, exchange(problem, power * problem.basis.white, tolerance=1e-7)
+    problem = whitened_problem(question, np.full(2, power / 2))
+    return problem, exchange(problem, power * problem.basis.even, tolerance=1e-7)
 
 
 def test_order_40_is_proved_and_no_worse_than_order_13():

@@ -6,7 +6,7 @@ import pytest
 from inputdesign_cli.design.loop_error import InternalModel, MinimumVariance, ModelReference
 from inputdesign_cli.design.loop_error.laws import propagation
 from inputdesign_cli.plant import Rational, TransferMatrix, zero_order_hold
-from loop_error.column import matrix_plant, random_complex, random_plant
+from tests.support.loop_error import matrix_plant, random_complex, random_plant
 
 W = np.array([0.1, 0.7, 1.9, 3.0])
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import scipy.linalg
-from cases import autocorrelations, general_search, mse, one_estimated_by_cvxpy
 
 from inputdesign_cli.design.regression import (
     OutOfReachError,
@@ -17,6 +16,7 @@ from inputdesign_cli.design.regression.lift import Box
 from inputdesign_cli.design.regression.limits import box_limits
 from inputdesign_cli.design.regression.structured import least_variance
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
+from tests.support.regression import autocorrelations, general_search, mse, one_estimated_by_cvxpy
 
 FOUR = ([0.94, 0.166], [2.245, 1.096], 0.5)
 

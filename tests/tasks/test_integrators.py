@@ -1,0 +1,75 @@
+"""Plants that integrate, in a loop: what cannot be promised at the pole is refused, the rest holds."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import SpecError
+
+INTEGRATOR = """
+plant: {A: [1, -1], B: [0, 0.2]}
+noise: {C: [1, 0.3], variance: 0.1}
+experiment: {samples: 1000, controller: {numerator: [1.0], denominator: [1, -0.2]}}
+cost: {input_power: 1, output_power: 1}
+spectrum: {type: fir, order: 8}
+signal: {seed: 1, samples: 200}
+"""
+TWO = """
+plant: {A: [[1, -1], [1, -0.6]], B: [[[0, 0.2], [0, 0.1]], [[0, 0.1], [0, 0.5]]]}
+noise: {variance: [[0.1, 0], [0, 0.1]]}
+experiment:
+  samples: 1000
+  controller: {numerator: [[[1.0], [0]], [[0], [0.3]]], denominator: [1, -0.2]}
+cost: {input_power: 1, output_power: 1}
+spectrum: {type: fir, order: 2}
+signal: {seed: 1, samples: 200}
+"""
+ACCURACY = [
+    "{model_error: {relative: 0.1, alpha: 2}}",
+    "{model_error: {absolute: 0.1, alpha: 2}}",
+    "{model_error: {sensitivity: {max_db: 12}}}",
+    "{weighted_variance: {max: 0.01}}",
+    "{weighted_variance: {max: 0.01, relative: true}}",
+]
+
+
+@pytest.mark.parametrize("accuracy", ACCURACY)
+@pytest.mark.parametrize("plant", [INTEGRATOR, TWO], ids=["one", "two"])
+def test_no_bound_at_the_estimated_pole(plant, accuracy):
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(f"{plant}accuracy: {accuracy}\n"))
+    (found,) = caught.value.diagnostics
+    assert found.code == "unbounded-error"
+    assert "at 0 rad/s" in found.message
+    assert "[0.03142, 3.142]" in found.hint
+
+
+@pytest.mark.parametrize("bound", ["relative: 0.1", "absolute: 0.1"])
+def test_the_band_that_is_proposed_can_be_kept(bound):
+    """r_u by central differences of G and the printed covariance, on a fine grid of the band."""
+    accuracy = f"{{model_error: {{{bound}, alpha: 2, band: [0.03142, 3.1415]}}}}"
+    result = solve(parse_spec(f"{INTEGRATOR}accuracy: {accuracy}\n")).result
+    assert result["status"] == "optimal"
+    w = np.concatenate([np.geomspace(0.03142, 3.1415, 3000), np.linspace(0.03142, 3.1415, 3000)])
+    q = np.exp(-1j * w)
+
+    def plant(a, b):
+        return b * q / (1 + a * q)
+
+    step = 1e-6
+    names = result["information"]["parameters"]
+    T = np.zeros((w.size, 2, len(names)))
+    for column, name in enumerate(names):
+        da, db = step * (name == "a1"), step * (name == "b1")
+        slope = (plant(-1 + da, 0.2 + db) - plant(-1 - da, 0.2 - db)) / (2 * step)
+        T[:, :, column] = np.stack([slope.real, slope.imag], axis=1)
+    P = np.array(result["information"]["covariance"])
+    r_u = 2 * np.sqrt(np.linalg.eigvalsh(T @ P @ T.swapaxes(1, 2))[:, -1])
+    r_adm = 0.1 * np.abs(plant(-1, 0.2)) if "relative" in bound else 0.1
+    assert np.max(r_u / r_adm) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_criterion_does_not_ask_for_the_pole():
+    result = solve(parse_spec(f"{INTEGRATOR}accuracy: {{criterion: D}}\nlimits: {{excitation_power: 1}}\n"))
+    assert result.result["status"] == "optimal"
+    assert np.all(np.isfinite(result.tables["bound"].columns["r_u"]))
