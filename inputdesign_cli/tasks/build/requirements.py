@@ -68,7 +68,7 @@ def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | 
 
 
 def _model_errors(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    return [_moved(error) for error in build_model_errors(spec, experiment)]
+    return [_maker(error) for error in build_model_errors(spec, experiment)]
 
 
 def _information(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
@@ -96,7 +96,7 @@ def _standard_deviations(spec: Spec, experiment: Experiment) -> list[Requirement
     ]
 
 
-def _moved(requirement: OverFrequency) -> RequirementFactory:
+def _maker(requirement: OverFrequency) -> RequirementFactory:
     return lambda experiment: replace(requirement, experiment=experiment)
 
 
@@ -128,7 +128,7 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
         check_bounded(spec, variance, key)
         if stated.relative:
             _check_nowhere_zero(spec, variance)
-    return [_moved(variance) for variance in found]
+    return [_maker(variance) for variance in found]
 
 
 def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
