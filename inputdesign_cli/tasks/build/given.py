@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
@@ -19,6 +16,7 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
+from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_header, build_units
 from inputdesign_cli.tasks.build.limits import build_power_limits
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
@@ -32,7 +30,6 @@ from inputdesign_cli.tasks.build.system import (
     read_excitation_record,
     record_step,
 )
-from inputdesign_cli.tasks.build.tables import read_columns
 from inputdesign_cli.tasks.given import GivenExcitation, GivenTask
 from inputdesign_cli.tasks.result.given_limits import StatedLimits
 
@@ -188,7 +185,7 @@ def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedSpectrum:
         names = {f"phi_{i + 1}{i + 1}": (i, i, 1.0) for i in range(r)}
     for i, j in pairs:
         names |= {f"phi_{i + 1}{j + 1}_re": (i, j, 1.0), f"phi_{i + 1}{j + 1}_im": (i, j, 1j)}
-    columns = _columns(spec, given, list(names))
+    columns = read_frequency_table(spec, given.file, list(names), _TABLE)
     phi = np.zeros((columns["frequency"].size, r, r), dtype=complex)
     for name, (i, j, unit) in names.items():
         phi[:, i, j] += unit * columns[name]
@@ -197,31 +194,11 @@ def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedSpectrum:
     eigenvalues = np.linalg.eigvalsh(phi)
     if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
         wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
-        message = f"phi must be {wanted}"
-        raise _bad_table(spec, given, message, "give the spectral density, such as the spectrum.csv of a run")
-    frequency = columns["frequency"] * build_units(spec).frequency
-    return TabulatedSpectrum(np.minimum(frequency, np.pi) if spec.plant.sampled else frequency, phi)
-
-
-def _columns(spec: Spec, given: GivenTable, names: Sequence[str]) -> dict[str, Array]:
-    """Columns `frequency` (rad per time unit) and `names`, each (n,).
-
-    Raises:
-        DataError: the file cannot be read, or its frequencies make no table (`bad-table`).
-    """
-    path = spec.resolve_path(given.file)
-    columns = read_columns(path, {"frequency": "frequency", **{name: name for name in names}}, key=_TABLE)
+        hint = "give the spectral density, such as the spectrum.csv of a run"
+        raise bad_table(spec, given.file, f"phi must be {wanted}", hint, _TABLE)
     frequency = columns["frequency"]
-    if frequency.size < 2 or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
-        message = "the frequencies must be nonnegative and increase from row to row"
-        raise _bad_table(spec, given, message, "sort the rows")
-    if frequency[-1] > spec.nyquist * (1 + 1e-4):
-        message = f"it reaches {frequency[-1]:g} rad/{spec.time_unit}, beyond the Nyquist frequency"
-        raise _bad_table(spec, given, message, "frequencies end at pi/sample_time")
-    return columns
-
-
-def _bad_table(spec: Spec, given: GivenTable, message: str, hint: str) -> DataError:
-    """The error about a table that cannot be a spectrum."""
-    name = spec.resolve_path(given.file).name
-    return DataError(Diagnostic("bad-table", f"{name}: {message}", hint, _TABLE))
+    if spec.plant.sampled and frequency[-1] > np.pi * (1 + 1e-4):
+        reached = f"{frequency[-1] / build_units(spec).frequency:g} rad/{spec.time_unit}"
+        message = f"it reaches {reached}, beyond the Nyquist frequency"
+        raise bad_table(spec, given.file, message, "frequencies end at pi/sample_time", _TABLE)
+    return TabulatedSpectrum(np.minimum(frequency, np.pi) if spec.plant.sampled else frequency, phi)

@@ -7,14 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
-from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.information import POWER_KINDS, Experiment
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
+from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.tables import read_columns
 from inputdesign_cli.tasks.build.weights import build_weight
 
 _KEY = "limits.spectrum"
@@ -101,18 +100,7 @@ def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array]
 
 
 def _table(spec: Spec, name: str, key: str) -> tuple[Array, Array]:
-    path = spec.resolve_path(name)
-    columns = read_columns(path, {"frequency": "frequency", "value": "phi"}, key=key)
-    frequency, value = columns["frequency"] * build_units(spec).frequency, columns["value"]
-    if np.any(np.diff(frequency) <= 0) or frequency[0] < 0 or np.any(value < 0):
-        raise DataError(
-            Diagnostic(
-                "bad-table",
-                f"{path.name}: frequencies must be nonnegative and increase from row to row, and phi must "
-                "not be negative",
-                "sort the rows and correct the values",
-                key,
-                spec.locate(key),
-            )
-        )
-    return frequency, value
+    columns = read_frequency_table(spec, name, ["phi"], key)
+    if np.any(columns["phi"] < 0):
+        raise bad_table(spec, name, "phi must not be negative", "correct the values", key)
+    return columns["frequency"], columns["phi"]

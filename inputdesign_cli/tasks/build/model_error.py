@@ -14,6 +14,7 @@ from inputdesign_cli.accuracy import (
     ModelError,
     Relative,
     Sensitivity,
+    Table,
     Weighted,
     active_entries,
 )
@@ -23,7 +24,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
-from inputdesign_cli.tasks.build.bound_table import read_bound
+from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_loop
 from inputdesign_cli.tasks.build.tables import has_column
@@ -187,8 +188,32 @@ def _admissible(
         path = spec.resolve_path(error.table)
         if entry is not None and not units.single and has_column(path, "r_adm_", key=f"{_KEY}.table"):
             column += units.suffix(*entry)
-        return read_bound(spec, error.table, band, unit=units.frequency, column=column)
+        return _table(spec, error.table, band, column)
     return _sensitivity(spec, error, model)
+
+
+def _table(spec: Spec, name: str, band: tuple[float, float], column: str) -> Table:
+    """r_adm of one column of a file, over the whole `band`.
+
+    Raises:
+        DataError: the file cannot be read, or does not bound the error on the whole band (`bad-table`).
+    """
+    key, units = f"{_KEY}.table", build_units(spec)
+    columns = read_frequency_table(spec, name, [column], key)
+    frequency, value = columns["frequency"], columns[column]
+    if np.any(value <= 0):
+        row = int(np.argmax(value <= 0)) + 2
+        message = f"{column} is {value[row - 2]:g} in row {row}: it must be positive"
+        hint = "leave frequencies that do not matter out, and restrict band"
+        raise bad_table(spec, name, message, hint, key)
+    if frequency[0] > band[0] * (1 + 1e-9) or frequency[-1] < band[1] * (1 - 1e-9):
+        covered, asked = (
+            f"{lo / units.frequency:g} to {hi / units.frequency:g} {units.per_time}"
+            for lo, hi in ((frequency[0], frequency[-1]), band)
+        )
+        message = f"it covers {covered}, but the band is {asked}"
+        raise bad_table(spec, name, message, f"extend the table, or restrict {_KEY}.band", key)
+    return Table(frequency, value)
 
 
 def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
