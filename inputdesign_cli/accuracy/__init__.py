@@ -8,7 +8,7 @@ from inputdesign_cli.accuracy.admissible import (
     Table as Table,
     Weighted as Weighted,
 )
-from inputdesign_cli.accuracy.criteria import Criterion as Criterion
+from inputdesign_cli.accuracy.criteria import Criterion as Criterion, criterion_of as criterion_of
 from inputdesign_cli.accuracy.cuts import (
     Cut as Cut,
     CutBlock as CutBlock,
@@ -17,12 +17,14 @@ from inputdesign_cli.accuracy.cuts import (
 )
 from inputdesign_cli.accuracy.ellipsoid import EllipsoidError as EllipsoidError
 from inputdesign_cli.accuracy.information_target import InformationTarget as InformationTarget
-from inputdesign_cli.accuracy.model_error import ModelError as ModelError
+from inputdesign_cli.accuracy.model_error import (
+    ModelError as ModelError,
+    OnModelError as OnModelError,
+    model_errors as model_errors,
+)
 from inputdesign_cli.accuracy.over_frequency import active_entries as active_entries
 from inputdesign_cli.accuracy.requirement import (
-    BoundedError as BoundedError,
     Entry as Entry,
-    Level as Level,
     Requirement as Requirement,
     Violation as Violation,
     worst as worst,

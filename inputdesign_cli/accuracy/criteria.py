@@ -9,6 +9,7 @@ relative to their nominal values.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -17,7 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from inputdesign_cli.accuracy.cuts import Cut, DeterminantCut, MatrixCut, TraceCut, VarianceCut
-from inputdesign_cli.accuracy.requirement import OneCondition
+from inputdesign_cli.accuracy.requirement import OneCondition, Requirement
 from inputdesign_cli.plant.polynomial import Array
 
 Letter = Literal["D", "A", "E", "T"]
@@ -39,11 +40,6 @@ class Criterion(OneCondition):
     def definite(self) -> bool:
         """Whether the criterion is worthless where M is singular: all but T."""
         return self.letter != "T"
-
-    @property
-    def criterion(self) -> Criterion:
-        """Itself."""
-        return self
 
     @cached_property
     def _inverse(self) -> Array:
@@ -84,3 +80,9 @@ class Criterion(OneCondition):
         if self.letter == "E":
             return MatrixCut(self._inverse @ self._inverse.T)
         return TraceCut(self.scaling.T @ self.scaling)
+
+
+def criterion_of(requirements: Sequence[Requirement]) -> Criterion | None:
+    """The criterion that is to be maximised: it then stands alone."""
+    first = requirements[0] if requirements else None
+    return first if isinstance(first, Criterion) else None

@@ -11,6 +11,7 @@ that all of them hold at once with that probability.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.accuracy.admissible import AdmissibleError
 from inputdesign_cli.accuracy.cuts import MatrixCut
 from inputdesign_cli.accuracy.over_frequency import OverFrequency, largest_singular
-from inputdesign_cli.accuracy.requirement import BoundedError, inverse_factor
+from inputdesign_cli.accuracy.requirement import Requirement, inverse_factor
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -36,11 +37,6 @@ class OnModelError(OverFrequency):
     def name(self) -> str:
         """`model_error`."""
         return "model_error"
-
-    @property
-    def bounded_error(self) -> BoundedError:
-        """Itself."""
-        return self
 
     @property
     def knots(self) -> Array:
@@ -73,6 +69,11 @@ class ModelError(OnModelError):
         """M >= R_adm at this frequency."""
         rows = self.rows(np.array([frequency]))[0]
         return MatrixCut(rows.T @ rows, frequency)
+
+
+def model_errors(requirements: Iterable[Requirement]) -> list[OnModelError]:
+    """Those that hold a model error below an admissible one: what bound.csv shows."""
+    return [requirement for requirement in requirements if isinstance(requirement, OnModelError)]
 
 
 def check_positive(admissible: AdmissibleError, grid: Array, *, unit: float, named: str) -> None:

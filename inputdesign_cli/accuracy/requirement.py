@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from inputdesign_cli.accuracy.cuts import Cut
 from inputdesign_cli.plant.polynomial import Array
-
-if TYPE_CHECKING:
-    from inputdesign_cli.accuracy.admissible import AdmissibleError
 
 Entry = tuple[int, int]
 
@@ -24,53 +19,6 @@ class Violation:
 
     ratio: float
     frequency: float | None = None
-
-
-class BoundedError(Protocol):
-    """A model error r_u(w) that is held below an admissible one; see `Requirement.bounded_error`."""
-
-    @property
-    def entry(self) -> Entry | None:
-        """The entry (output, input) of G that it is about, from zero; None for the norm of all."""
-
-    @property
-    def band(self) -> tuple[float, float]:
-        """(lo, hi): where it must hold."""
-
-    @property
-    def grid(self) -> Array:
-        """Frequencies of the band, refined at resonances."""
-
-    @property
-    def admissible(self) -> AdmissibleError:
-        """r_adm."""
-
-    def error_bound(self, information: Array, w: ArrayLike) -> Array:
-        """r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
-
-    def nominal_size(self, w: ArrayLike) -> Array:
-        """|G| (n,) of the entry, or the Frobenius norm."""
-
-    def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
-        """As `Requirement.violations`."""
-
-
-class Level(Protocol):
-    """A criterion as a level that must reach one; see `Requirement.criterion`."""
-
-    @property
-    def letter(self) -> Literal["D", "A", "E", "T"]:
-        """Which criterion it is."""
-
-    @property
-    def scaling(self) -> Array:
-        """(k, k): what takes parameters to the quantities that count."""
-
-    def level(self, information: Array) -> float:
-        """The quantity that must reach one."""
-
-    def value(self, level: float) -> float:
-        """What a level stands for: log det M, -tr M^-1, lambda_min(M) or tr M."""
 
 
 class Requirement(ABC):
@@ -100,16 +48,6 @@ class Requirement(ABC):
     def definite(self) -> bool:
         """Whether it is out of the question that M is singular."""
         return True
-
-    @property
-    def bounded_error(self) -> BoundedError | None:
-        """The requirement itself where it bounds a model error over frequency: what bound.csv shows."""
-        return None
-
-    @property
-    def criterion(self) -> Level | None:
-        """The requirement itself where it stands for a criterion to be maximised."""
-        return None
 
     @abstractmethod
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:

@@ -9,30 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
 _RANK_TOLERANCE = 1e-11
 # Parameters of a smaller share, relative to the largest, take part by rounding and coincidence only.
 _TAKES_PART = 0.05
-
-
-class Named(Protocol):
-    """A model, as far as its parameters go."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the k parameters."""
-
-    @property
-    def theta(self) -> Array:
-        """(k,): their values."""
 
 
 class Coordinates:
@@ -44,7 +33,7 @@ class Coordinates:
     if TYPE_CHECKING:  # a field or a property of the experiment; a default here would become the field's
 
         @property
-        def model(self) -> Named:
+        def model(self) -> Model:
             """What is to be identified."""
 
     @property

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.accuracy import ModelError, model_errors
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
@@ -224,8 +224,7 @@ class ConvexTask:
         if not found.x.any():
             return tables, curves
         white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
-        stated = [r.bounded_error for r in (*problem.requirements, *problem.side)]
-        errors = [error for error in stated if error is not None]
+        errors = model_errors((*problem.requirements, *problem.side))
         unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
         if errors or problem.needs_definite:
             tables["bound"], curves["bound"] = bound_curves(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Level
+from inputdesign_cli.accuracy import Criterion
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.hillclimb import QuadraticDesign, hill_climb
 from inputdesign_cli.design.convex.problem import Problem
@@ -40,7 +40,7 @@ def restrict_columns(asked: FewColumns, design: Design) -> Climbed:
     The bound of the design over all factors stays: it is the upper bound of [mohan-spectral].
     """
     problem, x = design.problem, design.result.x
-    basis, criterion = problem.basis, problem.requirements[0].criterion
+    basis, criterion = problem.basis, problem.stated_criterion
     if not isinstance(basis, PolynomialBasis) or criterion is None:
         raise ValueError("a factor of few columns is for a criterion and a polynomial spectrum")
     columns = min(asked.columns, basis.gram_order)
@@ -62,7 +62,7 @@ def restrict_columns(asked: FewColumns, design: Design) -> Climbed:
     )
 
 
-def _quadratic(problem: Problem, basis: PolynomialBasis, criterion: Level) -> QuadraticDesign:
+def _quadratic(problem: Problem, basis: PolynomialBasis, criterion: Criterion) -> QuadraticDesign:
     k = problem.experiment.size
     maps = np.array([[basis.gram(problem.information_map[:, i, j]) for j in range(k)] for i in range(k)])
     limits = tuple(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, Requirement, worst
+from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weights_of
 from inputdesign_cli.errors import bad_spec
@@ -147,7 +147,7 @@ class GivenTask:
         result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
         tables: dict[str, Table] = {}
         curves: dict[str, Curves] = {}
-        stated = [error for error in (r.bounded_error for r in requirements) if error is not None]
+        stated = model_errors(requirements)
         unstated = [replace(error, experiment=experiment) for error in self.unstated]
         tables["bound"], curves["bound"] = bound_curves(
             units, stated or unstated, information, white=white, stated=bool(stated)

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
@@ -183,7 +183,7 @@ def record_notes(request: RecordRequest, experiment: int, record: Record) -> lis
 
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
     """What ranks records: a criterion by itself, to be large, other requirements by their worst ratio."""
-    criterion = requirements[0].criterion if requirements else None
+    criterion = criterion_of(requirements)
     if criterion is None:
         return worst_ratio(requirements)
     return lambda information: -criterion.level(information)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Level, Requirement, Violation, worst
+from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, worst
 from inputdesign_cli.design.convex.limits import (
     DensityBreach,
     DensityLimit,
@@ -77,9 +77,9 @@ class Problem:
     finer: Problem | None = field(default=None, repr=False)
 
     @property
-    def stated_criterion(self) -> Level | None:
+    def stated_criterion(self) -> Criterion | None:
         """The criterion that is to be maximised, if that is the goal."""
-        return self.requirements[0].criterion if self.requirements else None
+        return criterion_of(self.requirements)
 
     def coarsened(self, basis: Basis) -> Problem:
         """The same problem for a smaller basis of the same family (see `Basis.coarser`)."""
@@ -249,7 +249,7 @@ class Problem:
         found = [
             violation
             for requirement in (*self.requirements, *self.side)
-            if requirement.criterion is None
+            if not isinstance(requirement, Criterion)
             for violation in requirement.violations(information)
         ]
         return worst(found)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.accuracy import BoundedError
+from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import BoundCurves, BoundPanel, Table
 from inputdesign_cli.runs.units import Units
@@ -18,7 +18,7 @@ _NEARLY = 0.5
 
 def bound_curves(
     units: Units,
-    errors: Sequence[BoundedError],
+    errors: Sequence[OnModelError],
     information: Array,
     *,
     white: Array | None = None,
@@ -67,12 +67,12 @@ def bound_curves(
     return Table(columns), BoundCurves(tuple(panels))
 
 
-def _peaks(errors: Sequence[BoundedError], information: Array) -> Array:
+def _peaks(errors: Sequence[OnModelError], information: Array) -> Array:
     found = [v.frequency for error in errors for v in error.violations(information, above=_NEARLY)]
     return np.array([w for w in found if w is not None])
 
 
-def _axis(errors: Sequence[BoundedError], extra: Array) -> Array:
+def _axis(errors: Sequence[OnModelError], extra: Array) -> Array:
     """Frequencies of the band with the `extra` ones, and what shows the shape of resonances."""
     grid = np.unique(np.concatenate([error.grid for error in errors]))
     shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]

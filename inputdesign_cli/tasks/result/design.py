@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement
 from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.designs import Design, Question
 from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
@@ -104,11 +104,11 @@ def requirements_entry(
     listed: list[dict[str, Json]] = []
     entry: dict[str, Json] = {"alpha": alpha}
     for requirement in requirements:
-        if requirement.criterion is not None:
+        if isinstance(requirement, Criterion):
             continue
         item = requirement_entry(units, requirement, information)
         listed.append(item)
-        if requirement.bounded_error is not None and item["worst_ratio"] > entry.get("worst_ratio", 0.0):
+        if isinstance(requirement, OnModelError) and item["worst_ratio"] > entry.get("worst_ratio", 0.0):
             entry["worst_ratio"] = item["worst_ratio"]
             if "frequency" in item:
                 entry["worst_frequency"] = item["frequency"]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, Requirement, worst
+from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -68,13 +68,12 @@ def bound_of_data(
         information: (k, k) of the data.
     """
     entry: dict[str, Json] = {}
-    bounding = [r for r in requirements if r.bounded_error is not None]
-    if bounding:
-        violation = worst([r.worst(information) for r in bounding])
+    errors = model_errors(requirements)
+    if errors:
+        violation = worst([error.worst(information) for error in errors])
         entry["worst_ratio"] = violation.ratio
         if violation.frequency is not None:
             entry["worst_frequency"] = violation.frequency / units.frequency
-    errors = [error for error in (r.bounded_error for r in bounding) if error is not None]
     table, curves = bound_curves(units, errors or entries, information, stated=bool(errors), label="data")
     return table, curves, entry
 

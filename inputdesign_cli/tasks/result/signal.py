@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, SignalCurves, Table
@@ -43,7 +43,7 @@ def signal_entry(
     if record.method == "multisine":
         entry["phases"] = request.settings.phases
     entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
-    criterion = requirements[0].criterion if requirements else None
+    criterion = criterion_of(requirements)
     if criterion is not None:
         reached = criterion.level(experiment.samples / len(samples) * plant.information(samples))
         entry["criterion"] = criterion.value(reached)
