@@ -17,7 +17,9 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
 _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
-_TINY = np.finfo(float).tiny
+# Shares of the band: a pole is on the circle, only rounding is seen beside it, it lies at an end of the band.
+_ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
+_GROWS = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +83,21 @@ class OverFrequency(Requirement):
     @cached_property
     def grid(self) -> Array:
         """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
-        return graded_grid(self.grid_singularities, *self.band, knots=self.knots)
+        grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
+        # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
+        clear = np.all(np.abs(grid[:, None] - self.poles_on_the_circle) > _HIDDEN * self.band[1], axis=1)
+        return grid[clear]
+
+    @cached_property
+    def poles_on_the_circle(self) -> Array:
+        """Frequencies of the band at which G has a pole on the unit circle, for all an estimate can tell."""
+        lo, hi = self.band
+        near = self.grid_singularities
+        places = np.unique(near.real[near.imag <= _ON_THE_CIRCLE])
+        inside = places[(places >= lo - _EDGE * hi) & (places <= hi * (1.0 + _EDGE))]
+        side = np.where(inside + 1e-5 * hi <= hi, 1e-6 * hi, -1e-6 * hi)
+        far, close = (self.nominal_size(inside + step * side) for step in (10.0, 1.0))
+        return inside[~np.isfinite(close) | (close > _GROWS * far)]
 
     @cached_property
     def _grid_rows(self) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -36,6 +36,8 @@ from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
+# A ratio this far above one is no rounding.
+_MISSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,7 @@ class ConvexTask:
         result = design_result(done, how, self.tolerance)
         if self.columns is not None:
             result["spectrum"] |= {"factor_columns": self.columns.columns}
+        self._check_met(result)
         self._check_length(result)
         solved = time.perf_counter()
         record = make_record(self.record, done.design, done.experiment)
@@ -181,6 +184,21 @@ class ConvexTask:
         how = {"method": "lmi", "status": "optimal_on_grid", "grid": method.lines}
         return replace(baseline, problem=problem, result=on_grid), how
 
+    def _check_met(self, result: dict[str, Json]) -> None:
+        """Raise `InaccurateError` (`internal-disagreement`) when the design misses what it must meet."""
+        relaxed = self.question.goal == "factor" or self.grid is not None
+        asked = () if relaxed else result.get("requirements", ())
+        for item in asked:
+            if not item["worst_ratio"] <= 1.0 + _MISSED:
+                raise InaccurateError(
+                    Diagnostic(
+                        "internal-disagreement",
+                        f"the design leaves {item['worst_ratio']:.6g} times the error {item['name']} admits",
+                        hint="rescale the signals, restrict the band, or look for poles near the unit circle",
+                        key="accuracy",
+                    )
+                )
+
     def _check_length(self, result: dict[str, Json]) -> None:
         """Raise `InfeasibleError` when even the shortest experiment is longer than limits.samples."""
         most = self.most_samples
@@ -226,7 +244,7 @@ class ConvexTask:
         white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
         errors = model_errors((*problem.requirements, *problem.side))
         unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
-        if errors or problem.needs_definite:
+        with suppress(np.linalg.LinAlgError):  # a parameter that a T-optimal design does not excite
             tables["bound"], curves["bound"] = bound_curves(
                 units,
                 errors or unstated,

@@ -119,7 +119,9 @@ def test_data_files_travel_with_the_points(loopback, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_sweep_whose_scheduler_ends_is_finished_later(spec, tmp_path):
+def test_a_sweep_whose_scheduler_ends_is_finished_later(tmp_path):
+    spec = tmp_path / "small.yaml"
+    spec.write_text(SPEC)
     cluster = Loopback(tmp_path)
     cluster.add_worker()
     setting = ["experiment.samples=60:66:1"]

@@ -198,7 +198,7 @@ def test_a_top_up_makes_up_for_what_is_missing(data, tmp_path):
 def test_the_command_tells_what_it_found(data, tmp_path):
     run = CliRunner().invoke(app, ["identify", str(data), "--spec", SPEC, "-o", str(tmp_path / "id")])
     assert run.exit_code == 0
-    assert "noise covariance" in run.stdout
+    assert "covariance [" in run.stdout
     assert "% of the outputs" in run.stdout
     for name in ("fit.png", "residuals.png", "bound.png", "model.yaml"):
         assert (tmp_path / "id" / name).stat().st_size > 500

@@ -10,6 +10,7 @@ distance is the proof.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -193,8 +194,9 @@ class _State:
         if self.interior is not None:
             self.best = min(self.best, mixed(problem, z, s, self.interior), key=lambda c: c.objective)
         elif worst <= _WORTH_REPAIRING:
-            candidate = scaled_up(problem, z, s, [(i, v.frequency) for i, v in found])
-            self.best = min(self.best, candidate, key=lambda c: c.objective)
+            places = [(i, v.frequency) for i, v in found]
+            with suppress(np.linalg.LinAlgError):  # singular on the way up: the best so far stays
+                self.best = min(self.best, scaled_up(problem, z, s, places), key=lambda c: c.objective)
         self._add(_most_violated(found, self.keys, 2 * problem.experiment.size + _MORE_CUTS))
         self._add_rows(breaches)
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)

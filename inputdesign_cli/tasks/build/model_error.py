@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.special
-from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import (
     Absolute,
@@ -31,8 +30,6 @@ from inputdesign_cli.tasks.build.tables import has_column
 from inputdesign_cli.tasks.build.weights import build_weight, rational
 
 _KEY = "accuracy.model_error"
-# A pole this near to the circle is on it, as far as an estimate can tell.
-_ON_THE_CIRCLE = 1e-9
 _GROWS = 5.0
 
 
@@ -123,13 +120,11 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
     """
     lo, hi = requirement.band
     units = build_units(spec)
-    for point in requirement.grid_singularities:
-        at = float(point.real)
-        if point.imag > _ON_THE_CIRCLE or not lo <= at <= hi:
-            continue
-        near = at + np.array([1e-5, 1e-6]) * hi * (1.0 if at + 1e-5 * hi <= hi else -1.0)
-        # A zero of G makes relative rows grow, and a weight may hide a pole: both must grow.
-        if all(_grows(rows) for rows in (requirement.plant_rows(near), requirement.rows(near))):
+    for at in requirement.poles_on_the_circle.tolist():
+        side = 1.0 if at + 1e-5 * hi <= hi else -1.0
+        far, close = np.abs(requirement.rows(at + side * np.array([1e-5, 1e-6]) * hi)).max(axis=(1, 2))
+        # A weight may hide the pole.
+        if not np.isfinite(close) or close > _GROWS * far:
             where = f"{at / units.frequency:.6g} {units.per_time}"
             raise spec.complain(
                 "unbounded-error",
@@ -139,12 +134,6 @@ def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
                 f"{key}.band: [{_beside(at, lo, hi, units.frequency)}]",
                 key=key,
             )
-
-
-def _grows(rows: NDArray[np.float64]) -> bool:
-    """Whether the second of two rows (2, q, k), ten times nearer to a point, is far larger than the first."""
-    far, close = np.abs(rows).max(axis=(1, 2))
-    return not np.isfinite(close) or bool(close > _GROWS * far)
 
 
 def _beside(at: float, lo: float, hi: float, unit: float) -> str:
