@@ -73,3 +73,29 @@ def test_a_criterion_does_not_ask_for_the_pole():
     result = solve(parse_spec(f"{INTEGRATOR}accuracy: {{criterion: D}}\nlimits: {{excitation_power: 1}}\n"))
     assert result.result["status"] == "optimal"
     assert np.all(np.isfinite(result.tables["bound"].columns["r_u"]))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["at zero", "at the Nyquist frequency"])
+def test_a_pole_that_the_weight_hides_is_no_pole(sign):
+    """W (G' / G) in closed form, -+q and W / b, with the printed covariance and over the whole band."""
+    spec = f"""
+plant: {{A: [1, {-sign}], B: [0, 0.5]}}
+noise: {{variance: 0.1}}
+experiment: {{samples: 1000, controller: {{numerator: [{sign}]}}}}
+cost: {{input_power: 1}}
+accuracy:
+  model_error: {{relative: 0.1, alpha: 2, weight: {{numerator: [1, {-sign}], denominator: [1]}}}}
+spectrum: {{type: fir, order: 6}}
+signal: {{seed: 1, samples: 200}}
+"""
+    result = solve(parse_spec(spec)).result
+    assert result["status"] == "optimal"
+    w = np.linspace(0.0, np.pi, 4001)
+    q = np.exp(-1j * w)
+    rows = np.stack([-q, (1.0 - sign * q) / 0.5], axis=1)
+    both = np.stack([rows.real, rows.imag], axis=1)
+    names = result["information"]["parameters"]
+    assert [name[0] for name in names] == ["a", "b"]
+    covariance = np.array(result["information"]["covariance"])
+    sizes = np.linalg.eigvalsh(both @ covariance @ both.transpose(0, 2, 1)).max(axis=1)
+    assert 2.0 * np.sqrt(sizes.max()) / 0.1 == pytest.approx(1.0, abs=1e-5)
