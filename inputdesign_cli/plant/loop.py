@@ -16,6 +16,12 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
+# What goes wrong most often in a controller, besides.
+_ONE = "and that numerator and denominator of the controller are in q^-1, ascending"
+_SEVERAL = (
+    "which output each column of the controller reads, and that entries of a row with the same poles share "
+    "one denominator"
+)
 
 
 @dataclass(frozen=True)
@@ -98,8 +104,8 @@ class Loop(ABC):
             )
         _refuse_unstable(
             self.closed_poles,
-            hint="check the signs (feedback is negative: u = r - C y), which output each column of the "
-            "controller reads, and that entries of a row with the same poles share one denominator",
+            hint="check the signs (feedback is negative: u = r - C y), the delay of the plant, "
+            + (_ONE if self.model.inputs == p == 1 else _SEVERAL),
         )
 
     def check_delay(self) -> None:

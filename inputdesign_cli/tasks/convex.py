@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, model_errors
+from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
@@ -242,7 +242,8 @@ class ConvexTask:
         if not found.x.any():
             return tables, curves
         white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
-        errors = model_errors((*problem.requirements, *problem.side))
+        asked = (*problem.requirements, *problem.side)
+        errors = model_errors(asked)
         unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
         with suppress(np.linalg.LinAlgError):  # a parameter that a T-optimal design does not excite
             tables["bound"], curves["bound"] = bound_curves(
@@ -252,7 +253,7 @@ class ConvexTask:
                 white=white,
                 record=self._known(done, record),
                 stated=bool(errors),
-                active=found.active_frequencies,
+                active=[found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)],
             )
         optimality = optimality_curves(units, design)
         if optimality is not None:

@@ -78,6 +78,10 @@ class ExchangeResult:
         """Frequencies (rad/sample) of the requirements that bind."""
         return np.array([w for _, w in self.active if w is not None])
 
+    def active_at(self, index: int) -> Array:
+        """Frequencies (rad/sample) at which one requirement binds, side ones counted after the others."""
+        return np.array([w for i, w in self.active if i == index and w is not None])
+
     @property
     def gap(self) -> float:
         """|objective - bound| / objective: a bound beyond the objective is as wrong as one far below."""

@@ -24,7 +24,7 @@ def bound_curves(
     white: Array | None = None,
     record: Array | None = None,
     stated: bool = True,
-    active: Array | None = None,
+    active: Sequence[Array] = (),
     label: str = "design",
 ) -> tuple[Table, BoundCurves]:
     """r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement.
@@ -33,23 +33,23 @@ def bound_curves(
         information: M (k, k) in the coordinates of the errors; `white` and `record`: that of the baseline
             and of the record to be applied.
         stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
-        active: frequencies of the experiment at which a requirement binds.
+        active: for each error, the frequencies of the experiment at which it binds; empty for none.
         label: what gave r_u.
     """
-    binding = np.zeros(0) if active is None else active
+    binding = active or [np.zeros(0)] * len(errors)
     peaks = _peaks(errors, information) if stated else np.zeros(0)
-    w = _axis(errors, np.concatenate([binding, peaks]))
+    w = _axis(errors, np.concatenate([*binding, peaks]))
     frequency = w / units.frequency
     columns: dict[str, Array] = {units.frequency_header: frequency}
     panels = []
-    for error in errors:
+    for error, binds in zip(errors, binding, strict=True):
         panel = BoundPanel(
             frequency=frequency,
             r_u=error.error_bound(information, w),
             G_abs=error.nominal_size(w),
             r_adm=error.admissible.at(w) if stated else None,
             r_u_white=None if white is None else error.error_bound(white, w),
-            active=distinct(np.maximum(binding, w[0])) / units.frequency if stated else np.zeros(0),
+            active=distinct(np.maximum(binds, w[0]), w[-1]) / units.frequency,
             r_u_record=None if record is None else error.error_bound(record, w),
             label=label,
             entry=None if units.single else error.entry,

@@ -112,7 +112,7 @@ def requirements_entry(
             entry["worst_ratio"] = item["worst_ratio"]
             if "frequency" in item:
                 entry["worst_frequency"] = item["frequency"]
-                entry["active_frequencies"] = distinct(active) / units.frequency
+                entry["active_frequencies"] = distinct(active, requirement.band[1]) / units.frequency
     return {"model_error": entry, "requirements": listed} if listed else {"model_error": entry}
 
 

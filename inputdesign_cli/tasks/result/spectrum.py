@@ -19,21 +19,31 @@ _DECADES = 1e-3
 _ZERO = 1e-5
 _PRICED = 1e-12
 _SUPPORT = 1e-3
+_ROUNDING = 1e-9
 
 
 def axis(lo: float, hi: float, extra: Array) -> Array:
     """Frequencies that look smooth on a logarithmic axis, with the `extra` ones among them."""
     start = lo if lo > _ZERO * hi else _DECADES * hi
     inside = extra[(extra >= start) & (extra <= hi)]
-    return np.unique(
-        np.concatenate([np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2), inside])
-    )
+    smooth = [np.geomspace(start, hi, _POINTS), np.linspace(start, hi, _POINTS // 2)]
+    w = _apart(np.concatenate([*smooth, inside]), _ROUNDING, 0.0)
+    w[-1] = hi
+    return w
 
 
-def distinct(w: Array) -> Array:
-    """One frequency for each cluster within a thousandth: the exchange visits an optimum several times."""
+def distinct(w: Array, highest: float) -> Array:
+    """One frequency for each cluster within a thousandth: the exchange visits an optimum several times.
+
+    Below a millionth of the `highest` of the band, the first stands for all.
+    """
+    return _apart(w, 1e-3, 1e-6 * highest)
+
+
+def _apart(w: Array, relative: float, absolute: float) -> Array:
+    """The frequencies in order, without those that hardly differ from the one before."""
     ordered = np.sort(w)
-    return ordered[np.diff(ordered, prepend=-1.0) > 1e-3 * ordered]
+    return ordered[np.diff(ordered, prepend=-np.inf) > np.maximum(relative * ordered, absolute)]
 
 
 def hermitian_columns(values: NDArray, symbol: str) -> dict[str, Array]:
@@ -129,7 +139,7 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
     size = np.einsum("naa->n", matrices(costs)).real
     seen = size > _PRICED * size.max()
     ratio, _ = best_directions(costs[seen], value.density(w)[seen])
-    marks = distinct(np.maximum(support, w[0]))
+    marks = distinct(np.maximum(support, w[0]), w[-1])
     frequency = w[seen] / units.frequency
     table = Table({units.frequency_header: frequency, "ratio": ratio})
     return table, OptimalityCurves(frequency, ratio, marks / units.frequency)
