@@ -139,6 +139,10 @@ class Loop(ABC):
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
         left, p = self.left_at(w), self.model.outputs
+        if left.shape[1] == 2:
+            R, minus_N, P, Q = _blocks(left)
+            below = R * Q - minus_N * P
+            return R * Q / below, R * P / below
         right = np.zeros((left.shape[0], left.shape[1], p), dtype=complex)
         right[:, :p] = left[:, :p, :p]
         solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
@@ -158,11 +162,16 @@ class Loop(ABC):
 
 def _single_responses(left: ComplexArray, noise: ComplexArray) -> LoopResponse:
     """One input and one output, by Cramer's rule from the matrix on the left (n, 2, 2) and R H (n, 1, 1)."""
-    R, minus_N, P, Q = (left[:, i : i + 1, j : j + 1] for i in (0, 1) for j in (0, 1))
+    R, minus_N, P, Q = _blocks(left)
     below = R * Q - minus_N * P
     return LoopResponse(
         y_x=-minus_N * Q / below, u_x=R * Q / below, y_e=Q * noise / below, u_e=-P * noise / below
     )
+
+
+def _blocks(left: ComplexArray) -> tuple[ComplexArray, ...]:
+    """R, -N, P and Q (n, 1, 1) of the matrix on the left for one input and one output."""
+    return tuple(left[:, i : i + 1, j : j + 1] for i in (0, 1) for j in (0, 1))
 
 
 @singledispatch

@@ -24,7 +24,8 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     c = np.asarray(coefficients, dtype=float)
     value: ComplexArray = np.full(np.shape(q), c[-1], dtype=complex)
     for coefficient in c[-2::-1]:  # Horner
-        value = value * q + coefficient
+        value *= q
+        value += coefficient
     return value
 
 

@@ -24,9 +24,10 @@ def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
 
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
     """(K, rows, columns): the values at `q` (K,), which stands for q^-1."""
-    value = np.broadcast_to(matrix[..., -1].astype(complex), (q.size, *matrix.shape[:-1]))
+    value = np.full((q.size, *matrix.shape[:-1]), matrix[..., -1], dtype=complex)
     for lag in range(matrix.shape[-1] - 2, -1, -1):
-        value = value * q[:, None, None] + matrix[..., lag]
+        value *= q[:, None, None]
+        value += matrix[..., lag]
     return value
 
 

@@ -71,7 +71,11 @@ def directed_scale(
     def ratio(w: Array) -> Array:
         return best_directions(price.density(w), value.density(w))[0]
 
-    peaks, heights = local_maxima(ratio, grid, ratio(grid))
+    over_grid = ratio(grid)
+    peaks, heights = local_maxima(ratio, grid, over_grid)
+    if over_grid[0] == -np.inf:
+        # Near a frequency that costs nothing the ratio hardly changes, but the price loses its size.
+        peaks = np.maximum(peaks, grid[1])
     directions = best_directions(price.density(peaks), value.density(peaks))[1]
     top = heights.max(initial=0.0)
     if value.concentrated:

@@ -1,9 +1,11 @@
 """Plants that integrate, in a loop: what cannot be promised at the pole is refused, the rest holds."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, solve
+from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.errors import SpecError
 
 INTEGRATOR = """
@@ -99,3 +101,11 @@ signal: {{seed: 1, samples: 200}}
     covariance = np.array(result["information"]["covariance"])
     sizes = np.linalg.eigvalsh(both @ covariance @ both.transpose(0, 2, 1)).max(axis=1)
     assert 2.0 * np.sqrt(sizes.max()) / 0.1 == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("sample_time", [0.05, 0.06])
+def test_the_bound_over_every_spectrum_closes_where_power_near_zero_is_free(sample_time):
+    """Integral action takes power near frequency zero away; the bound rests on sinusoids there."""
+    spec = Path(__file__).parents[2] / "specs" / "motor_loop.yaml"
+    found = solve(load_spec(spec, [f"sample_time={sample_time}"])).result
+    assert found["solver"]["any_spectrum_gap"] <= 1e-6

@@ -169,8 +169,8 @@ class _State:
         return [index >= len(self.problem.requirements) for index, _ in self.keys]
 
     def improve(self, tolerance: float) -> bool:
-        """One round: solve, prove, repair, enlarge. False when the solver fails and nothing improves."""
-        problem = self.problem
+        """One round: solve, prove, repair, enlarge. False when another could not improve anything."""
+        problem, face, best, cuts = self.problem, self.face, self.best, len(self.cuts)
         tagged = list(zip(self.cuts, self.sides, strict=True))
         answer = solve_master(
             problem,
@@ -206,6 +206,9 @@ class _State:
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
             self._grow(replace(problem, basis=basis, finer=None))
+        same = self.face is face and self.best is best and len(self.cuts) == cuts
+        if same and not (moves or breaches):
+            return False  # the next round would solve the same program
         better = self.best.objective < 0.9 * before[0] or self.certificate.bound > 1.1 * before[1]
         return answer.converged or better
 
