@@ -25,6 +25,7 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
+from inputdesign_cli.tasks.other_spectra import power_that_fits
 from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, make_record, record_notes, redrawn
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
@@ -101,7 +102,7 @@ class ConvexTask:
         self._check_met(result)
         self._check_length(result)
         solved = time.perf_counter()
-        record = make_record(self.record, done.design, done.experiment)
+        record = self._made(done)
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
         if record is not None:
@@ -119,6 +120,22 @@ class ConvexTask:
         found = done.design.result
         generator = redrawn(self.record, done.design, record)
         return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
+
+    def _made(self, done: Designed) -> Record | None:
+        """The record; where none is found within the limits on samples, the error names what would do.
+
+        Raises:
+            InfeasibleError: `limits-too-tight`.
+        """
+        try:
+            return make_record(self.record, done.design, done.experiment)
+        except InfeasibleError as missed:
+            power = power_that_fits(self.record, self.question, done.design, done.experiment)
+            if power is None:
+                raise
+            told = missed.diagnostics[0]
+            hint = f"with limits.input_power: {power:.4g} a record of this length does; or {told.hint}"
+            raise InfeasibleError(replace(told, hint=hint)) from missed
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.

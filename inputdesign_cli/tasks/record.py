@@ -76,15 +76,20 @@ class RecordRequest:
         return -(-(self.samples or experiment) // block) * block
 
 
-def make_record(request: RecordRequest, design: Design, experiment: Experiment) -> Record | None:
+def make_record(
+    request: RecordRequest, design: Design, experiment: Experiment, *, longer: bool = True
+) -> Record | None:
     """The best of several records of the designed spectrum.
 
     Best is the least power that meets the requirements by the record itself, or the best criterion. None when
     no excitation is needed, or when the record would be too short (criteria per sample without
     `signal.samples`).
 
+    Args:
+        longer: whether to look for a longer one where none of this length is found to meet the accuracy.
+
     Raises:
-        InfeasibleError: no record of this length within the limits on single samples meets the accuracy.
+        InfeasibleError: no record of this length was found within the limits on single samples.
     """
     problem, settings = design.problem, request.settings
     samples = request.length(experiment.samples)
@@ -109,7 +114,7 @@ def make_record(request: RecordRequest, design: Design, experiment: Experiment) 
         return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
 
     record = made(samples)
-    if record.met or settings.level is not None or not bounds.hard:
+    if record.met or settings.level is not None or not (bounds.hard and longer):
         return record
     longest = request.most_samples if problem.goal == "samples" and request.samples is None else 0
     return shortest_record(record, settings.block, made, longest, request.limit_keys)

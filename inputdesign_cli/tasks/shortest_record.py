@@ -93,10 +93,10 @@ def _too_tight(
     names = " and ".join(limit_keys)
     size = len(missed.samples)
     message = (
-        f"no record of {size} samples within {names} meets the accuracy: the best found reaches "
-        f"r_u / r_adm = {missed.worst_ratio:.4g} with power {missed.power:.4g}"
+        f"no record of {size} samples within {names} was found that meets the accuracy: the best of those "
+        f"tried reaches r_u / r_adm = {missed.worst_ratio:.4g} with power {missed.power:.4g}"
         if np.isfinite(missed.worst_ratio)
-        else f"no record of {size} samples within {names} excites every parameter"
+        else f"no record of {size} samples within {names} was found that excites every parameter"
     )
     if found is None:
         hint = (

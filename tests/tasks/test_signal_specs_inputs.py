@@ -34,7 +34,12 @@ def test_limits_on_each_channel():
 
 
 def test_a_record_that_is_too_short_names_one_that_is_not():
-    changes = ["spectrum.order=4", "limits.amplitude=[7, 19]", "signal.type=binary", "signal.candidates=1"]
+    changes = [
+        "spectrum.order=4",
+        "limits.amplitude=[7.65, 20.8]",
+        "signal.type=binary",
+        "signal.candidates=1",
+    ]
     with pytest.raises(InfeasibleError) as error:
         solve(load_spec(SPEC, changes))
     (diagnostic,) = error.value.diagnostics
@@ -45,7 +50,7 @@ def test_a_record_that_is_too_short_names_one_that_is_not():
     longer = [f"experiment.samples={length}", f"signal.samples={length}"]
     signal = solve(load_spec(SPEC, [*changes, *longer, "signal.candidates=4"])).result["signal"]
     assert signal["worst_ratio"] <= 1 + 1e-9
-    assert np.all(np.array(signal["peak"]) <= [7, 19])
+    assert np.all(np.array(signal["peak"]) <= [7.65, 20.8])
 
 
 def test_what_is_applied_to_several_inputs(tmp_path):

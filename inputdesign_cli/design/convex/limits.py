@@ -16,18 +16,20 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 class PowerLimit:
     """A power of input, output or excitation is at most (`upper`) or at least `bound`.
 
-    `channel` counts from 0; None is the sum over the channels. `key` is its name in the spec.
+    `channel` counts from 0; None is the sum over the channels. `implied` says that a limit on single samples
+    stands behind it: |u| <= a leaves u no more power than a^2.
     """
 
     kind: PowerKind
     bound: float
     upper: bool = True
     channel: int | None = None
+    implied: bool = False
 
     @property
     def key(self) -> str:
         """Its name in the spec."""
-        return f"limits.{self.kind}_power"
+        return f"limits.amplitude.{self.kind}" if self.implied else f"limits.{self.kind}_power"
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,8 @@ def limits_present(spec: Spec) -> Iterator[PathDiagnostic]:
     asked = (*spec.accuracy.goals, *spec.accuracy.requirements)
     if not spec.designs or spec.limits.bounds_power:
         return
-    keys, path = "limits.input_power, limits.output_power or limits.excitation_power", ["objective"]
+    keys = "limits.input_power, limits.output_power, limits.excitation_power or limits.amplitude"
+    path = ["objective"]
     if spec.goal == "shortest_experiment":
         message = "the shortest experiment needs a limit on power: otherwise one strong sample would do"
     elif spec.goal == "best_accuracy" and asked:

@@ -11,7 +11,7 @@ from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits
+from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
@@ -40,6 +40,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     check_pairs(spec, experiment.model.names)
     check_signal(spec)
     basis = build_basis(spec, experiment.inputs, experiment.band)
+    grid = _grid_method(spec)
     question = Question(
         experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
         basis=basis,
@@ -47,7 +48,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         requirements=requirements if criterion is None else [criterion],
         side=[] if criterion is None else requirements,
         cost=cost if goal == "cost" else {},
-        limits=build_power_limits(spec),
+        limits=[*build_power_limits(spec), *([] if grid else implied_limits(spec))],
         densities=build_density_limits(spec, experiment),
     )
     check_every_direction_counts(spec, question)
@@ -60,7 +61,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         tolerance=spec.solver.tolerance,
         most_samples=spec.limits.samples,
         ellipses=spec.report.ellipses,
-        grid=_grid_method(spec),
+        grid=grid,
         columns=_few_columns(spec, basis),
         record=build_record_request(spec),
         unstated=unstated_errors(spec, experiment),

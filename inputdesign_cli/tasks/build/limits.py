@@ -7,13 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
-from inputdesign_cli.information import POWER_KINDS, Experiment
+from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
 from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.signal_settings import build_bounds
 from inputdesign_cli.tasks.build.weights import build_weight
 
 _KEY = "limits.spectrum"
@@ -42,6 +43,18 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
                 if upper or v > 0
             ]
     return limits
+
+
+def implied_limits(spec: Spec) -> list[PowerLimit]:
+    """What limits on single samples leave of the powers: with |u| <= a an input has no more than a^2."""
+    bounds = build_bounds(spec)
+    peaks: list[tuple[PowerKind, Array | None]] = [("input", bounds.amplitude), ("output", bounds.output)]
+    return [
+        PowerLimit(kind, float(a) ** 2, channel=channel if peak.size > 1 else None, implied=True)
+        for kind, peak in peaks
+        if peak is not None
+        for channel, a in enumerate(peak)
+    ]
 
 
 def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimit]:

@@ -206,7 +206,7 @@ def _limits(done: Designed) -> list[dict[str, Json]]:
     for limit in done.question.limits:
         value = at.power(limit.kind, limit.channel).at(x)
         slack = (limit.bound - value) if limit.upper else (value - limit.bound)
-        entry: dict[str, Json] = {"name": f"{limit.kind}_power"}
+        entry: dict[str, Json] = {"name": limit.key.removeprefix("limits.")}
         if limit.channel is not None:
             entry["channel"] = limit.channel + 1
         entry |= {

@@ -50,6 +50,10 @@ def explain(units: Units, question: Question, unreachable: UnreachableError) -> 
         f"raise the limit, or loosen the accuracy: within the limits the error can be made no smaller than "
         f"{looser:.4g} times what is asked"
     )
+    if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
+        # Within the same limits information grows in proportion to the length.
+        longer = int(np.ceil(question.experiment.samples * nearest.objective))
+        hint += f"; with {longer} samples a spectrum can"
     if _within_reach_of_any(question):
         hint += "; spectrum: {type: free} can meet it"
     if problem.densities and stated:
@@ -82,8 +86,10 @@ def _needed(question: Question, limit: PowerLimit) -> str:
         least = solve_design(alone, tolerance=_TOLERANCE).result.certificate.bound
     except (UnreachableError, np.linalg.LinAlgError):
         return ""
-    kind = limit.kind
-    return f"needs {kind} power >= {_up(least)}, limit is {limit.bound:.6g}"
+    if limit.implied:
+        peak = np.sqrt(limit.bound)
+        return f"needs {limit.kind} power >= {_up(least)}, but a peak of {peak:.6g} leaves {limit.bound:.6g}"
+    return f"needs {limit.kind} power >= {_up(least)}, limit is {limit.bound:.6g}"
 
 
 def _within_reach_of_any(question: Question) -> bool:

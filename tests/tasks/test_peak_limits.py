@@ -1,0 +1,64 @@
+"""A limit on single samples limits the power of the design, and what is said where no record is found."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import InfeasibleError
+
+DEAR_OUTPUT = """
+sample_time: 5
+plant: {B: [0, 0, 0.05], F: [1, -0.9]}
+noise: {variance: 1.0}
+experiment: {samples: 720}
+cost: {output_power: 1}
+limits: {%s}
+accuracy: {model_error: {relative: 0.25, band: [0.001, 0.2]}}
+spectrum: {type: fir, order: 20}
+"""
+
+
+@pytest.mark.parametrize("amplitude", [3.5, 5.0])
+def test_a_peak_limits_the_power_of_the_design(amplitude):
+    """Without the limit implied, input power of 24 to 27 left no record of this length."""
+    found = solve(parse_spec(DEAR_OUTPUT % f"amplitude: {amplitude}"))
+    u = np.array(found.tables["signal"].columns["u1"])
+    assert found.result["power"]["input"][0] <= amplitude**2 * (1 + 1e-9)
+    assert np.abs(u).max() <= amplitude
+    assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_the_peak_is_the_limit_that_its_square_is():
+    """D-optimal for a peak of two: the same design as for a power of four."""
+    asked = DEAR_OUTPUT.replace("cost: {output_power: 1}\n", "").replace(
+        "model_error: {relative: 0.25, band: [0.001, 0.2]}", "criterion: D"
+    )
+    peak = solve(parse_spec(asked % "amplitude: 2")).result
+    power = solve(parse_spec(asked % "input_power: 4")).result
+    assert peak["objective"]["value"] == pytest.approx(power["objective"]["value"], abs=1e-7)
+    assert peak["objective"]["upper_bound"] == pytest.approx(power["objective"]["upper_bound"], abs=1e-7)
+    assert [limit["name"] for limit in peak["limits"]] == ["amplitude.input"]
+    assert peak["limits"][0]["max"] == 4.0
+
+
+def test_a_power_below_the_least_is_a_proof():
+    least = solve(parse_spec(DEAR_OUTPUT.replace("output_power: 1", "input_power: 1") % "samples: 720"))
+    least = least.result["objective"]["value"]
+    with pytest.raises(InfeasibleError) as caught:
+        solve(parse_spec(DEAR_OUTPUT % f"amplitude: {0.99 * np.sqrt(least)}"))
+    assert caught.value.diagnostics[0].code == "infeasible"
+    told = caught.value.diagnostics[0]
+    assert "a peak of" in told.message
+    samples = int(told.hint.split("; with ")[1].split()[0])
+    assert samples == pytest.approx(720 / 0.99**2, rel=0.02)
+
+
+def test_the_power_that_the_hint_names_does():
+    with pytest.raises(InfeasibleError) as caught:
+        solve(parse_spec(DEAR_OUTPUT % "amplitude: 2"))
+    told = caught.value.diagnostics[0]
+    assert told.code == "limits-too-tight"
+    assert "was found" in told.message
+    power = told.hint.split("limits.input_power: ")[1].split()[0]
+    found = solve(parse_spec(DEAR_OUTPUT % f"amplitude: 2, input_power: {power}"))
+    assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
