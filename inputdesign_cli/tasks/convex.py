@@ -24,6 +24,7 @@ from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
+from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.other_spectra import power_that_fits
 from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, make_record, record_notes, redrawn
@@ -37,8 +38,6 @@ from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
-# A ratio this far above one is no rounding.
-_MISSED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class ConvexTask:
         result = design_result(done, how, self.tolerance)
         if self.columns is not None:
             result["spectrum"] |= {"factor_columns": self.columns.columns}
-        self._check_met(result)
+        audit(done, result, on_grid=self.grid is not None)
         self._check_length(result)
         solved = time.perf_counter()
         record = self._made(done)
@@ -200,21 +199,6 @@ class ConvexTask:
         )
         how = {"method": "lmi", "status": "optimal_on_grid", "grid": method.lines}
         return replace(baseline, problem=problem, result=on_grid), how
-
-    def _check_met(self, result: dict[str, Json]) -> None:
-        """Raise `InaccurateError` (`internal-disagreement`) when the design misses what it must meet."""
-        relaxed = self.question.goal == "factor" or self.grid is not None
-        asked = () if relaxed else result.get("requirements", ())
-        for item in asked:
-            if not item["worst_ratio"] <= 1.0 + _MISSED:
-                raise InaccurateError(
-                    Diagnostic(
-                        "internal-disagreement",
-                        f"the design leaves {item['worst_ratio']:.6g} times the error {item['name']} admits",
-                        hint="rescale the signals, restrict the band, or look for poles near the unit circle",
-                        key="accuracy",
-                    )
-                )
 
     def _check_length(self, result: dict[str, Json]) -> None:
         """Raise `InfeasibleError` when even the shortest experiment is longer than limits.samples."""

@@ -319,3 +319,16 @@ def test_what_is_known_already_may_be_enough(spec, overrides, said):
     assert (result["status"], result["cost"]) == ("nothing_needed", 0.0)
     assert said in result["notes"][0]
     assert "times as much" not in summary(result, "s", [Path("spec.yaml")])
+
+
+def test_an_input_that_a_trace_leaves_out_is_told():
+    """One input has all of the trace where its gains are largest; the other gets nothing, and that is said."""
+    found = solve(
+        parse_spec(
+            "plant: {B: [[[0, 1], [0, 0.4]]], F: [[[1, -0.8], [1, -0.5]]]}\nnoise: {variance: 1}\n"
+            "experiment: {samples: 500}\naccuracy: {criterion: T}\nlimits: {input_power: 1}\n"
+            "spectrum: {type: fir, order: 3}\n"
+        )
+    ).result
+    assert found["power"]["input"] == pytest.approx([1.0, 0.0], abs=1e-9)
+    assert [note for note in found["notes"] if note.startswith("input 2 gets no power")]

@@ -23,6 +23,8 @@ _BINDS = 1e-6
 # Below this share of its largest price, power at a frequency is called free of charge.
 _FREE = 1e-3
 _SUPPORT = 1e-3
+# An input with less than this share of the power has none.
+_NOTHING = 1e-9
 _KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "accuracy_factor"}
 
 
@@ -133,7 +135,8 @@ def powers(problem: Problem, basis: Basis, x: Array) -> dict[str, list[float]]:
     """The powers of input, output and excitation, one entry a channel."""
     at, model = problem.on(basis), problem.experiment.model
     channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
-    return {kind: [at.power(kind, c).at(x) for c in range(channels[kind])] for kind in POWER_KINDS}
+    # A channel without power may come out below zero by rounding.
+    return {kind: [max(at.power(kind, c).at(x), 0.0) for c in range(channels[kind])] for kind in POWER_KINDS}
 
 
 def _cost(done: Designed, basis: Basis, x: Array) -> float:
@@ -238,9 +241,21 @@ def _notes(done: Designed) -> list[str]:
         sources += ["experiment.prior"] if experiment.prior is not None else []
         known = " and ".join(sources) or "the noise"
         return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
+    notes = _left_out(done)
     if units.closed_loop and not found.basis.has_density:
-        return _free_of_charge(done)
-    return []
+        notes += _free_of_charge(done)
+    return notes
+
+
+def _left_out(done: Designed) -> list[str]:
+    """The inputs that a T-optimal design leaves without power: trace M may be largest without them."""
+    excited = powers(done.design.problem, done.design.result.basis, done.design.result.x)["excitation"]
+    return [
+        f"input {channel + 1} gets no power, so that nothing is learnt about what it alone drives: T adds up "
+        "what is learnt; criterion D, A or E asks for every parameter"
+        for channel, power in enumerate(excited)
+        if power <= _NOTHING * sum(excited)
+    ]
 
 
 def _free_of_charge(done: Designed) -> list[str]:

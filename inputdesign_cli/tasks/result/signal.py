@@ -139,6 +139,6 @@ def _spectrum_error(lines: Lines, samples: Array) -> float:
     wanted = np.einsum("tn,nab->tab", turn, lines.powers).real
     found = np.array([samples[lag:].T @ samples[: n - lag] / (n - lag) for lag in lags])
     found *= np.trace(wanted[0]) / np.trace(found[0])
-    size = np.sqrt(np.diag(wanted[0]))
+    size = np.sqrt(np.maximum(np.diag(wanted[0]), 0.0))
     scale = np.where(size > 0.0, size, np.inf)
     return float(np.abs((found - wanted) / np.outer(scale, scale)).max())
