@@ -322,7 +322,7 @@ def test_what_is_known_already_may_be_enough(spec, overrides, said):
 
 
 def test_an_input_that_a_trace_leaves_out_is_told():
-    """One input has all of the trace where its gains are largest; the other gets nothing, and that is said."""
+    """One input has all of the trace where its gains are largest; the other gets nothing."""
     found = solve(
         parse_spec(
             "plant: {B: [[[0, 1], [0, 0.4]]], F: [[[1, -0.8], [1, -0.5]]]}\nnoise: {variance: 1}\n"
