@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weights_of
+from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weighted_sum
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
@@ -84,13 +84,6 @@ class GivenExcitation:
         share = np.full(experiment.inputs, power / experiment.inputs)
         return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
 
-    def cost(self, weights: dict[PowerKind, Weight]) -> float:
-        """The weighted sum of the powers."""
-        return sum(
-            weight * (sum(self.power[kind]) if channel is None else self.power[kind][channel])
-            for kind, channel, weight in weights_of(weights)
-        )
-
 
 @dataclass(frozen=True)
 class GivenTask:
@@ -139,8 +132,8 @@ class GivenTask:
         information = excitation.information(experiment)
         _check_excites(experiment, information)
         requirements = [make(experiment) for make in self.requirements]
-        cost = excitation.cost(self.cost)
-        level = cost / GivenExcitation.even(raw, 1.0).cost(self.cost)
+        cost = weighted_sum(self.cost, excitation.power)
+        level = cost / weighted_sum(self.cost, GivenExcitation.even(raw, 1.0).power)
         white = GivenExcitation.even(raw, level).information(experiment)
         result = self._result(experiment, requirements, information)
         result |= {"cost": cost, "power": excitation.power, "spectrum": self._spectrum_entry()}

@@ -18,7 +18,7 @@ import numpy as np
 
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.weight import adjoint
-from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.frequencies import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -195,13 +195,11 @@ def _restricted(
 
 
 def _failed(why: str) -> InaccurateError:
-    return InaccurateError(
-        Diagnostic(
-            "solver-failed",
-            f"the program over the lines of the spectrum was not solved: {why}",
-            hint="write covariance: asymptotic, or look for parameters that are nearly indistinguishable",
-            key="accuracy.closed_loop_error.covariance",
-        )
+    return InaccurateError.of(
+        "solver-failed",
+        f"the program over the lines of the spectrum was not solved: {why}",
+        hint="write covariance: asymptotic, or look for parameters that are nearly indistinguishable",
+        key="accuracy.closed_loop_error.covariance",
     )
 
 

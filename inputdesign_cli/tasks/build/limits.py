@@ -12,8 +12,8 @@ from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
-from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.weights import build_weight
 
 _KEY = "limits.spectrum"

@@ -17,6 +17,7 @@ from inputdesign_cli.plant import (
     SampledModel,
     TransferMatrix,
     close_loop,
+    hold_entries,
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
@@ -76,12 +77,20 @@ def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Arra
     """A plant in q^-1; A, C and D that the spec states once are common to the outputs."""
     return PolynomialModel(
         B=_arrays(plant.B_matrix),
-        A=rows_of(plant.A),
+        A=_rows(plant.A),
         F=_arrays(plant.F_matrix),
-        C=rows_of(noise.C),
-        D=rows_of(noise.D),
+        C=_rows(noise.C),
+        D=_rows(noise.D),
         covariance=covariance,
     )
+
+
+def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
+    """A plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
+    matrix = plant.continuous
+    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, sample_time)
+    B, F = (tuple(tuple(tuple(entry.tolist()) for entry in row) for row in rows) for rows in held)
+    return PolynomialPlant.model_construct(A=(1.0,), B=B, F=F)
 
 
 def build_experiment(spec: Spec) -> Experiment:
@@ -249,6 +258,6 @@ def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, .
     return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
 
 
-def rows_of(value: tuple) -> tuple[Array, ...]:
+def _rows(value: tuple) -> tuple[Array, ...]:
     """One polynomial, common to all outputs, or a list of one an output."""
     return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))
