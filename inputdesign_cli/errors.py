@@ -54,7 +54,7 @@ class IdesignError(Exception):
         super().__init__("; ".join(c.message for c in self.diagnostics))
 
     @classmethod
-    def of(
+    def because(
         cls, code: str, message: str, hint: str = "", key: str = "", location: Location | None = None
     ) -> Self:
         """An error with a single diagnostic."""
@@ -87,7 +87,7 @@ class InaccurateError(IdesignError):
 
 def bad_spec(code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
     """A `SpecError` with a single diagnostic."""
-    return SpecError.of(code, message, hint, key)
+    return SpecError.because(code, message, hint, key)
 
 
 def refuse(key: str, what: str, hint: str, *, who: str = "this version") -> SpecError:

@@ -112,7 +112,7 @@ class OverFrequency(Requirement):
         turn = inverse_factor(information).T
         on_grid = self.measure(self._grid_rows @ turn, self.grid)
         if not np.all(np.isfinite(on_grid)):
-            raise InaccurateError.of(
+            raise InaccurateError.because(
                 "ratio-not-finite",
                 f"{self.name} has no finite value at {self.grid[~np.isfinite(on_grid)][0]:.6g} (in the "
                 "unit of the experiment)",

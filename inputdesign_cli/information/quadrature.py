@@ -118,7 +118,7 @@ def integrate(
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
             return fine
         coarse, earlier = fine, change
-    raise InaccurateError.of(
+    raise InaccurateError.because(
         "integral-inaccurate",
         "an integral of the information matrix did not settle: the integrand has a pole on, "
         "or within rounding of, the unit circle",

@@ -58,7 +58,7 @@ def run_batches(
         if isinstance(done.error, WorkerLostError):
             message = f"a batch of {done.job.runs} simulated runs has no result: {done.error}"
             hint = "the system may have run out of memory; try fewer processes"
-            raise IdesignError.of("worker-lost", message, hint) from done.error
+            raise IdesignError.because("worker-lost", message, hint) from done.error
         if done.error is not None:
             raise done.error
         assert done.answer is not None  # there is an answer or an error

@@ -26,7 +26,7 @@ def report_text(directory: Path) -> str:
         return _filled("run.html", directory, run_page(directory))
     message = f"{directory} holds neither a finished run nor a sweep"
     hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
-    raise DataError.of("run-missing", message, hint)
+    raise DataError.because("run-missing", message, hint)
 
 
 def _filled(template: str, directory: Path, content: Mapping[str, Json]) -> str:

@@ -78,7 +78,7 @@ def read_tree(text: str, file: str, overrides: Sequence[str], folder: FilePath) 
     tree = read(text, file)
     if not isinstance(tree.data, dict):
         empty = tree.data is None
-        raise SpecError.of(
+        raise SpecError.because(
             "empty-file" if empty else "not-a-mapping",
             "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
             "`idesign init` writes a spec to start from",

@@ -143,7 +143,7 @@ class ConvexTask:
             raise explain(self.header.units, self.question, unreachable) from unreachable
         found = design.result
         if found.gap > _ALMOST * self.tolerance:
-            raise InaccurateError.of(
+            raise InaccurateError.because(
                 "gap-not-closed",
                 f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance "
                 f"asks for {self.tolerance:.1e}",
@@ -188,7 +188,7 @@ class ConvexTask:
         asked = () if relaxed else result.get("requirements", ())
         for item in asked:
             if not item["worst_ratio"] <= 1.0 + _MISSED:
-                raise InaccurateError.of(
+                raise InaccurateError.because(
                     "internal-disagreement",
                     f"the design leaves {item['worst_ratio']:.6g} times the error {item['name']} admits",
                     hint="rescale the signals, restrict the band, or look for poles near the unit circle",
@@ -201,7 +201,7 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
-        raise InfeasibleError.of(
+        raise InfeasibleError.because(
             "too-long",
             f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
             f"no fewer than {least}), but limits.samples is {most}",
@@ -272,7 +272,7 @@ def plain_errors() -> Iterator[None]:
     try:
         yield
     except np.linalg.LinAlgError as error:
-        raise InaccurateError.of(
+        raise InaccurateError.because(
             "numerically-singular",
             "the information matrix is singular to working precision: the parameters are nearly "
             "indistinguishable",

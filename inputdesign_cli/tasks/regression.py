@@ -208,7 +208,7 @@ def _out_of_reach(
             f"no Toeplitz moments were found that reach a mean-squared error of {target:.7g} (the least "
             f"biased ones leave {smallest:.7g} at any energy), nor was it proved that there are none"
         )
-        return InaccurateError.of("target-undecided", message, hint=hint, key=f"{KEY}.target")
+        return InaccurateError.because("target-undecided", message, hint=hint, key=f"{KEY}.target")
     unit = regression.n * regression.variance * float(np.sum(regression.estimated**2)) / target
     proof = f"proved for every energy up to {error.proved * unit:.3g}"
     if error.assumed:
@@ -217,4 +217,4 @@ def _out_of_reach(
         f"no Toeplitz moments reach a mean-squared error of {target:.7g} ({proof}): the bias alone "
         f"leaves {smallest:.7g}"
     )
-    return InfeasibleError.of("target-out-of-reach", message, hint=hint, key=f"{KEY}.target")
+    return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=f"{KEY}.target")

@@ -111,4 +111,4 @@ def _too_tight(
         )
         if most_samples:
             hint += f"; limits.samples is {most_samples}"
-    return InfeasibleError.of("limits-too-tight", message, hint, limit_keys[0])
+    return InfeasibleError.because("limits-too-tight", message, hint, limit_keys[0])

@@ -239,7 +239,7 @@ def _check_reachable(problem: Problem, start: Array) -> None:
     except np.linalg.LinAlgError:
         ratio = np.inf
     if ratio > 1.0:
-        raise InfeasibleError.of(
+        raise InfeasibleError.because(
             "infeasible",
             "no power of these lines reaches the accuracy: they excite only "
             f"{int(np.sum(excited > _UNEXCITED * excited[-1]))} combinations of the "

@@ -108,7 +108,7 @@ def _symmetric(matrix: Array) -> Array:
 
 
 def _failed(why: str) -> InaccurateError:
-    return InaccurateError.of(
+    return InaccurateError.because(
         "solver-failed",
         f"the solver found no answer to the grid program: {why}",
         hint="use solver: {method: exchange}, fewer grid frequencies, or a lower order",

@@ -72,7 +72,7 @@ def _enough(excess: Callable[[float], float], start: float) -> float:
 
 def _out_of_reach(excess: float) -> InfeasibleError:
     ratio = float(np.exp(excess))
-    return InfeasibleError.of(
+    return InfeasibleError.because(
         "infeasible",
         "no power is enough: the accuracy asks for parameters of which only the noise tells, and the "
         f"error stays at {ratio:.6g} times what is asked",

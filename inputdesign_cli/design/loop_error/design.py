@@ -126,7 +126,7 @@ def design_loop_error(
     else:
         found = _asymptotic(problem, criterion)
     if found.gap > _ALMOST * tolerance:
-        raise InaccurateError.of(
+        raise InaccurateError.because(
             "gap-not-closed",
             f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance asks "
             f"for {tolerance:.1e}",
@@ -159,7 +159,7 @@ def _check_identifiable(problem: LoopErrorProblem, criterion: ParametricCriterio
 def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> LoopErrorDesign:
     design, rule, settled = problem.asymptotic()
     if settled > _UNSETTLED:
-        raise InaccurateError.of(
+        raise InaccurateError.because(
             "integral-inaccurate",
             f"the mean over frequency moves by {settled:.1e} when its grid is halved",
             hint="look for poles or zeros next to the unit circle",

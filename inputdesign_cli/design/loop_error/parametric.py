@@ -195,7 +195,7 @@ def _restricted(
 
 
 def _failed(why: str) -> InaccurateError:
-    return InaccurateError.of(
+    return InaccurateError.because(
         "solver-failed",
         f"the program over the lines of the spectrum was not solved: {why}",
         hint="write covariance: asymptotic, or look for parameters that are nearly indistinguishable",

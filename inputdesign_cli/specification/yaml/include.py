@@ -73,4 +73,4 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
 def _error(tree: Tree, path: Path, message: str, hint: str) -> SpecError:
     key = format_key(path)
     location = tree.places.location(tree.places.mark(path, at_key=True))
-    return SpecError.of("bad-include", message.replace("{key}", key), hint, key, location)
+    return SpecError.because("bad-include", message.replace("{key}", key), hint, key, location)

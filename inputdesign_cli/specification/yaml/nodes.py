@@ -60,7 +60,7 @@ class Document:
 
     def error(self, code: str, message: str, line: int, column: int, hint: str) -> SpecError:
         """What stops the reading."""
-        return SpecError.of(code, message, hint, location=self.location(line, column))
+        return SpecError.because(code, message, hint, location=self.location(line, column))
 
     def spend(self, line: int, column: int, depth: int) -> None:
         """Count one node.

@@ -38,7 +38,7 @@ def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError
     """What is wrong with an override, at a column of its text."""
     first = override.splitlines()[0] if override else ""
     location = Location(f"--set {override}", 1, column, first)
-    return SpecError.of("bad-override", message, hint, location=location)
+    return SpecError.because("bad-override", message, hint, location=location)
 
 
 def _apply(tree: Tree, override: str) -> None:

@@ -109,7 +109,7 @@ def _number(path: Path, key: str, line: int, row: list[str], column: int, name: 
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise DataError.of(
+        raise DataError.because(
             "data-not-a-number",
             f"{text!r} in column {name} is not a finite number"
             if text
@@ -122,7 +122,7 @@ def _number(path: Path, key: str, line: int, row: list[str], column: int, name: 
 
 
 def _unreadable(path: Path, key: str, what: str, hint: str) -> DataError:
-    return DataError.of("data-unreadable", f"the file {path} {what}", hint, key)
+    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key)
 
 
 def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str) -> dict[str, Array]:
@@ -142,4 +142,4 @@ def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str
 
 def bad_table(spec: Spec, name: str, message: str, hint: str, key: str) -> DataError:
     """The error about a table that can be read but not used."""
-    return DataError.of("bad-table", f"{spec.resolve_path(name).name}: {message}", hint, key)
+    return DataError.because("bad-table", f"{spec.resolve_path(name).name}: {message}", hint, key)

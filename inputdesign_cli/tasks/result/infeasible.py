@@ -55,7 +55,7 @@ def explain(units: Units, question: Question, unreachable: UnreachableError) -> 
     if problem.densities and stated:
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
-    return InfeasibleError.of("infeasible", message, hint, key)
+    return InfeasibleError.because("infeasible", message, hint, key)
 
 
 def _conflicting(unreachable: UnreachableError) -> list[tuple[Requirement, float | None]]:
@@ -104,7 +104,7 @@ def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError
     upper = [limit for limit in involved if limit.upper]
     names = ", ".join(dict.fromkeys(limit.key for limit in (*lower, *upper))) or "limits.spectrum"
     where = [*lower, *upper][0].key if involved else "limits"
-    return InfeasibleError.of(
+    return InfeasibleError.because(
         "contradictory-limits",
         f"no spectrum of this type keeps to {names}: the upper limits would have to be {proved:.4g} "
         "times as large for the lower ones to be reached",
