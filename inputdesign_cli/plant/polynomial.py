@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.polynomial import polynomial as ascending
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
@@ -21,11 +22,7 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    c = np.asarray(coefficients, dtype=float)
-    value: ComplexArray = np.full(np.shape(q), c[-1], dtype=complex)
-    for coefficient in c[-2::-1]:  # Horner
-        value = value * q + coefficient
-    return value
+    return np.asarray(ascending.polyval(q, np.asarray(coefficients, dtype=float)), dtype=complex)
 
 
 def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
