@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weighted_sum
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
+from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
@@ -61,10 +62,6 @@ class GivenExcitation:
     ) -> GivenExcitation:
         """An excitation that is known by its spectrum."""
 
-        def information(coordinates: Experiment) -> Array:
-            maps = basis.integrals(coordinates.information_density, coordinates.singularities)
-            return coordinates.baseline_information + np.tensordot(x, maps, axes=1)
-
         def power(of: PowerKind, channel: int) -> float:
             unit = basis.integrals(
                 lambda w: experiment.power_density(of, w, channel), experiment.singularities
@@ -76,6 +73,7 @@ class GivenExcitation:
             of: [power(of, i) for i in range(model.outputs if of == "output" else model.inputs)]
             for of in POWER_KINDS
         }
+        information = partial(spectral_information, basis, x)
         return cls(kind, found, information, basis, x, sinusoids)
 
     @classmethod

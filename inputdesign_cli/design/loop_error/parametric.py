@@ -187,9 +187,8 @@ def _restricted(
             raise _failed(str(error)) from error
     if x.value is None:
         raise _failed(str(program.status))
-    Phi = np.einsum("kt,tab->kab", x.value, basis) * power
-    values, vectors = np.linalg.eigh(Phi)
-    Phi = (vectors * np.maximum(values, 0)[:, None, :]) @ adjoint(vectors)
+    # To the power one: without the rounding below zero.
+    Phi = power_of(np.einsum("kt,tab->kab", x.value, basis) * power, 1.0)
     multipliers = np.maximum(np.asarray(budget.dual_value, dtype=float), 0) * float(np.trace(W)) / limits
     return Phi, multipliers
 

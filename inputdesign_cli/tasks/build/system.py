@@ -222,6 +222,17 @@ def record_step(spec: Spec) -> float:
     return spec.sample_time
 
 
+def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
+    """Raise `SpecError` (`unknown-parameter`) for the name of a parameter that the model does not have."""
+    if name not in known:
+        raise spec.complain(
+            "unknown-parameter",
+            f'the model has no parameter "{name}"',
+            hint=f"its parameters are {', '.join(known)}",
+            key=key,
+        )
+
+
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
     """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
 
@@ -229,13 +240,7 @@ def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[st
         SpecError: `unknown-parameter` or `wrong-shape`.
     """
     for name in names or ():
-        if name not in known:
-            raise spec.complain(
-                "unknown-parameter",
-                f'the model has no parameter "{name}"',
-                hint=f"its parameters are {', '.join(known)}",
-                key=key,
-            )
+        check_known(spec, known, name, key)
     listed = tuple(names or known)
     if len(matrix) != len(listed):
         raise spec.complain(
