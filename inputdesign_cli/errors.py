@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 EXIT_DONE = 0
 EXIT_MISSED = 1
@@ -52,6 +53,13 @@ class IdesignError(Exception):
         self.diagnostics = (diagnostics,) if isinstance(diagnostics, Diagnostic) else tuple(diagnostics)
         super().__init__("; ".join(c.message for c in self.diagnostics))
 
+    @classmethod
+    def because(
+        cls, code: str, message: str, hint: str = "", key: str = "", location: Location | None = None
+    ) -> Self:
+        """An error with a single diagnostic."""
+        return cls(Diagnostic(code, message, hint, key, location))
+
 
 class SpecError(IdesignError):
     """The spec cannot be read, or what it says is not well posed."""
@@ -79,4 +87,9 @@ class InaccurateError(IdesignError):
 
 def bad_spec(code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
     """A `SpecError` with a single diagnostic."""
-    return SpecError(Diagnostic(code, message, hint, key))
+    return SpecError.because(code, message, hint, key)
+
+
+def refuse(key: str, what: str, hint: str, *, who: str = "this version") -> SpecError:
+    """`not-supported`: `who` does not do `what`, said plainly rather than ignored."""
+    return bad_spec("not-supported", f"{who} does not {what}", hint=hint, key=key)

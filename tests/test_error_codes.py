@@ -13,7 +13,7 @@ from inputdesign_cli.error_codes import explanation, explanations
 from inputdesign_cli.errors import SpecError
 
 PACKAGE = Path(inputdesign_cli.__file__).parent
-MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "PathDiagnostic", "stop", "_error"}
+MAKERS = {"Diagnostic", "complain", "_complain", "bad_spec", "PathDiagnostic", "stop", "_error", "because"}
 CODE = re.compile(r"[a-z]+(-[a-z]+)*")
 
 

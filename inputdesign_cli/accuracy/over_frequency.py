@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.requirement import Entry, Requirement, Violation, inverse_factor, worst
-from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -112,14 +112,12 @@ class OverFrequency(Requirement):
         turn = inverse_factor(information).T
         on_grid = self.measure(self._grid_rows @ turn, self.grid)
         if not np.all(np.isfinite(on_grid)):
-            raise InaccurateError(
-                Diagnostic(
-                    "ratio-not-finite",
-                    f"{self.name} has no finite value at {self.grid[~np.isfinite(on_grid)][0]:.6g} (in the "
-                    "unit of the experiment)",
-                    hint="restrict the band of the requirement, and rescale signals of extreme units",
-                    key="accuracy",
-                )
+            raise InaccurateError.because(
+                "ratio-not-finite",
+                f"{self.name} has no finite value at {self.grid[~np.isfinite(on_grid)][0]:.6g} (in the "
+                "unit of the experiment)",
+                hint="restrict the band of the requirement, and rescale signals of extreme units",
+                key="accuracy",
             )
         w, ratio = local_maxima(
             lambda w: self.measure(self.rows(w) @ turn, w), self.grid, on_grid, above=above

@@ -37,7 +37,7 @@ def check(
     """
     from inputdesign_cli.runs.golden import compare
     from inputdesign_cli.runs.golden_file import load_golden
-    from inputdesign_cli.sweep.golden_runs import execute
+    from inputdesign_cli.sweep.verbs import execute
 
     rows: list[Row] = []
     for golden in [load_golden(path) for path in files or _default_files()]:

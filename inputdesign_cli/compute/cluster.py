@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
-from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.version import __version__
 
 _AHEAD = 2  # jobs on their way for each thread of the cluster
@@ -69,10 +69,8 @@ class Cluster:
         try:
             from distributed import Client
         except ImportError:
-            raise DataError(
-                Diagnostic(
-                    "cluster-extra", "Dask is not installed", hint="pip install 'inputdesign-cli[cluster]'"
-                )
+            raise DataError.because(
+                "cluster-extra", "Dask is not installed", hint="pip install 'inputdesign-cli[cluster]'"
             ) from None
         # Its diagnostics about lost connections are no news: what they lead to is an error of ours.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -95,7 +93,7 @@ class Cluster:
                 found = version if isinstance(version, str) else "no inputdesign-cli that can be imported"
                 message = f"the worker {worker} has {found}, and this is {__version__}"
                 hint = "install the same version everywhere, so that every point is computed alike"
-                raise DataError(Diagnostic("cluster-version", message, hint))
+                raise DataError.because("cluster-version", message, hint)
 
 
 def _version() -> str:
@@ -125,4 +123,4 @@ def _reaching(address: str) -> Iterator[None]:
 def _unreachable(address: str, why: str) -> DataError:
     message = f"there is no Dask cluster to compute on at {address}{f': {why}' if why else ''}"
     hint = "start one (`dask scheduler`, `dask worker ADDRESS --nthreads 1`) or leave out --cluster"
-    return DataError(Diagnostic("cluster-unreachable", message, hint))
+    return DataError.because("cluster-unreachable", message, hint)

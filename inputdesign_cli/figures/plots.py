@@ -9,16 +9,12 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.bound import draw_bound
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
-from inputdesign_cli.figures.directions import draw_directions
 from inputdesign_cli.figures.ellipses import draw_ellipses
-from inputdesign_cli.figures.error import draw_error
-from inputdesign_cli.figures.loss import draw_loss
-from inputdesign_cli.figures.moments import draw_moments
-from inputdesign_cli.figures.optimality import draw_optimality
+from inputdesign_cli.figures.moments import draw_error, draw_moments
 from inputdesign_cli.figures.signal import draw_signal
-from inputdesign_cli.figures.spectrum import draw_spectrum
+from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
 from inputdesign_cli.figures.style import FileType, rendered
-from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands
+from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands, draw_loss
 from inputdesign_cli.runs import results as of
 from inputdesign_cli.runs.results import Curves, Results
 

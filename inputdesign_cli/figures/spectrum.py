@@ -1,4 +1,4 @@
-"""spectrum.png: where in frequency the design puts its power, and in which directions of the inputs."""
+"""spectrum.png, directions.png, optimality.png: where the design puts its power, how, and where it pays."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
 
 from inputdesign_cli.figures.style import (
+    BLACK,
     BLUE,
     DASHED,
     GREEN,
@@ -17,8 +18,9 @@ from inputdesign_cli.figures.style import (
     PALETTE,
     frequency_axis,
     legend_above,
+    marked,
 )
-from inputdesign_cli.runs.results import Array, SpectrumCurves
+from inputdesign_cli.runs.results import Array, DirectionCurves, OptimalityCurves, SpectrumCurves
 
 LOG_FROM = 100.0  # a density whose peak is further above the white level reads better on a logarithmic axis
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
@@ -58,7 +60,7 @@ def _plot_density(
     if record is not None:
         handles += axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
     if curves.white is not None:
-        handles.append(plot_white(axes, curves.white, f"${phi}$, white"))
+        handles.append(_plot_white(axes, curves.white, f"${phi}$, white"))
     axes.set_ylabel(rf"spectral density ${phi}(\omega)$")
     peak = float(density.max())
     if peak > LOG_FROM * (curves.white or float(np.median(density))):
@@ -91,7 +93,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     handles: list[Artist] = []
     for number, (i, j) in enumerate(pairs[:MOST]):
         label = rf"$|\Phi_{{{i + 1}{j + 1}}}|$"
-        handles += plot_power(above, w, entries[:, i, j], lines=curves.lines, number=number, label=label)
+        handles += _plot_power(above, w, entries[:, i, j], lines=curves.lines, number=number, label=label)
     if curves.record is not None:
         drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
         drawn[0].set_label("record, smoothed")
@@ -100,7 +102,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     above.set_ylabel(of if curves.lines else rf"density of ${curves.symbol}$")
     shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
     if float(shown.max(initial=0.0)) > LOG_FROM * float(np.median(shown)):
-        logarithmic(above, shown)
+        _logarithmic(above, shown)
     else:
         above.set_ylim(bottom=0.0)
     legend_above(above, handles)
@@ -108,10 +110,10 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     handles = []
     for number in range(min(r, MOST)):
         label = rf"$\lambda_{{{number + 1}}}$"
-        handles += plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
+        handles += _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
     if curves.white is not None:
-        handles.append(plot_white(below, curves.white))
-    logarithmic(below, values)
+        handles.append(_plot_white(below, curves.white))
+    _logarithmic(below, values)
     below.set_ylabel("eigenvalues")
     legend_above(below, handles)
     if curves.logarithmic:
@@ -123,7 +125,44 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
         below.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
 
 
-def plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> list[Artist]:
+def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> None:
+    """The gains of the plant above; below, the power of the input along each of its input directions."""
+    w = curves.frequency
+    upper, lower = page.subplots(2, 1, sharex=True)
+    gains: list[Artist] = []
+    powers: list[Artist] = []
+    for i, (gain, power) in enumerate(zip(curves.gain.T, curves.power.T, strict=True)):
+        gains += upper.plot(w, gain, color=PALETTE[i % MOST], label=rf"$\sigma_{i + 1}(G)$")
+        label = rf"$v_{i + 1}^* \Phi_u v_{i + 1}$"
+        powers += _plot_power(lower, w, power, lines=curves.lines, number=i, label=label)
+    upper.set_yscale("log", nonpositive="mask")
+    upper.set_ylabel("gains of the plant")
+    legend_above(upper, gains)
+    if curves.white is not None:
+        powers.append(_plot_white(lower, curves.white))
+    _logarithmic(lower, curves.power)
+    lower.set_ylabel("input along them")
+    frequency_axis(lower, w, time_unit)
+    legend_above(lower, powers)
+
+
+def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> None:
+    """What a unit of cost buys at each frequency, relative to the best: one on the support, never more."""
+    axes = page.add_subplot()
+    (ratio,) = axes.plot(
+        curves.frequency, curves.ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost"
+    )
+    handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="optimal: nowhere above one")]
+    if curves.support.size:
+        height = np.interp(curves.support, curves.frequency, curves.ratio)
+        handles += marked(axes, curves.support, height, color=ORANGE, label="power of the optimum")
+    axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
+    axes.set_ylabel("relative worth of excitation")
+    frequency_axis(axes, curves.frequency, time_unit)
+    legend_above(axes, handles)
+
+
+def _plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int, label: str) -> list[Artist]:
     """A power over frequency, the `number`th of its panel: a curve, or stems of `lines`."""
     colour = PALETTE[number % MOST]
     if not lines:
@@ -133,12 +172,12 @@ def plot_power(axes: Axes, w: Array, values: Array, *, lines: bool, number: int,
     return list(axes.plot(w, values, linestyle="none", marker="o", markersize=4, color=colour, label=label))
 
 
-def plot_white(axes: Axes, level: float, label: str = "white, same power") -> Artist:
+def _plot_white(axes: Axes, level: float, label: str = "white, same power") -> Artist:
     """The level of white excitation."""
     return axes.axhline(level, color=GREY, linestyle=DASHED, label=label)
 
 
-def logarithmic(axes: Axes, values: Array) -> None:
+def _logarithmic(axes: Axes, values: Array) -> None:
     """A logarithmic axis over the leading decades: zeros of a spectrum would stretch it without end."""
     peak = float(values.max(initial=0.0))
     if peak > 0.0:

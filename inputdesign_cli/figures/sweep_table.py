@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.results import Array, Json
 
 
@@ -63,8 +63,8 @@ def read_sweep(root: Path) -> SweepTable:
         _ = table.axes, table.rows
     except (FileNotFoundError, NotADirectoryError) as error:
         message = f"{root} holds no sweep: there is no {Path(error.filename).name} in it"
-        raise DataError(Diagnostic("run-missing", message, hint="run it with `idesign sweep`")) from None
+        raise DataError.because("run-missing", message, hint="run it with `idesign sweep`") from None
     except (OSError, ValueError, KeyError, IndexError) as error:
         message = f"{root} cannot be read as a sweep: {error}"
-        raise DataError(Diagnostic("run-unreadable", message, hint="run the sweep again")) from error
+        raise DataError.because("run-unreadable", message, hint="run the sweep again") from error
     return table

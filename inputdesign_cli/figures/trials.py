@@ -1,4 +1,4 @@
-"""cloud_*.png and errors_*.png: what many runs of an experiment gave, against theory."""
+"""cloud_*.png, errors_*.png and loss.png: what many runs of an experiment gave, against theory."""
 
 from __future__ import annotations
 
@@ -9,13 +9,29 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from inputdesign_cli.figures.ellipses import boundary
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, ORANGE, legend_over_all, page_of_pairs
-from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel
+from inputdesign_cli.figures.style import (
+    BLACK,
+    BLUE,
+    DASHED,
+    GREEN,
+    GREY,
+    ORANGE,
+    legend_above,
+    legend_over_all,
+    page_of_pairs,
+)
+from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
 
 COLUMNS = 2
+COLOURS = (BLUE, ORANGE, GREEN, GREY)
+BINS = 40
+SHADE = 0.45
+# The few runs of the tail would squeeze the rest into a corner.
+SHOWN = 0.998
 
 
 def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
@@ -62,3 +78,24 @@ def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
         r_adm = np.where(curves.r_adm > 0, curves.r_adm, np.nan)
         handles += axes.plot(w, r_adm, color=ORANGE, label=r"$r_\mathrm{adm}$")
     return handles
+
+
+def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
+    """A histogram for each input on common bins, with its mean as a vertical line."""
+    axes = page.add_subplot()
+    top = max(float(np.quantile(loss, SHOWN)) for loss in curves.losses.values())
+    bins = np.linspace(0.0, top, BINS + 1)
+    handles = []
+    for index, (name, loss) in enumerate(curves.losses.items()):
+        colour = COLOURS[index % len(COLOURS)]
+        weights = np.full(loss.size, 100.0 / loss.size)
+        label = f"{name}: mean {loss.mean():.4g}, sd {loss.std(ddof=1):.4g}"
+        axes.hist(loss, bins=bins.tolist(), weights=weights, color=colour, alpha=SHADE)
+        handles.append(Patch(color=colour, alpha=SHADE, label=label))
+        axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
+        if name in curves.theory:
+            axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
+    axes.set_xlabel(r"loss of a run, $\sqrt{\Sigma_t |y - y_0|^2}$ (solid: mean of the runs, dashed: theory)")
+    axes.set_ylabel("share of the runs (%)")
+    axes.set_xlim(0.0, top)
+    legend_above(axes, handles)

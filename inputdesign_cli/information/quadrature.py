@@ -15,7 +15,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 NODES = 20
@@ -118,13 +118,11 @@ def integrate(
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
             return fine
         coarse, earlier = fine, change
-    raise InaccurateError(
-        Diagnostic(
-            "integral-inaccurate",
-            "an integral of the information matrix did not settle: the integrand has a pole on, "
-            "or within rounding of, the unit circle",
-            hint="move the pole inside the unit circle (integrators belong into a stable closed loop)",
-        )
+    raise InaccurateError.because(
+        "integral-inaccurate",
+        "an integral of the information matrix did not settle: the integrand has a pole on, "
+        "or within rounding of, the unit circle",
+        hint="move the pole inside the unit circle (integrators belong into a stable closed loop)",
     )
 
 

@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from inputdesign_cli.compute.executor import Executor, InProcess, WorkerLostError
-from inputdesign_cli.errors import Diagnostic, IdesignError
+from inputdesign_cli.errors import IdesignError
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
@@ -58,7 +58,7 @@ def run_batches(
         if isinstance(done.error, WorkerLostError):
             message = f"a batch of {done.job.runs} simulated runs has no result: {done.error}"
             hint = "the system may have run out of memory; try fewer processes"
-            raise IdesignError(Diagnostic("worker-lost", message, hint)) from done.error
+            raise IdesignError.because("worker-lost", message, hint) from done.error
         if done.error is not None:
             raise done.error
         assert done.answer is not None  # there is an answer or an error

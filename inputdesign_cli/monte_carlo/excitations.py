@@ -7,11 +7,11 @@ from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, in_phase_record
+from inputdesign_cli.signal.designed import constant_density
 from inputdesign_cli.signal.settings import Method
 from inputdesign_cli.spectrum import Basis, LinesBasis, TabulatedSpectrum
 
@@ -84,14 +84,14 @@ class Redrawn:
 
         def of(channel: int) -> float:
             unit = np.diag(np.arange(inputs) == channel).astype(float)
-            density = partial(_constant, unit)
+            density = partial(constant_density, unit)
             return float(self.x @ self.basis.integrals(density, np.zeros(0, dtype=complex)))
 
         return np.array([of(channel) for channel in range(inputs)])
 
     def information(self, experiment: Experiment) -> Array:
         """Of the spectrum."""
-        return _information(experiment, self.basis, self.x)
+        return spectral_information(self.basis, self.x, experiment)
 
 
 @dataclass(frozen=True)
@@ -115,15 +115,10 @@ class InPhase:
 
     def information(self, experiment: Experiment) -> Array:
         """Of the sinusoids."""
-        return _information(experiment, self.basis, self.x)
+        return spectral_information(self.basis, self.x, experiment)
 
 
-def _constant(density: Array, w: Array) -> NDArray[np.float64]:
-    """A density (r, r) at frequencies (n,): (n,) for one input, else (n, r, r)."""
-    return np.full(w.shape, density[0, 0]) if density.size == 1 else np.ones(w.shape)[:, None, None] * density
-
-
-def _information(experiment: Experiment, basis: Basis | TabulatedSpectrum, x: Array) -> Array:
-    """(k, k): M of a spectrum."""
+def spectral_information(basis: Basis | TabulatedSpectrum, x: Array, experiment: Experiment) -> Array:
+    """(k, k): M of a spectrum in the coordinates of an experiment."""
     maps = basis.integrals(experiment.information_density, experiment.singularities)
     return np.asarray(experiment.baseline_information + np.tensordot(x, maps, axes=1))

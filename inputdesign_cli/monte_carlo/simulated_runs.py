@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, fit_batch, identify
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation
 from inputdesign_cli.monte_carlo.trials import Trials
 from inputdesign_cli.plant import Model
@@ -53,9 +53,9 @@ def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
     theta = found.theta
     if true.prior is not None and system.names == job.model.names:
         theta = _with_prior(found, true.prior, system.theta, rng)
-    caused = {"input": u_r, "output": y_r, "excitation": r}
+    caused: dict[PowerKind, Array] = {"input": u_r, "output": y_r, "excitation": r}
     power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
-    total = {"input": _mean_squares(u), "output": _mean_squares(y)}
+    total: dict[PowerKind, list[float]] = {"input": _mean_squares(u), "output": _mean_squares(y)}
     return Trials(true, job.model, theta, found.converged, power, total, first=np.array(r[0]))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Absolute, Entry, ModelError
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
@@ -47,8 +47,8 @@ class Trials:
     model: Model
     theta: Array
     converged: NDArray[np.bool_]
-    power: dict[str, list[float]]
-    total_power: dict[str, list[float]]
+    power: dict[PowerKind, list[float]]
+    total_power: dict[PowerKind, list[float]]
     first: Array
 
     @classmethod
@@ -56,7 +56,7 @@ class Trials:
         """All batches of one study as one; mean squares are weighted by the number of runs."""
         weights = [len(part.theta) for part in parts]
 
-        def averaged(entries: Sequence[dict[str, list[float]]]) -> dict[str, list[float]]:
+        def averaged(entries: Sequence[dict[PowerKind, list[float]]]) -> dict[PowerKind, list[float]]:
             return {
                 name: np.average([entry[name] for entry in entries], axis=0, weights=weights).tolist()
                 for name in entries[0]

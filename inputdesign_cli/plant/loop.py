@@ -16,6 +16,10 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
+_DELAY = (
+    "give the plant its delay (a leading 0 in B; in s a numerator of lower order than the denominator) or "
+    "the controller one (a leading 0 in its numerator)"
+)
 # What goes wrong most often in a controller, besides.
 _ONE = "and that numerator and denominator of the controller are in q^-1, ascending"
 _SEVERAL = (
@@ -98,25 +102,38 @@ class Loop(ABC):
             raise bad_spec(
                 "algebraic-loop",
                 "plant and controller both act without delay and det(I + C G) vanishes at infinite frequency",
-                hint="give the plant its delay (a leading 0 in B; in s a numerator of lower order than the "
-                "denominator) or the controller one (a leading 0 in its numerator)",
+                hint=_DELAY,
                 key="experiment.controller",
             )
-        _refuse_unstable(
-            self.closed_poles,
-            hint="check the signs (feedback is negative: u = r - C y), the delay of the plant, "
-            + (_ONE if self.model.inputs == p == 1 else _SEVERAL),
-        )
+        worst = max(self.closed_poles, key=abs, default=0.0)
+        if abs(worst) >= 1.0:
+            raise bad_spec(
+                "unstable-loop",
+                f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
+                f"angle {abs(np.angle(worst)):.4g} rad/sample",
+                hint="check the signs (feedback is negative: u = r - C y), the delay of the plant, "
+                + (_ONE if self.model.inputs == p == 1 else _SEVERAL),
+                key="experiment.controller",
+            )
 
     def check_delay(self) -> None:
-        """Raise `SpecError` where the direct method would fail, see `_refuse_instantaneous`.
+        """Raise `SpecError` where both plant and controller act at once.
+
+        Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an
+        estimate from u and y, is biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
 
         Raises:
             SpecError: `algebraic-loop`.
         """
         acting, p = self.instantaneous != 0.0, self.model.outputs
         if np.any(acting[:p, p:] @ acting[p:, :p]):
-            _refuse_instantaneous()
+            raise bad_spec(
+                "algebraic-loop",
+                "plant and controller both act without delay: u(t) answers the noise of y(t) and changes "
+                "y(t), so that estimates from u and y would be biased",
+                hint=_DELAY,
+                key="experiment.controller",
+            )
 
     def responses(self, w: ArrayLike) -> LoopResponse:
         """From r and from e at normalised frequencies `w`: y_x (n, p, r), u_x (n, r, r), y_e (n, p, p), u_e.
@@ -185,35 +202,5 @@ def close_loop(model: Model, controller: TransferMatrix) -> Loop:
         "not-supported",
         "this version has no loop around a plant in continuous time",
         hint="write plant.sample: zoh: controllers act on samples",
-        key="experiment.controller",
-    )
-
-
-def _refuse_instantaneous() -> None:
-    """Raise `SpecError` (`algebraic-loop`): both plant and controller act at once.
-
-    Then u(t) holds e(t), and so does the gradient of the prediction of y(t): the direct method, an estimate
-    from u and y, is biased. [ljung-1999], Chapter 13, asks for a delay in one of them.
-    """
-    raise bad_spec(
-        "algebraic-loop",
-        "plant and controller both act without delay: u(t) answers the noise of y(t) and changes y(t), so "
-        "that estimates from u and y would be biased",
-        hint="give the plant its delay (a leading 0 in B; in s a numerator of lower order than the "
-        "denominator) or the controller one (a leading 0 in its numerator)",
-        key="experiment.controller",
-    )
-
-
-def _refuse_unstable(poles: ComplexArray, *, hint: str) -> None:
-    """Raise `SpecError` (`unstable-loop`) unless all closed-loop poles in z lie inside the unit circle."""
-    if not poles.size or np.abs(poles).max() < 1.0:
-        return
-    worst = poles[int(np.argmax(np.abs(poles)))]
-    raise bad_spec(
-        "unstable-loop",
-        f"the loop u = r - C y is unstable: closed-loop pole at radius {abs(worst):.6g}, "
-        f"angle {abs(np.angle(worst)):.4g} rad/sample",
-        hint=hint,
         key="experiment.controller",
     )

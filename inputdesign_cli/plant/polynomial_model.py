@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.frequencies import logarithmic_distance
@@ -22,7 +23,6 @@ from inputdesign_cli.plant.polynomial import (
     roots_in_z,
     unit_circle,
 )
-from inputdesign_cli.plant.simulation import caused_by_inputs, caused_by_noise
 
 Rows = tuple[tuple[Array, ...], ...]
 
@@ -120,10 +120,6 @@ class PolynomialModel(Parametrised):
         return tuple((i, j) for i, j in places if np.any(self.B[i][j]))
 
     @cached_property
-    def _active(self) -> frozenset[tuple[int, int]]:
-        return frozenset(self.active)
-
-    @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         """(k,): the parameters on which G depends."""
         return np.array([parameter.letter in "abf" for parameter in self.parameters], dtype=bool)
@@ -194,7 +190,7 @@ class PolynomialModel(Parametrised):
             if parameter.letter in "abf":
                 shift = q**parameter.power
                 for i, j in parameter.places:
-                    if (i, j) in self._active:
+                    if (parameter.letter, i, j) in factors:
                         gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
         return gradient
 
@@ -266,8 +262,13 @@ class PolynomialModel(Parametrised):
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
-        A, C, D = (self.per_output(rows) for rows in (self.A, self.C, self.D))
-        return caused_by_inputs(A, self.B, self.F, u), caused_by_noise(A, C, D, e)
+        y, v = np.zeros((*u.shape[:-1], self.outputs)), np.empty(e.shape)
+        for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
+            v[..., i] = scipy.signal.lfilter(c, np.convolve(a, d), e[..., i])
+            for j, (b, f) in enumerate(zip(self.B[i], self.F[i], strict=True)):
+                if np.any(b):
+                    y[..., i] += scipy.signal.lfilter(b, np.convolve(a, f), u[..., j])
+        return y, v
 
     @property
     def stable_outputs(self) -> tuple[bool, ...]:

@@ -14,7 +14,7 @@ from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.intersample import Intersample
 from inputdesign_cli.plant.model import Fraction, WhiteNoise
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.plant.state_space import StateSpace
+from inputdesign_cli.plant.transfer import StateSpace
 
 
 @dataclass(frozen=True)

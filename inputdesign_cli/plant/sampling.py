@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.signal
 
+from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.plant.transfer import Rational
 
 
@@ -31,9 +32,11 @@ def hold_entries(
     numerators: Sequence[Sequence[Sequence[float]]],
     denominators: Sequence[Sequence[Sequence[float]]],
     period: float,
-) -> list[list[Rational]]:
-    """The same for every entry of a matrix."""
-    return [
+) -> tuple[Rows, Rows]:
+    """The same for every entry of a matrix: numerators and denominators in q^-1, ascending."""
+    held = [
         [zero_order_hold(above, below, period) for above, below in zip(*rows, strict=True)]
         for rows in zip(numerators, denominators, strict=True)
     ]
+    above = tuple(tuple(entry.numerator for entry in row) for row in held)
+    return above, tuple(tuple(entry.denominator_polynomial for entry in row) for row in held)

@@ -11,9 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import or_
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.plant.frequencies import logarithmic_distance
@@ -26,7 +27,6 @@ from inputdesign_cli.plant.polynomial import (
     unit_circle,
 )
 from inputdesign_cli.plant.polynomial_matrix import at, delay_of, stack
-from inputdesign_cli.plant.state_space import StateSpace
 
 Coefficients = Sequence[float] | Array
 
@@ -57,17 +57,10 @@ class Rational:
         factors = [denominator] if np.ndim(denominator[0]) == 0 else denominator
         return cls(np.asarray(numerator, dtype=float), tuple(np.asarray(f, dtype=float) for f in factors))
 
-    def numerator_at(self, w: ArrayLike) -> ComplexArray:
-        """Numerator at normalised frequencies `w`."""
-        return evaluate(self.numerator, unit_circle(w))
-
-    def denominator_at(self, w: ArrayLike) -> ComplexArray:
-        """Product of the denominator factors at normalised frequencies `w`."""
-        return _product_at(self.denominator, unit_circle(w))
-
     def at(self, w: ArrayLike) -> ComplexArray:
         """Frequency response at normalised frequencies `w`."""
-        return self.numerator_at(w) / self.denominator_at(w)
+        q = unit_circle(w)
+        return evaluate(self.numerator, q) / _product_at(self.denominator, q)
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -107,6 +100,23 @@ class ContinuousRational:
         """Poles and zeros as points of the frequency plane."""
         roots = np.concatenate([np.roots(self.numerator), np.roots(self.denominator)])
         return np.asarray(np.abs(roots.imag) + 1j * np.abs(roots.real))
+
+
+class StateSpace(NamedTuple):
+    """x(t + 1) = A x + B v, z = C x + D v with n states, m inputs v and q outputs z."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+    @classmethod
+    def of(cls, blocks: Iterable[tuple[Array, Array, Array]], direct: Array) -> StateSpace:
+        """Blocks (A, B, C) that share all inputs and of which the outputs add up; D (q, m) is `direct`."""
+        outputs, inputs = direct.shape
+        none = (np.zeros((0, 0)), np.zeros((0, inputs)), np.zeros((outputs, 0)))
+        A, B, C = zip(none, *blocks, strict=True)
+        return cls(scipy.linalg.block_diag(*A), np.concatenate(B), np.concatenate(C, axis=1), direct)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.errors import DataError
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.runs.results import Json
@@ -26,7 +26,7 @@ def report_text(directory: Path) -> str:
         return _filled("run.html", directory, run_page(directory))
     message = f"{directory} holds neither a finished run nor a sweep"
     hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
-    raise DataError(Diagnostic("run-missing", message, hint))
+    raise DataError.because("run-missing", message, hint)
 
 
 def _filled(template: str, directory: Path, content: Mapping[str, Json]) -> str:

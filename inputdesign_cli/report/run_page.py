@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from inputdesign_cli.errors import DataError, Diagnostic, SpecError
+from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.report.charts import run_charts
 from inputdesign_cli.report.evidence import (
     estimate_answer,
@@ -49,7 +49,7 @@ def run_page(run: Path) -> dict[str, Json]:
         question = read_question(text, str(run / "spec.yaml"), verb)
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
-        raise DataError(Diagnostic("run-unreadable", message, hint="run the spec again")) from error
+        raise DataError.because("run-unreadable", message, hint="run the spec again") from error
     charts = run_charts(run, result, question.time_unit, closed_loop=question.closed_loop)
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]

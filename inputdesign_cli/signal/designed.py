@@ -41,7 +41,8 @@ class DesignedSpectrum:
         cls, basis: Basis | TabulatedSpectrum, x: Array, *, inputs: int = 1, step: float = 1.0
     ) -> DesignedSpectrum:
         """The spectrum with coefficients `x` on `basis`."""
-        power = float(x @ basis.integrals(partial(_unit, inputs), np.zeros(0, dtype=complex)))
+        every = partial(constant_density, np.eye(inputs))
+        power = float(x @ basis.integrals(every, np.zeros(0, dtype=complex)))
         if not basis.has_density:
             return cls(inputs, power, step, sinusoids=Lines(*basis.lines(x)), free=basis.free)
         moving_average = basis.moving_average(x)
@@ -63,7 +64,6 @@ class DesignedSpectrum:
         return merged(lines, period) if self.free else lines
 
 
-def _unit(inputs: int, w: Array) -> NDArray[np.float64]:
-    """The density of the power of all inputs together."""
-    unit = np.ones(w.shape)
-    return unit if inputs == 1 else unit[:, None, None] * np.eye(inputs)
+def constant_density(density: Array, w: Array) -> NDArray[np.float64]:
+    """A density (r, r) at frequencies (n,): (n,) for one input, else (n, r, r)."""
+    return np.full(w.shape, density[0, 0]) if density.size == 1 else np.ones(w.shape)[:, None, None] * density

@@ -78,13 +78,11 @@ def read_tree(text: str, file: str, overrides: Sequence[str], folder: FilePath) 
     tree = read(text, file)
     if not isinstance(tree.data, dict):
         empty = tree.data is None
-        raise SpecError(
-            Diagnostic(
-                "empty-file" if empty else "not-a-mapping",
-                "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
-                "`idesign init` writes a spec to start from",
-                location=tree.places.location(tree.places.mark(())) or Location(file, 1, 1),
-            )
+        raise SpecError.because(
+            "empty-file" if empty else "not-a-mapping",
+            "the spec is empty" if empty else 'a spec is a mapping of keys ("plant: ..", "noise: ..")',
+            "`idesign init` writes a spec to start from",
+            location=tree.places.location(tree.places.mark(())) or Location(file, 1, 1),
         )
     compose(tree, folder, overrides)
     return tree

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily
-
-_NODES_AT_ONCE = 256
+from inputdesign_cli.spectrum.directions import weighted_sums
 
 
 @dataclass(frozen=True)
@@ -62,15 +61,9 @@ class TabulatedSpectrum(DensityFamily):
         """(1, ...): (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w."""
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
-            total: NDArray | float = 0.0
-            for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
-                part = slice(start, start + _NODES_AT_ONCE)
-                values = density(rule.nodes[part])
-                if self.inputs == 1:
-                    values = values[..., None, None]
-                weighted = self._at(rule.nodes[part]) * rule.weights[part, None, None]
-                total = total + np.einsum("n...ab,nba->...", values, weighted, optimize=True).real
-            return np.asarray(total)[None]
+            r, phi = self.inputs, self._at(rule.nodes)
+            sums = weighted_sums(phi.reshape(-1, r * r), density, rule, r)
+            return np.einsum("ba...ab->...", sums.reshape(r, r, *sums.shape[1:])).real[None]
 
         band = (float(self.frequency[0]), float(self.frequency[-1]))
         return integrate_band(moments, singularities, band, knots=self.frequency)

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from inputdesign_cli.errors import Diagnostic, OutputError
+from inputdesign_cli.errors import OutputError
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import RESULT, output_errors, replace_text
 
@@ -101,15 +101,15 @@ def opened(root: Path) -> Iterator[Layout]:
         with output_errors(root):
             if root.exists() and not root.is_dir():
                 message = f"{root} is a file, and a sweep is written into a directory"
-                raise OutputError(
-                    Diagnostic("output-not-a-directory", message, hint="choose another directory with -o")
+                raise OutputError.because(
+                    "output-not-a-directory", message, "choose another directory with -o"
                 )
             root.mkdir(parents=True, exist_ok=True)
             foreign = sorted(p.name for p in root.iterdir() if not p.name.startswith("."))
             if foreign and not (root / SUMMARY).is_file():
                 message = f"{root} already has {', '.join(foreign[:4])}, and no {SUMMARY} of an earlier sweep"
                 hint = "choose another directory with -o"
-                raise OutputError(Diagnostic("output-not-a-sweep", message, hint))
+                raise OutputError.because("output-not-a-sweep", message, hint)
             lock = held.enter_context((root / LOCK).open("a+", encoding="utf-8"))
             _claim(lock, root)
             with (root / WORKERS).open("a") as workers:
@@ -128,7 +128,7 @@ def _claim(lock: IO[str], root: Path) -> None:
         owner = lock.read().strip()
         message = f"another sweep is writing into {root}{f' (process {owner})' if owner else ''}"
         hint = "wait for it, or choose another directory with -o"
-        raise OutputError(Diagnostic("sweep-locked", message, hint)) from None
+        raise OutputError.because("sweep-locked", message, hint) from None
     lock.truncate(0)
     lock.write(str(os.getpid()))
     lock.flush()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from inputdesign_cli.compute.executor import Executor
-    from inputdesign_cli.runs.results import Results
-    from inputdesign_cli.specification import Spec
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError
+from inputdesign_cli.runs.golden_file import Golden, GoldenRun
+from inputdesign_cli.runs.results import Result, Results
+from inputdesign_cli.specification import Spec, load_spec
 
 Verb = Literal["solve", "analyse", "simulate"]
 
@@ -32,3 +33,16 @@ def run_verb(verb: Verb, spec: Spec, executor: Executor | None = None) -> Result
             return tasks.analyse(spec)
         case "simulate":
             return tasks.simulate(spec, executor=executor)
+
+
+def execute(golden: Golden, run: GoldenRun) -> Result | IdesignError:
+    """The result of one run of a golden file, or the error that stands for it if there is no design.
+
+    Raises:
+        SpecError, DataError: the spec that the golden file names is not good: nothing can be compared.
+    """
+    spec = load_spec(golden.spec_of(run), list(run.overrides))
+    try:
+        return run_verb(run.command, spec).result
+    except (InfeasibleError, InaccurateError) as error:
+        return error

@@ -16,7 +16,7 @@ from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
-from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
+from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
@@ -145,8 +145,8 @@ class ConvexTask:
         with plain_errors():
             design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
             if self.columns is not None:
-                climbed = restrict_columns(self.columns, design)
-                design, how = climbed.design, how | climbed.how
+                design, climbed = restrict_columns(self.columns, design)
+                how |= climbed
         experiment = design.problem.experiment
         if design.problem.goal == "samples":
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
@@ -159,15 +159,13 @@ class ConvexTask:
             raise explain(self.header.units, self.question, unreachable) from unreachable
         found = design.result
         if found.gap > _ALMOST * self.tolerance:
-            raise InaccurateError(
-                Diagnostic(
-                    "gap-not-closed",
-                    f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance "
-                    f"asks for {self.tolerance:.1e}",
-                    hint="loosen solver.tolerance, lower the order of the spectrum, or look for parameters "
-                    "that are nearly indistinguishable",
-                    key="solver.tolerance",
-                )
+            raise InaccurateError.because(
+                "gap-not-closed",
+                f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance "
+                f"asks for {self.tolerance:.1e}",
+                hint="loosen solver.tolerance, lower the order of the spectrum, or look for parameters "
+                "that are nearly indistinguishable",
+                key="solver.tolerance",
             )
         status = "optimal" if found.gap <= self.tolerance else "almost_optimal"
         return design, {
@@ -206,14 +204,12 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
-        raise InfeasibleError(
-            Diagnostic(
-                "too-long",
-                f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
-                f"no fewer than {least}), but limits.samples is {most}",
-                hint="allow more samples or more power, or ask for less accuracy",
-                key="limits.samples",
-            )
+        raise InfeasibleError.because(
+            "too-long",
+            f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
+            f"no fewer than {least}), but limits.samples is {most}",
+            hint="allow more samples or more power, or ask for less accuracy",
+            key="limits.samples",
         )
 
     def _signal_entry(self, done: Designed, record: Record) -> dict[str, Json]:
@@ -279,12 +275,10 @@ def plain_errors() -> Iterator[None]:
     try:
         yield
     except np.linalg.LinAlgError as error:
-        raise InaccurateError(
-            Diagnostic(
-                "numerically-singular",
-                "the information matrix is singular to working precision: the parameters are nearly "
-                "indistinguishable",
-                hint="lower the orders, or look for poles and zeros that nearly cancel",
-                key="plant",
-            )
+        raise InaccurateError.because(
+            "numerically-singular",
+            "the information matrix is singular to working precision: the parameters are nearly "
+            "indistinguishable",
+            hint="lower the orders, or look for poles and zeros that nearly cancel",
+            key="plant",
         ) from error

@@ -25,17 +25,8 @@ class FewColumns:
     seed: int
 
 
-@dataclass(frozen=True)
-class Climbed:
-    """The design of few columns, with what the result says of the climb."""
-
-    design: Design
-    how: dict[str, Json]
-    entry: dict[str, Json]
-
-
-def restrict_columns(asked: FewColumns, design: Design) -> Climbed:
-    """Climb from the optimum cut to so few columns and from random factors.
+def restrict_columns(asked: FewColumns, design: Design) -> tuple[Design, dict[str, Json]]:
+    """Climb from the optimum cut to so few columns and from random factors; what the result says of it.
 
     The bound of the design over all factors stays: it is the upper bound of [mohan-spectral].
     """
@@ -55,11 +46,8 @@ def restrict_columns(asked: FewColumns, design: Design) -> Climbed:
     objective = 1.0 / criterion.level(information)
     result = replace(design.result, x=climbed, information=information, objective=objective, s=objective)
     reached = [history[-1] for history in found.histories]
-    return Climbed(
-        replace(design, result=result),
-        {"method": "hill_climb", "status": "lower_bound", "starts": reached},
-        {"factor_columns": columns},
-    )
+    how: dict[str, Json] = {"method": "hill_climb", "status": "lower_bound", "starts": reached}
+    return replace(design, result=result), how
 
 
 def _quadratic(problem: Problem, basis: PolynomialBasis, criterion: Criterion) -> QuadraticDesign:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weights_of
+from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weighted_sum
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn
+from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
@@ -61,10 +62,6 @@ class GivenExcitation:
     ) -> GivenExcitation:
         """An excitation that is known by its spectrum."""
 
-        def information(coordinates: Experiment) -> Array:
-            maps = basis.integrals(coordinates.information_density, coordinates.singularities)
-            return coordinates.baseline_information + np.tensordot(x, maps, axes=1)
-
         def power(of: PowerKind, channel: int) -> float:
             unit = basis.integrals(
                 lambda w: experiment.power_density(of, w, channel), experiment.singularities
@@ -76,6 +73,7 @@ class GivenExcitation:
             of: [power(of, i) for i in range(model.outputs if of == "output" else model.inputs)]
             for of in POWER_KINDS
         }
+        information = partial(spectral_information, basis, x)
         return cls(kind, found, information, basis, x, sinusoids)
 
     @classmethod
@@ -83,13 +81,6 @@ class GivenExcitation:
         """White excitation of this total power, flat over the band and even over the channels."""
         share = np.full(experiment.inputs, power / experiment.inputs)
         return cls.spectral("white", TabulatedSpectrum.white(share, experiment.band), np.ones(1), experiment)
-
-    def cost(self, weights: dict[PowerKind, Weight]) -> float:
-        """The weighted sum of the powers."""
-        return sum(
-            weight * (sum(self.power[kind]) if channel is None else self.power[kind][channel])
-            for kind, channel, weight in weights_of(weights)
-        )
 
 
 @dataclass(frozen=True)
@@ -139,8 +130,8 @@ class GivenTask:
         information = excitation.information(experiment)
         _check_excites(experiment, information)
         requirements = [make(experiment) for make in self.requirements]
-        cost = excitation.cost(self.cost)
-        level = cost / GivenExcitation.even(raw, 1.0).cost(self.cost)
+        cost = weighted_sum(self.cost, excitation.power)
+        level = cost / weighted_sum(self.cost, GivenExcitation.even(raw, 1.0).power)
         white = GivenExcitation.even(raw, level).information(experiment)
         result = self._result(experiment, requirements, information)
         result |= {"cost": cost, "power": excitation.power, "spectrum": self._spectrum_entry()}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
-from inputdesign_cli.errors import SpecError
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.tasks.loop_error_signal import (
@@ -33,13 +33,12 @@ class LossTrial:
 
 @dataclass(frozen=True)
 class LoopErrorTask:
-    """A design for the closed-loop error; `trial` is its study, or `refusal` why it cannot be made."""
+    """A design for the closed-loop error; `trial` makes its study, or raises what speaks against one."""
 
     problem: LoopErrorProblem
     terms: LoopErrorTerms
     signal: LoopErrorSignalSettings
-    trial: LossTrial | None
-    refusal: SpecError | None
+    trial: Callable[[], LossTrial]
 
     def check(self) -> None:
         """Nothing: building has checked all."""
@@ -60,10 +59,7 @@ class LoopErrorTask:
             SpecError: `not-supported` for true systems that are not ARX, or minimum-variance control.
             InaccurateError: see `solve`.
         """
-        if self.trial is None:
-            assert self.refusal is not None
-            raise self.refusal
-        trial = self.trial
+        trial = self.trial()
         design, results = self._solved()
         begun = time.perf_counter()
         samples = self.terms.samples

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from inputdesign_cli.design.regression import (
     least_error,
 )
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
-from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError, SpecError, bad_spec
+from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, MomentsCurves, Results, Table
@@ -63,7 +64,7 @@ class RegressionTrial:
 
 @dataclass(frozen=True)
 class RegressionTask:
-    """A design of moments; `trial` is its study, or `refusal` why it cannot be made.
+    """A design of moments; `trial` makes its study, or raises what speaks against one.
 
     `alternating` and `tolerance` (the relative gap to be proved) are for Toeplitz moments, `seed` for
     their starts.
@@ -74,8 +75,7 @@ class RegressionTask:
     tolerance: float
     seed: int
     signal: RegressorSettings
-    trial: RegressionTrial | None
-    refusal: SpecError | None
+    trial: Callable[[], RegressionTrial]
 
     def check(self) -> None:
         """Nothing: building has checked all."""
@@ -97,10 +97,7 @@ class RegressionTask:
             SpecError: there is no simulation, or the record is too short, or an input to compare with is
                 not available for regressions; and what `solve` raises, as it does.
         """
-        if self.trial is None:
-            assert self.refusal is not None
-            raise self.refusal
-        trial = self.trial
+        trial = self.trial()
         record, results = self._solved()
         if record is None:
             raise bad_spec(
@@ -211,7 +208,7 @@ def _out_of_reach(
             f"no Toeplitz moments were found that reach a mean-squared error of {target:.7g} (the least "
             f"biased ones leave {smallest:.7g} at any energy), nor was it proved that there are none"
         )
-        return InaccurateError(Diagnostic("target-undecided", message, hint=hint, key=f"{KEY}.target"))
+        return InaccurateError.because("target-undecided", message, hint=hint, key=f"{KEY}.target")
     unit = regression.n * regression.variance * float(np.sum(regression.estimated**2)) / target
     proof = f"proved for every energy up to {error.proved * unit:.3g}"
     if error.assumed:
@@ -220,4 +217,4 @@ def _out_of_reach(
         f"no Toeplitz moments reach a mean-squared error of {target:.7g} ({proof}): the bias alone "
         f"leaves {smallest:.7g}"
     )
-    return InfeasibleError(Diagnostic("target-out-of-reach", message, hint=hint, key=f"{KEY}.target"))
+    return InfeasibleError.because("target-out-of-reach", message, hint=hint, key=f"{KEY}.target")

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.signal import Record
 
 _LONGEST = 64  # times the length that was asked for
@@ -111,4 +111,4 @@ def _too_tight(
         )
         if most_samples:
             hint += f"; limits.samples is {most_samples}"
-    return InfeasibleError(Diagnostic("limits-too-tight", message, hint, limit_keys[0]))
+    return InfeasibleError.because("limits-too-tight", message, hint, limit_keys[0])

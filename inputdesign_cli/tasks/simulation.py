@@ -109,7 +109,12 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     started = time.perf_counter()
     units, results = plan.units, delivered.results
     if delivered.record is None:
-        raise _nothing_to_simulate()
+        raise bad_spec(
+            "nothing-to-simulate",
+            "there is no record of the excitation, so that there is no experiment to simulate",
+            hint="ask for more accuracy or a longer signal, or give an excitation under spectrum.given",
+            key="accuracy",
+        )
     excitations = _excitations(plan, delivered, delivered.record)
     nominal = replace(plan.nominal, samples=len(delivered.record))
     result = dict(results.result)
@@ -194,13 +199,4 @@ def _predicted(plan: Simulation, results: Results, information: Array) -> Predic
         r_adm=np.concatenate(admissible) if admissible else None,
         alpha=plan.alpha,
         entries=np.repeat(np.array(places), sizes, axis=0) if places else None,
-    )
-
-
-def _nothing_to_simulate() -> Exception:
-    return bad_spec(
-        "nothing-to-simulate",
-        "there is no record of the excitation, so that there is no experiment to simulate",
-        hint="ask for more accuracy or a longer signal, or give an excitation under spectrum.given",
-        key="accuracy",
     )

@@ -78,7 +78,7 @@ def verbs(monkeypatch):
         return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
     monkeypatch.setattr(specification, "load_spec", load_spec)
-    monkeypatch.setattr("inputdesign_cli.sweep.golden_runs.load_spec", load_spec)
+    monkeypatch.setattr("inputdesign_cli.sweep.verbs.load_spec", load_spec)
     for verb in ("solve", "analyse"):
         monkeypatch.setattr(tasks, verb, results)
     monkeypatch.setattr(tasks, "validate", lambda spec: None)

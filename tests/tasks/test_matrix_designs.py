@@ -1,4 +1,4 @@
-"""Specs with several channels and in continuous time: designs against plain programs, and bad input."""
+"""Specs with several channels and in continuous time: designs against plain programs."""
 
 import warnings
 from pathlib import Path
@@ -8,29 +8,13 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from inputdesign_cli import load_spec, solve, validate
-from inputdesign_cli.errors import EXIT_BAD_INPUT, SpecError
+from inputdesign_cli import load_spec, solve
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.specification import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
+from tests.support.matrix_specs import CONTINUOUS, changed
 from tests.support.plants import arx
 
 SPECS = Path(__file__).parents[2] / "specs"
-
-CONTINUOUS = """
-plant:
-  continuous:
-    numerator: [[[3.125], [3.188]], [[5.313], [1.563]]]
-    denominator: [[[1, 1.5, 1.563], [1, 2, 1.063]], [[1, 0.5, 1.063], [1, 1, 0.312]]]
-noise: {variance: [[1, 0], [0, 1]]}
-accuracy: {criterion: E}
-limits: {input_power: 1000, output_power: 1000}
-spectrum: {type: polynomial, order: 4, band: [0, 2.0]}
-"""
-
-
-def changed(text, *overrides):
-    return parse_spec(text, overrides=list(overrides))
 
 
 @pytest.fixture(scope="module")
@@ -231,124 +215,6 @@ spectrum: {{type: polynomial, order: 8, band: [0, 2.0]}}
     assert outcome.result["signal"]["efficiency"] > 0.9
 
 
-BAD = {
-    "improper": (
-        "plant.continuous.numerator=[[[1, 0, 0, 3.1], [3.2]], [[5.3], [1.6]]]",
-        "improper-transfer",
-        "not proper",
-    ),
-    "unstable": (
-        "plant.continuous.denominator=[[[1, -1.5, 1.6], [1, 2, 1.1]], [[1, 0.5, 1.1], [1, 1, 0.3]]]",
-        "unstable-polynomial",
-        "",
-    ),
-    "zero width": ("spectrum.band=[2, 2]", "bad-band", ""),
-    "zero limit": ("limits.input_power=0", "out-of-range", ""),
-    "contradictory": ("limits.input_power={min: 20, max: 10}", "conflicting-keys", "larger than max"),
-    "no band": ("spectrum={type: free}", "needs-band", "frequencies have no end"),
-    "indistinguishable": (
-        "plant.continuous={numerator: [[[1, 1], [1]]], denominator: [[[1, 2, 1], [1, 1]]]}",
-        "not-identifiable",
-        r"no excitation within the band can tell these parameters apart: b0\[1,1\], a0\[1,1\], a1\[1,1\]",
-    ),
-    "too slow": ("sample_time=4", "beyond-nyquist", "cannot carry the band"),
-    "band beyond the limit": ("limits.band=[0, 1]", "bad-limit", r"leaves limits.band"),
-    "sensitivity": (
-        "accuracy={model_error: {sensitivity: {max_db: 6, controller: {numerator: [0.1]}}}}",
-        "unsuitable-key",
-        "works in discrete time, but the plant is not sampled",
-    ),
-    "levels in continuous time": ("signal.type=binary", "not-supported", "has no levels"),
-    "hold in continuous time": ("signal.hold=2", "not-supported", "holds nothing"),
-    "columns without a criterion": (
-        "accuracy={standard_deviation: {'b0[1,1]': 0.1}}",
-        "not-supported",
-        "factor_columns is for a criterion",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_bad_input_is_refused_with_place_and_hint(name):
-    override, code, message = BAD[name]
-    extra = ["spectrum.factor_columns=1"] if name.startswith("columns") else []
-    noise = ["noise.variance=1"] if name == "indistinguishable" else []
-    with pytest.raises(SpecError, match=message or None) as caught:
-        validate(changed(CONTINUOUS, override, *extra, *noise))
-    diagnostic = caught.value.diagnostics[0]
-    assert (diagnostic.code, caught.value.exit_code) == (code, EXIT_BAD_INPUT)
-    assert diagnostic.hint
-    assert diagnostic.key
-
-
 def test_the_spec_of_the_example_is_that_of_the_tests():
     task = build_convex(load_spec(SPECS / "two_by_two_arx.yaml"))
     assert task.experiment.model.names == Experiment(arx(), 1).model.names
-
-
-GAINS = """
-plant: {A: [[1, -0.7], [1, 0.4]], B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]]}
-noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.1}}
-"""
-# u2 in thousandths: its coefficients are a thousand times smaller, its power 1e6 times larger.
-MILLI = "plant.B=[[[0, 1.0, 0.4], [0, -0.0005, 0.0003]], [[0, 0.6, 0.2], [0, 0.0012, -0.0005]]]"
-
-
-@pytest.mark.parametrize("spectrum", ["{type: fir, order: 4}", "{type: free}"])
-@pytest.mark.parametrize(
-    ("asked", "same"),
-    [
-        (["cost={input_power: [1, 1]}"], ["cost={input_power: [1, 1.0e-6]}"]),
-        (
-            ["limits={input_power: [2, 1]}", "objective=best_accuracy"],
-            ["limits={input_power: [2, 1.0e6]}", "objective=best_accuracy"],
-        ),
-        (
-            ["limits={input_power: [2, 1]}", "objective=shortest_experiment"],
-            ["limits={input_power: [2, 1.0e6]}", "objective=shortest_experiment"],
-        ),
-    ],
-)
-def test_the_units_of_the_inputs_do_not_matter(spectrum, asked, same):
-    found = []
-    for overrides in (asked, [*same, MILLI]):
-        spec = changed(GAINS, f"spectrum={spectrum}", *overrides)
-        found.append(build_convex(spec).designed()[0].design)
-    assert found[1].result.objective == pytest.approx(found[0].result.objective, rel=1e-6)
-    bounds = [design.any_spectrum.certificate.bound for design in found]
-    assert bounds[1] == pytest.approx(bounds[0], rel=2e-5)
-
-
-def test_a_limit_that_hardly_matters_does_not_spoil_the_proof():
-    """Input 1 may have nearly any power: what it is worth is below the accuracy of a solver."""
-    spec = parse_spec(
-        "plant: {A: [[1, -0.35], [1, -0.3]], B: [[[0, 1.4, -0.7], [0, 0.3]], [[0, -0.2], [0, 1.4, -0.2]]]}\n"
-        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
-        "accuracy: {criterion: E}\nspectrum: {type: fir, order: 6}\n"
-        "limits: {input_power: [1000000.0, 2.5]}\n"
-    )
-    result = build_convex(spec).designed()[0].design.result
-    assert result.gap < 1e-6
-
-
-def test_a_spectrum_of_order_zero_is_white_in_time():
-    """No better than order one, and no worse than the best flat spectrum, which is one of its members."""
-    costs = [
-        solve(changed(GAINS, f"spectrum={{{kind}}}", "signal.candidates=1")).result["cost"]
-        for kind in ("type: fir, order: 1", "type: fir, order: 0", "type: white")
-    ]
-    assert costs[0] < costs[1] < costs[2]
-
-
-def test_free_spectra_of_unequal_limits_are_proved():
-    """Many rounds pass here before a sinusoid is found that pays: no reason to stop."""
-    spec = changed(
-        "plant: {B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]],\n"
-        "  F: [[[1, -0.7], [1, 0.3]], [[1, -0.5], [1, -0.8]]]}\n"
-        "noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}\nexperiment: {samples: 500}\n"
-        "accuracy: {model_error: {relative: 0.1}}\nobjective: best_accuracy\n"
-        "limits: {input_power: [2, 1]}\nspectrum: {type: free}\n"
-    )
-    assert build_convex(spec).designed()[0].design.result.gap < 1e-6

@@ -18,7 +18,7 @@ from inputdesign_cli.design.convex.feasible import strictly_feasible
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
 from inputdesign_cli.design.convex.problem import Goal, Problem, RequirementFactory, Weight
 from inputdesign_cli.design.convex.white import least_white_power
-from inputdesign_cli.errors import Diagnostic, InfeasibleError, bad_spec
+from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, LinesBasis, flat_basis
@@ -80,7 +80,7 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     powers = balanced_powers(question, power or 1.0)
     question = replace(question, basis=question.basis.in_units(np.sqrt(powers)))
     problem = whitened_problem(question, powers)
-    flat = _on_flat(problem)
+    flat = problem.on(flat_basis(problem.experiment))
     white = _white(question, flat, power)
     white_level = float(white.z[0] / white.s)
     anywhere = _anywhere(question, problem, powers)
@@ -163,17 +163,14 @@ def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
         # Limits that the cheapest design keeps anyway cost nothing.
         unlimited = replace(problem, limits=(), densities=(), finer=problem)
         free = exchange(unlimited, start, tolerance=tolerance)
-        same = free.basis is problem.basis
-        kept = replace(problem, basis=free.basis, finer=problem if same else None)
+        kept = problem.on(free.basis)
         if excess(kept, candidate_at(kept, free.x, 1.0)) <= _KEEPS:
             no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
             return replace(free, certificate=no_weight)
     if not (floors or problem.side or (problem.goal == "cost" and limited)):
         return exchange(problem, start, tolerance=tolerance)
     basis, interior = strictly_feasible(problem, start)
-    same = basis is problem.basis
-    problem = replace(problem, basis=basis, finer=problem if same else None)
-    return exchange(problem, start, tolerance=tolerance, interior=interior)
+    return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior)
 
 
 def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:
@@ -206,10 +203,6 @@ def _white(question: Question, flat: Problem, power: float) -> Candidate:
         return candidate_at(flat, np.array([power]), 1.0)
     # From far below, since what meets the requirements with room to spare is not scaled down.
     return scaled_up(replace(flat, floors_fixed=False), np.array([_FAR_BELOW * power]), 0.0, [])
-
-
-def _on_flat(problem: Problem) -> Problem:
-    return replace(problem, basis=flat_basis(problem.experiment), finer=None)
 
 
 def _check_excites(problem: Problem, start: Array) -> None:
@@ -246,15 +239,13 @@ def _check_reachable(problem: Problem, start: Array) -> None:
     except np.linalg.LinAlgError:
         ratio = np.inf
     if ratio > 1.0:
-        raise InfeasibleError(
-            Diagnostic(
-                "infeasible",
-                "no power of these lines reaches the accuracy: they excite only "
-                f"{int(np.sum(excited > _UNEXCITED * excited[-1]))} combinations of the "
-                f"{problem.experiment.size} parameters",
-                "each sinusoid tells at most two parameters apart: give more frequencies, or use type: free",
-                "spectrum",
-            )
+        raise InfeasibleError.because(
+            "infeasible",
+            "no power of these lines reaches the accuracy: they excite only "
+            f"{int(np.sum(excited > _UNEXCITED * excited[-1]))} combinations of the "
+            f"{problem.experiment.size} parameters",
+            "each sinusoid tells at most two parameters apart: give more frequencies, or use type: free",
+            "spectrum",
         )
 
 

@@ -110,7 +110,8 @@ def exchange(
     """
     done = enough or (lambda objective, bound: False)
     coarser = [] if interior is not None else problem.basis.coarser()
-    stages = [problem.coarsened(coarse) for coarse in coarser] + [problem]
+    # x of a coarser basis is the head of x of the next, so that they share their integrals.
+    stages = [replace(problem, basis=coarse, finer=problem) for coarse in coarser] + [problem]
     state = _first_state(stages[0], start, interior)
     rounds = 0
     for stage in stages:
@@ -205,7 +206,7 @@ class _State:
         self._add_rows(breaches)
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
-            self._grow(replace(problem, basis=basis, finer=None))
+            self._grow(problem.on(basis))
         same = self.face is face and self.best is best and len(self.cuts) == cuts
         if same and not (moves or breaches):
             return False  # the next round would solve the same program
@@ -308,14 +309,13 @@ def _first_state(problem: Problem, start: Array, interior: Array | None) -> _Sta
 
 def _inner(problem: Problem, x: Array) -> Candidate:
     """The interior design in the unknowns (z, s), its requirements met with room where s allows that."""
-    if not problem.scaled:
-        return candidate_at(problem, x, 1.0)
     unit = candidate_at(problem, x, 1.0)
+    if not problem.scaled:
+        return unit
     ratio = max((v.ratio for _, v in problem.violations(unit.information)), default=0.0)
     s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
     if problem.goal == "samples":
-        meets = scaled_up(problem, x, 1.0, [])
-        s = 1.2 * meets.s
+        s = 1.2 * scaled_up(problem, x, 1.0, []).s
     return candidate_at(problem, s * x, s)
 
 

@@ -59,7 +59,7 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
         if reached.objective >= 1.0:
             raise UnreachableError(limits_only, reached, limits_alone=True)
         within = np.sqrt(reached.s) * reached.x
-        problem, start = _on(problem, reached.basis), np.pad(start, (0, within.size - start.size))
+        problem, start = problem.on(reached.basis), np.pad(start, (0, within.size - start.size))
     factor = replace(problem, goal="factor", requirements=asked, side=(), finer=problem)
     if not asked:
         return problem.basis, within if within is not None else start * (0.5 / least_scale(factor, start))
@@ -78,11 +78,6 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
     share = 0.5 * (1.0 - found.s)
     within = np.pad(within, (0, found.x.size - within.size))
     return found.basis, (1.0 - share) * found.x + share * within
-
-
-def _on(problem: Problem, basis: Basis) -> Problem:
-    same = basis is problem.basis
-    return replace(problem, basis=basis, finer=problem if same else None)
 
 
 def _decided(objective: float, bound: float) -> bool:

@@ -6,7 +6,7 @@ meeting every requirement, and the powers and the density of x within their limi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -42,6 +42,14 @@ def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | 
         elif weight > 0:
             listed.append((kind, None, weight))
     return listed
+
+
+def weighted_sum(weights: Mapping[PowerKind, Weight], power: Mapping[PowerKind, Sequence[float]]) -> float:
+    """What powers, by kind and channel, cost at these weights."""
+    return sum(
+        weight * (sum(power[kind]) if channel is None else power[kind][channel])
+        for kind, channel, weight in weights_of(weights)
+    )
 
 
 @dataclass(frozen=True)
@@ -81,12 +89,8 @@ class Problem:
         """The criterion that is to be maximised, if that is the goal."""
         return criterion_of(self.requirements)
 
-    def coarsened(self, basis: Basis) -> Problem:
-        """The same problem for a smaller basis of the same family (see `Basis.coarser`)."""
-        return replace(self, basis=basis, finer=self)
-
     def on(self, basis: Basis) -> Problem:
-        """The same problem on a basis that may have grown out of this one."""
+        """The same problem on another basis, such as one that has grown out of this one."""
         return self if basis is self.basis else replace(self, basis=basis, finer=None)
 
     @property

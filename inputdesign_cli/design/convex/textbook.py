@@ -19,7 +19,7 @@ from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.master import Proof
 from inputdesign_cli.design.convex.problem import Problem
-from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec
 
@@ -108,11 +108,9 @@ def _symmetric(matrix: Array) -> Array:
 
 
 def _failed(why: str) -> InaccurateError:
-    return InaccurateError(
-        Diagnostic(
-            "solver-failed",
-            f"the solver found no answer to the grid program: {why}",
-            hint="use solver: {method: exchange}, fewer grid frequencies, or a lower order",
-            key="solver.method",
-        )
+    return InaccurateError.because(
+        "solver-failed",
+        f"the solver found no answer to the grid program: {why}",
+        hint="use solver: {method: exchange}, fewer grid frequencies, or a lower order",
+        key="solver.method",
     )

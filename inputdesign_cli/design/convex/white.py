@@ -9,7 +9,7 @@ import scipy.optimize
 
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.design.convex.problem import Problem, RequirementFactory
-from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import flat_basis
 
@@ -72,12 +72,10 @@ def _enough(excess: Callable[[float], float], start: float) -> float:
 
 def _out_of_reach(excess: float) -> InfeasibleError:
     ratio = float(np.exp(excess))
-    return InfeasibleError(
-        Diagnostic(
-            "infeasible",
-            "no power is enough: the accuracy asks for parameters of which only the noise tells, and the "
-            f"error stays at {ratio:.6g} times what is asked",
-            f"take {ratio**2:.4g} times as many samples, or allow {ratio:.4g} times the error",
-            "accuracy",
-        )
+    return InfeasibleError.because(
+        "infeasible",
+        "no power is enough: the accuracy asks for parameters of which only the noise tells, and the "
+        f"error stays at {ratio:.6g} times what is asked",
+        f"take {ratio**2:.4g} times as many samples, or allow {ratio:.4g} times the error",
+        "accuracy",
     )

@@ -11,7 +11,7 @@ from inputdesign_cli.design.loop_error.closed_form import error_of
 from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.design.loop_error.problem import LoopErrorProblem
 from inputdesign_cli.design.loop_error.weight import adjoint
-from inputdesign_cli.errors import Diagnostic, InaccurateError, bad_spec
+from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.information.quadrature import Quadrature
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -126,14 +126,12 @@ def design_loop_error(
     else:
         found = _asymptotic(problem, criterion)
     if found.gap > _ALMOST * tolerance:
-        raise InaccurateError(
-            Diagnostic(
-                "gap-not-closed",
-                f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance asks "
-                f"for {tolerance:.1e}",
-                hint="loosen solver.tolerance, or leave out limits that hardly matter",
-                key="solver.tolerance",
-            )
+        raise InaccurateError.because(
+            "gap-not-closed",
+            f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance asks "
+            f"for {tolerance:.1e}",
+            hint="loosen solver.tolerance, or leave out limits that hardly matter",
+            key="solver.tolerance",
         )
     return found
 
@@ -161,13 +159,11 @@ def _check_identifiable(problem: LoopErrorProblem, criterion: ParametricCriterio
 def _asymptotic(problem: LoopErrorProblem, criterion: ParametricCriterion) -> LoopErrorDesign:
     design, rule, settled = problem.asymptotic()
     if settled > _UNSETTLED:
-        raise InaccurateError(
-            Diagnostic(
-                "integral-inaccurate",
-                f"the mean over frequency moves by {settled:.1e} when its grid is halved",
-                hint="look for poles or zeros next to the unit circle",
-                key="plant",
-            )
+        raise InaccurateError.because(
+            "integral-inaccurate",
+            f"the mean over frequency moves by {settled:.1e} when its grid is halved",
+            hint="look for poles or zeros next to the unit circle",
+            key="plant",
         )
     part = problem.model_of_noise_part()
     total = float(np.trace(design.spectrum, axis1=1, axis2=2).real @ rule.weights)

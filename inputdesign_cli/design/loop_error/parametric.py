@@ -18,7 +18,7 @@ import numpy as np
 
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.weight import adjoint
-from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.frequencies import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -187,21 +187,18 @@ def _restricted(
             raise _failed(str(error)) from error
     if x.value is None:
         raise _failed(str(program.status))
-    Phi = np.einsum("kt,tab->kab", x.value, basis) * power
-    values, vectors = np.linalg.eigh(Phi)
-    Phi = (vectors * np.maximum(values, 0)[:, None, :]) @ adjoint(vectors)
+    # To the power one: without the rounding below zero.
+    Phi = power_of(np.einsum("kt,tab->kab", x.value, basis) * power, 1.0)
     multipliers = np.maximum(np.asarray(budget.dual_value, dtype=float), 0) * float(np.trace(W)) / limits
     return Phi, multipliers
 
 
 def _failed(why: str) -> InaccurateError:
-    return InaccurateError(
-        Diagnostic(
-            "solver-failed",
-            f"the program over the lines of the spectrum was not solved: {why}",
-            hint="write covariance: asymptotic, or look for parameters that are nearly indistinguishable",
-            key="accuracy.closed_loop_error.covariance",
-        )
+    return InaccurateError.because(
+        "solver-failed",
+        f"the program over the lines of the spectrum was not solved: {why}",
+        hint="write covariance: asymptotic, or look for parameters that are nearly indistinguishable",
+        key="accuracy.closed_loop_error.covariance",
     )
 
 

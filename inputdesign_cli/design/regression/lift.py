@@ -23,6 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from inputdesign_cli.accuracy import positive_part
 from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
 from inputdesign_cli.plant.polynomial import Array
@@ -253,7 +254,7 @@ class Lift:
         z[many] = self._with_weight(z[many], weight)
         z[many + 1] = np.maximum(z[many + 1], 0.0)
         for i in range(many + 3, len(blocks)):
-            z[i] = _projected(z[i])
+            z[i] = svec(positive_part(smat(z[i])))
         missing = q.copy()
         for block, multiplier in zip(blocks, z, strict=True):
             missing -= block.matrix.T @ multiplier
@@ -282,8 +283,7 @@ class Lift:
         matrix, head = smat(z), self.problem.m + 1
         G = matrix[:head, head:]
         least = G @ G.T / weight
-        rest = smat(_projected(svec(matrix[:head, :head] - least)))
-        matrix[:head, :head] = least + rest
+        matrix[:head, :head] = least + positive_part(matrix[:head, :head] - least)
         matrix[head:, head:] = weight * np.eye(self.biases)
         return svec(matrix)
 
@@ -296,8 +296,3 @@ class Lift:
                 product = x[self.index(0, j, k)]
                 spread[k - 1] += abs(product - rho * x[self.index(0, j, 0)])
         return spread
-
-
-def _projected(z: Array) -> Array:
-    values, vectors = np.linalg.eigh(smat(z))
-    return svec((vectors * np.maximum(values, 0.0)) @ vectors.T)

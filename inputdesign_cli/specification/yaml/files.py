@@ -6,7 +6,7 @@ import difflib
 import os
 from pathlib import Path
 
-from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.errors import Location, SpecError
 
 MAX_BYTES = 10 * 1024 * 1024
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -60,7 +60,7 @@ def decode(raw: bytes, file: str) -> str:
         place = Location(file, len(rows), len(rows[-1]), text)
         hint = "save the file as UTF-8 (an editor may have used Latin-1 or Windows-1252)"
         message = f"the byte 0x{byte:02X} is not UTF-8"
-        raise SpecError(Diagnostic("file-encoding", message, hint, location=place)) from None
+        raise SpecError.because("file-encoding", message, hint, location=place) from None
 
 
 def _nearby(path: Path) -> str:
@@ -78,4 +78,4 @@ def _nearby(path: Path) -> str:
 
 
 def _error(code: str, message: str, file: str, hint: str) -> SpecError:
-    return SpecError(Diagnostic(code, message, hint, location=Location(file, 1, 1)))
+    return SpecError.because(code, message, hint, location=Location(file, 1, 1))

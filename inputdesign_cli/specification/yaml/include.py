@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path as FilePath
 
-from inputdesign_cli.errors import Diagnostic, SpecError
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import Path, format_key
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -73,4 +73,4 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
 def _error(tree: Tree, path: Path, message: str, hint: str) -> SpecError:
     key = format_key(path)
     location = tree.places.location(tree.places.mark(path, at_key=True))
-    return SpecError(Diagnostic("bad-include", message.replace("{key}", key), hint, key, location))
+    return SpecError.because("bad-include", message.replace("{key}", key), hint, key, location)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.syntax import syntax_error
 
@@ -60,7 +60,7 @@ class Document:
 
     def error(self, code: str, message: str, line: int, column: int, hint: str) -> SpecError:
         """What stops the reading."""
-        return SpecError(Diagnostic(code, message, hint, location=self.location(line, column)))
+        return SpecError.because(code, message, hint, location=self.location(line, column))
 
     def spend(self, line: int, column: int, depth: int) -> None:
         """Count one node.

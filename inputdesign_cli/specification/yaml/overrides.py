@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
-from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.specification.yaml.include import KEY, apply_includes
 from inputdesign_cli.specification.yaml.nodes import MAX_DEPTH
 from inputdesign_cli.specification.yaml.places import Mark, Path, format_key, parse_key
@@ -38,7 +38,7 @@ def _error(override: str, message: str, hint: str, column: int = 1) -> SpecError
     """What is wrong with an override, at a column of its text."""
     first = override.splitlines()[0] if override else ""
     location = Location(f"--set {override}", 1, column, first)
-    return SpecError(Diagnostic("bad-override", message, hint, location=location))
+    return SpecError.because("bad-override", message, hint, location=location)
 
 
 def _apply(tree: Tree, override: str) -> None:

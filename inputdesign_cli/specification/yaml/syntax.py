@@ -6,7 +6,7 @@ import re
 
 import yaml
 
-from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.errors import Location, SpecError
 
 # What PyYAML says (a pattern: its C and its Python parser word it differently), what it means, what to do.
 _MEANINGS = (
@@ -66,7 +66,7 @@ def syntax_error(error: yaml.YAMLError, file: str, lines: list[str], shift: int 
     if opened is not None and opened.line + 1 != line and "closed" in message:
         message += f" (it begins on line {opened.line + 1})"
     location = Location(file, line, column, text)
-    return SpecError(Diagnostic("yaml-syntax", message, hint, location=location))
+    return SpecError.because("yaml-syntax", message, hint, location=location)
 
 
 def _meaning(error: yaml.YAMLError, character: str) -> tuple[str, str]:

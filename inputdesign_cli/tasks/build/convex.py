@@ -18,7 +18,7 @@ from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
-from inputdesign_cli.tasks.build.system import build_cost, build_experiment
+from inputdesign_cli.tasks.build.system import build_cost, build_experiment, check_known
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
 from inputdesign_cli.tasks.factor_columns import FewColumns
 
@@ -101,13 +101,7 @@ def check_pairs(spec: Spec, known: Sequence[str]) -> None:
     """Raise `SpecError` (`unknown-parameter`) where `report.ellipses` names what the model does not have."""
     for n, pair in enumerate(spec.report.ellipses or ()):
         for m, name in enumerate(pair):
-            if name not in known:
-                raise spec.complain(
-                    "unknown-parameter",
-                    f'the model has no parameter "{name}"',
-                    hint=f"its parameters are {', '.join(known)}",
-                    key=f"report.ellipses[{n}][{m}]",
-                )
+            check_known(spec, known, name, f"report.ellipses[{n}][{m}]")
 
 
 def _check_interpolated(spec: Spec) -> None:

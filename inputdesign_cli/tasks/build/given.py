@@ -16,7 +16,6 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
-from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_header, build_units
 from inputdesign_cli.tasks.build.limits import build_power_limits
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
@@ -30,6 +29,7 @@ from inputdesign_cli.tasks.build.system import (
     read_excitation_record,
     record_step,
 )
+from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
 from inputdesign_cli.tasks.given import GivenExcitation, GivenTask
 from inputdesign_cli.tasks.result.given_limits import StatedLimits
 

@@ -12,9 +12,9 @@ from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
-from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.signal_settings import build_bounds
+from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.weights import build_weight
 
 _KEY = "limits.spectrum"
@@ -106,14 +106,10 @@ def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array]
         constant = float(curve)
         return lambda w: np.full(np.shape(w), constant), nowhere, smooth
     if curve.kind == "table":
-        frequency, value = _table(spec, curve.table, key)
+        columns = read_frequency_table(spec, curve.table, ["phi"], key)
+        frequency, value = columns["frequency"], columns["phi"]
+        if np.any(value < 0):
+            raise bad_table(spec, curve.table, "phi must not be negative", "correct the values", key)
         return lambda w: np.interp(w, frequency, value), frequency, smooth
     W = build_weight(spec, curve, key)
     return lambda w: np.abs(W.at(w)) ** 2, nowhere, W.singularities
-
-
-def _table(spec: Spec, name: str, key: str) -> tuple[Array, Array]:
-    columns = read_frequency_table(spec, name, ["phi"], key)
-    if np.any(columns["phi"] < 0):
-        raise bad_table(spec, name, "phi must not be negative", "correct the values", key)
-    return columns["frequency"], columns["phi"]

@@ -17,15 +17,15 @@ from inputdesign_cli.design.loop_error import (
     PowerLimit,
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
-from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.identification.least_squares import is_arx
-from inputdesign_cli.plant import PolynomialModel, Rational, TransferMatrix, hold_entries, zero_order_hold
+from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.refusals import refuse, stated
-from inputdesign_cli.tasks.build.system import polynomial_model, rows_of
+from inputdesign_cli.tasks.build.system import held_plant, polynomial_model
+from inputdesign_cli.tasks.build.weights import held, rational
 from inputdesign_cli.tasks.loop_error import LoopErrorTask, LossTrial
 from inputdesign_cli.tasks.loop_error_signal import LoopErrorSignalSettings
 from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms
@@ -34,13 +34,11 @@ KEY = "accuracy.closed_loop_error"
 _GRID = 512
 _CANDIDATES = 20
 
-_refuse = partial(refuse, who="this version")
-
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     """The task, with all that can be wrong with its design already complained of.
 
-    What speaks against its simulation alone is kept for whoever asks for that.
+    What speaks against its simulation alone is told to whoever asks for that.
 
     Raises:
         SpecError: what this version does not design, and the diagnostics of `ControlLaw.check`.
@@ -62,11 +60,6 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         reference_filter=Rational(np.ones(1)) if coloured is None else _transfer(spec, coloured),
         band=(lo * spec.sample_time, min(hi * spec.sample_time, np.pi)),
     )
-    trial, refusal = None, None
-    try:
-        trial = _trial(spec, problem)
-    except SpecError as found:
-        refusal = found
     cost, spectrum = spec.cost, spec.spectrum
     terms = LoopErrorTerms(
         header=build_header(spec),
@@ -81,7 +74,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         },
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
-    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), trial, refusal)
+    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), partial(_trial, spec, problem))
 
 
 def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
@@ -93,27 +86,16 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
-    if plant.kind == "polynomial":
-        covariance = noise.covariance(plant.outputs)
-        return MatrixPlant.of(polynomial_model(plant, noise, covariance))
-    if plant.kind != "continuous" or not plant.sampled:
+    if plant.kind == "continuous" and plant.sampled:
+        plant = held_plant(plant, spec.sample_time)
+    if plant.kind != "polynomial":
         raise bad_spec(
             "not-supported",
             "this version designs for the closed-loop error of sampled plants only",
             hint="add sample: zoh to a continuous-time plant",
             key=key,
         )
-    matrix = plant.continuous
-    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, spec.sample_time)
-    sampled = PolynomialModel(
-        B=tuple(tuple(entry.numerator for entry in row) for row in held),
-        A=(np.ones(1),),
-        F=tuple(tuple(entry.denominator_polynomial for entry in row) for row in held),
-        C=rows_of(noise.C),
-        D=rows_of(noise.D),
-        covariance=noise.covariance(plant.outputs),
-    )
-    return MatrixPlant.of(sampled)
+    return MatrixPlant.of(polynomial_model(plant, noise, noise.covariance(plant.outputs)))
 
 
 def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, ControlLaw]:
@@ -132,8 +114,7 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, C
     elif target.kind == "continuous_matrix":
         inside = target.continuous
         held = hold_entries(inside.numerator_matrix, inside.denominator_matrix, spec.sample_time)
-        above = [[entry.numerator for entry in row] for row in held]
-        T = TransferMatrix.build(above, [[entry.denominator_polynomial for entry in row] for row in held])
+        T = TransferMatrix.build(*held)
     else:
         T = TransferMatrix.diagonal(_transfer(spec, target), plant.outputs)
     return "model_reference", ModelReference(T)
@@ -141,10 +122,7 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, C
 
 def _transfer(spec: Spec, transfer: Transfer) -> Rational:
     """A transfer function of the spec, sampled by a zero-order hold where it is given in s."""
-    if transfer.kind == "continuous":
-        ratio = transfer.continuous
-        return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, spec.sample_time)
-    return Rational.build(transfer.numerator, transfer.denominator_factors)
+    return rational(transfer) if transfer.kind == "discrete" else held(transfer, spec.sample_time)
 
 
 def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
@@ -158,7 +136,7 @@ def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
         if limit is None:
             continue
         if limit.min is not None:
-            raise _refuse(f"limits.{key}.min", what="enforce least powers here", hint="remove min")
+            raise refuse(f"limits.{key}.min", what="enforce least powers here", hint="remove min")
         if isinstance(limit.max, tuple):
             found += [kind(most, channel) for channel, most in enumerate(limit.max)]
         elif limit.max is not None:
@@ -235,34 +213,29 @@ _SIGNAL_KEYS = ("hold", "lines", "amplitudes", "offset", "ramp", "bits", "quanti
 def _check_supported(spec: Spec) -> None:
     for name in spec.accuracy.requirements:
         what = f"handle {name} beside closed_loop_error"
-        raise _refuse(f"accuracy.{name}", what=what, hint="keep one of them")
-    for name in stated(spec.limits):
-        if name in _LIMITS:
-            what, hint = (
-                f"enforce limits.{name} for closed_loop_error",
-                "limit input_power, output_power or band",
-            )
-            raise _refuse(f"limits.{name}", what=what, hint=hint)
+        raise refuse(f"accuracy.{name}", what=what, hint="keep one of them")
+    for name in spec.limits.stated(*_LIMITS):
+        what, hint = f"enforce limits.{name} for closed_loop_error", "limit input_power, output_power or band"
+        raise refuse(f"limits.{name}", what=what, hint=hint)
     spectrum, signal = spec.spectrum, spec.signal
     if spectrum is not None and spectrum.type not in ("pointwise", "free"):
         kind = spectrum.phrase.replace(":", "")
         what = f"design spectra of {kind} for closed_loop_error"
-        raise _refuse("spectrum", what=what, hint="use type: pointwise, which is best at every frequency")
+        raise refuse("spectrum", what=what, hint="use type: pointwise, which is best at every frequency")
     if spec.closed_loop:
         what, hint = "design closed-loop experiments here", "remove the controller"
-        raise _refuse("experiment.controller", what=what, hint=hint)
+        raise refuse("experiment.controller", what=what, hint=hint)
     if spec.report.ellipses is not None:
-        raise _refuse("report.ellipses", what="draw ellipses for closed_loop_error", hint="remove report")
+        raise refuse("report.ellipses", what="draw ellipses for closed_loop_error", hint="remove report")
     if spec.experiment.prior is not None:
-        raise _refuse("experiment.prior", what="use prior information here", hint="remove it")
+        raise refuse("experiment.prior", what="use prior information here", hint="remove it")
     if spec.solver.method != "exchange":
         what = f"use the method {spec.solver.method} here"
-        raise _refuse("solver.method", what=what, hint="remove method")
+        raise refuse("solver.method", what=what, hint="remove method")
     if signal.type not in (None, "multisine", "filtered_noise"):
         what = f"make {signal.type} signals here"
-        raise _refuse("signal.type", what=what, hint="use multisine or filtered_noise")
-    for name in stated(signal):
-        if name in _SIGNAL_KEYS:
-            raise _refuse(f"signal.{name}", what=f"apply signal.{name} here", hint="remove it")
+        raise refuse("signal.type", what=what, hint="use multisine or filtered_noise")
+    for name in signal.stated(*_SIGNAL_KEYS):
+        raise refuse(f"signal.{name}", what=f"apply signal.{name} here", hint="remove it")
     if signal.phases not in (None, "random"):
-        raise _refuse("signal.phases", what=f"choose {signal.phases} phases here", hint="use random")
+        raise refuse("signal.phases", what=f"choose {signal.phases} phases here", hint="use random")

@@ -23,10 +23,9 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
-from inputdesign_cli.tasks.build.frequency_table import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_loop
-from inputdesign_cli.tasks.build.tables import has_column
+from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.tasks.build.weights import build_weight, rational
 
 _KEY = "accuracy.model_error"

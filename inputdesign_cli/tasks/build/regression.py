@@ -7,11 +7,10 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.design.regression import Regression
-from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
 from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.refusals import refuse, stated
 from inputdesign_cli.tasks.regression import KEY, RegressionTask, RegressionTrial, TrueNoise
 from inputdesign_cli.tasks.regressors import RegressorSettings
 from inputdesign_cli.tasks.result.regression import RegressionTerms
@@ -19,8 +18,8 @@ from inputdesign_cli.tasks.result.regression import RegressionTerms
 # Toeplitz designs take long to prove; a gap that is asked for explicitly holds instead.
 _STRUCTURED_TOLERANCE = 1e-6
 _SIGNAL_KEYS = (
-    *("type", "phases", "hold", "lines", "amplitudes", "offset", "ramp", "bits", "candidates"),
-    *("quantisation", "scale", "also"),
+    *("type", "phases", "hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation"),
+    *("scale", "also", "candidates"),
 )
 
 _refuse = partial(refuse, who="a regression design")
@@ -29,7 +28,7 @@ _refuse = partial(refuse, who="a regression design")
 def build_regression_task(spec: Spec) -> RegressionTask:
     """The task, with all that can be wrong with its design already complained of.
 
-    What speaks against its simulation alone is kept for whoever asks for that.
+    What speaks against its simulation alone is told to whoever asks for that.
 
     Raises:
         SpecError: the spec asks for what a regression design does not do.
@@ -66,19 +65,13 @@ def build_regression_task(spec: Spec) -> RegressionTask:
         energy=spec.limits.energy if error.target is None else None,
     )
     seed = signal.seed or 0
-    trial, refusal = None, None
-    try:
-        trial = _trial(spec)
-    except SpecError as found:
-        refusal = found
     return RegressionTask(
         terms=terms,
         alternating=solver.method == "alternating",
         tolerance=solver.tolerance if "tolerance" in solver.model_fields_set else _STRUCTURED_TOLERANCE,
         seed=seed,
         signal=RegressorSettings(spec.signal_samples, signal.periods, signal.start or "steady", seed),
-        trial=trial,
-        refusal=refusal,
+        trial=partial(_trial, spec),
     )
 
 
@@ -138,8 +131,8 @@ def _check_supported(spec: Spec) -> None:
         raise _refuse("experiment.controller", what="run in closed loop", hint="remove the controller")
     if spec.experiment.prior is not None:
         raise _refuse("experiment.prior", what="use prior information", hint="remove it")
-    for name in stated(spec.limits):
-        if name != "energy":
+    for name, stated in spec.limits:
+        if name != "energy" and stated is not None:
             hint = "remove it, or use limits.energy"
             raise _refuse(f"limits.{name}", what=f"enforce limits.{name}", hint=hint)
     error = spec.accuracy.mean_squared_error
@@ -151,7 +144,6 @@ def _check_supported(spec: Spec) -> None:
     if spec.solver.method == "lmi":
         hint = "use exchange (the default) or alternating"
         raise _refuse("solver.method", what="have a grid program", hint=hint)
-    for name in stated(spec.signal):
-        if name in _SIGNAL_KEYS:
-            hint = "remove it; samples, periods, seed and start count"
-            raise _refuse(f"signal.{name}", what=f"apply signal.{name}", hint=hint)
+    for name in spec.signal.stated(*_SIGNAL_KEYS):
+        hint = "remove it; samples, periods, seed and start count"
+        raise _refuse(f"signal.{name}", what=f"apply signal.{name}", hint=hint)

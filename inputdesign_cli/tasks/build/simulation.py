@@ -1,14 +1,15 @@
-"""Spec -> how its experiment is tried on the true system."""
+"""Spec -> how its experiment is tried on the true system: the nominal one, but for what `simulation` says."""
 
 from __future__ import annotations
 
+from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
+from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
-from inputdesign_cli.tasks.build.system import build_cost
-from inputdesign_cli.tasks.build.true_system import build_true_system
-from inputdesign_cli.tasks.simulation import Simulation
+from inputdesign_cli.tasks.build.system import build_cost, build_loop, build_model, held_plant
+from inputdesign_cli.tasks.simulation import Simulation, TrueSystem
 
 
 def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
@@ -24,7 +25,7 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
     return Simulation(
         units=build_units(spec),
         nominal=nominal,
-        truth=build_true_system(spec),
+        truth=_true_system(spec),
         runs=study.runs,
         seed=study.seed,
         renewed=study.excitation == "new",
@@ -33,3 +34,33 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
         entries=unstated_errors(spec, nominal),
         alpha=model_error_alpha(spec, nominal.model),
     )
+
+
+def _true_system(spec: Spec) -> TrueSystem | None:
+    """The system of `simulation.plant` and `simulation.noise`; None where neither is given.
+
+    Raises:
+        SpecError: a loop that the nominal plant leaves stable, and the true one does not.
+    """
+    study = spec.simulation
+    if study is None or (study.plant is None and study.noise is None):
+        return None
+    plant, noise = study.plant or spec.plant, spec.noise
+    if study.noise is not None:
+        stated = study.noise
+        noise = Noise.model_construct(C=stated.C, D=stated.D, variance=stated.variance or 1.0)
+    if plant.kind == "continuous" and (spec.plant.kind == "polynomial" or noise.filters):
+        plant = held_plant(plant, spec.sample_time)
+    model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
+    controller = spec.experiment.controller
+    try:
+        loop = None if controller is None else build_loop(model, controller)
+    except SpecError as error:
+        found = error.diagnostics[0]
+        raise bad_spec(
+            found.code,
+            f"with the true plant {found.message}",
+            hint="give a true plant that the controller stabilises as well",
+            key="simulation.plant",
+        ) from error
+    return TrueSystem(model, loop, None if study.noise is None else study.noise.relative_std)

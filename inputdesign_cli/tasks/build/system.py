@@ -17,6 +17,7 @@ from inputdesign_cli.plant import (
     SampledModel,
     TransferMatrix,
     close_loop,
+    hold_entries,
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
@@ -76,12 +77,20 @@ def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Arra
     """A plant in q^-1; A, C and D that the spec states once are common to the outputs."""
     return PolynomialModel(
         B=_arrays(plant.B_matrix),
-        A=rows_of(plant.A),
+        A=_rows(plant.A),
         F=_arrays(plant.F_matrix),
-        C=rows_of(noise.C),
-        D=rows_of(noise.D),
+        C=_rows(noise.C),
+        D=_rows(noise.D),
         covariance=covariance,
     )
+
+
+def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
+    """A plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
+    matrix = plant.continuous
+    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, sample_time)
+    B, F = (tuple(tuple(tuple(entry.tolist()) for entry in row) for row in rows) for rows in held)
+    return PolynomialPlant.model_construct(A=(1.0,), B=B, F=F)
 
 
 def build_experiment(spec: Spec) -> Experiment:
@@ -213,6 +222,17 @@ def record_step(spec: Spec) -> float:
     return spec.sample_time
 
 
+def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
+    """Raise `SpecError` (`unknown-parameter`) for the name of a parameter that the model does not have."""
+    if name not in known:
+        raise spec.complain(
+            "unknown-parameter",
+            f'the model has no parameter "{name}"',
+            hint=f"its parameters are {', '.join(known)}",
+            key=key,
+        )
+
+
 def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
     """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
 
@@ -220,13 +240,7 @@ def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[st
         SpecError: `unknown-parameter` or `wrong-shape`.
     """
     for name in names or ():
-        if name not in known:
-            raise spec.complain(
-                "unknown-parameter",
-                f'the model has no parameter "{name}"',
-                hint=f"its parameters are {', '.join(known)}",
-                key=key,
-            )
+        check_known(spec, known, name, key)
     listed = tuple(names or known)
     if len(matrix) != len(listed):
         raise spec.complain(
@@ -249,6 +263,6 @@ def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, .
     return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
 
 
-def rows_of(value: tuple) -> tuple[Array, ...]:
+def _rows(value: tuple) -> tuple[Array, ...]:
     """One polynomial, common to all outputs, or a list of one an output."""
     return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))

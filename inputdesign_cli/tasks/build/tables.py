@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic, Location
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 _MOST_BYTES = 100 * 2**20
@@ -106,19 +109,37 @@ def _number(path: Path, key: str, line: int, row: list[str], column: int, name: 
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise DataError(
-            Diagnostic(
-                "data-not-a-number",
-                f"{text!r} in column {name} is not a finite number"
-                if text
-                else f"a number is missing in column {name}",
-                "write plain numbers with a decimal point, one row a line",
-                key,
-                Location(str(path), line, 1, ",".join(row)),
-            )
+        raise DataError.because(
+            "data-not-a-number",
+            f"{text!r} in column {name} is not a finite number"
+            if text
+            else f"a number is missing in column {name}",
+            "write plain numbers with a decimal point, one row a line",
+            key,
+            Location(str(path), line, 1, ",".join(row)),
         )
     return value
 
 
 def _unreadable(path: Path, key: str, what: str, hint: str) -> DataError:
-    return DataError(Diagnostic("data-unreadable", f"the file {path} {what}", hint, key))
+    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key)
+
+
+def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str) -> dict[str, Array]:
+    """Columns `frequency`, in the unit of the experiment, and `columns`, each (n,).
+
+    Raises:
+        DataError: the file cannot be read, or its frequencies do not rise from zero or more (`bad-table`).
+    """
+    wanted = {"frequency": "frequency", **{column: column for column in columns}}
+    found = read_columns(spec.resolve_path(name), wanted, key=key)
+    frequency = found["frequency"]
+    if frequency.size < 2 or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
+        message = "the frequencies must be nonnegative and increase from row to row"
+        raise bad_table(spec, name, message, "sort the rows; there must be two at least", key)
+    return found | {"frequency": frequency * build_units(spec).frequency}
+
+
+def bad_table(spec: Spec, name: str, message: str, hint: str, key: str) -> DataError:
+    """The error about a table that can be read but not used."""
+    return DataError.because("bad-table", f"{spec.resolve_path(name).name}: {message}", hint, key)

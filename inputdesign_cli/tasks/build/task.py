@@ -1,13 +1,37 @@
-"""The one dispatch: which kind of question a spec asks."""
+"""What every kind of question answers, and the one dispatch: which kind a spec asks."""
 
 from __future__ import annotations
 
+from typing import Protocol
+
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
 from inputdesign_cli.tasks.build.regression import build_regression_task
-from inputdesign_cli.tasks.task import Task
+
+
+class Task(Protocol):
+    """A question, built from a spec once (`tasks.build`); it holds objects, and functions made of the spec, never the spec.
+
+    Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`), not its
+    place in a file: the dispatch adds that (`Spec.place`).
+    """
+
+    def check(self) -> None:
+        """Whatever can be wrong before anything long is computed; building has checked the rest."""
+
+    def solve(self) -> Results:
+        """The answer: a design with its proof, or what a given excitation buys."""
+
+    def simulate(self, executor: Executor | None = None) -> Results:
+        """The answer, with the experiment tried many times on the true system.
+
+        Args:
+            executor: where batches of runs are computed (default: in this process).
+        """
 
 
 def build_task(spec: Spec) -> Task:

@@ -14,6 +14,12 @@ def rational(transfer: DiscreteTransfer) -> Rational:
     return Rational.build(list(transfer.numerator), [list(f) for f in transfer.denominator_factors])
 
 
+def held(transfer: ContinuousTransfer, sample_time: float) -> Rational:
+    """A transfer function of the spec in s behind a zero-order hold."""
+    ratio = transfer.continuous
+    return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, sample_time)
+
+
 def build_weight(
     spec: Spec, transfer: DiscreteTransfer | ContinuousTransfer | None, key: str
 ) -> ScalarTransfer:
@@ -46,5 +52,4 @@ def build_weight(
                 key=key,
             )
         case ContinuousTransfer():
-            ratio = transfer.continuous
-            return zero_order_hold(ratio.numerator, ratio.denominator_polynomial, spec.sample_time)
+            return held(transfer, spec.sample_time)

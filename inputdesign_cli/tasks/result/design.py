@@ -10,7 +10,7 @@ import numpy as np
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement
 from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.designs import Design, Question
-from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
+from inputdesign_cli.design.convex.problem import Problem, Weight, weighted_sum
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
@@ -131,7 +131,7 @@ def requirement_entry(units: Units, requirement: Requirement, information: Array
     return item
 
 
-def powers(problem: Problem, basis: Basis, x: Array) -> dict[str, list[float]]:
+def powers(problem: Problem, basis: Basis, x: Array) -> dict[PowerKind, list[float]]:
     """The powers of input, output and excitation, one entry a channel."""
     at, model = problem.on(basis), problem.experiment.model
     channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
@@ -140,11 +140,7 @@ def powers(problem: Problem, basis: Basis, x: Array) -> dict[str, list[float]]:
 
 
 def _cost(done: Designed, basis: Basis, x: Array) -> float:
-    spent = powers(done.design.problem, basis, x)
-    total = 0.0
-    for kind, channel, weight in weights_of(done.cost):
-        total += weight * (sum(spent[kind]) if channel is None else spent[kind][channel])
-    return total
+    return weighted_sum(done.cost, powers(done.design.problem, basis, x))
 
 
 def _objective(design: Design) -> dict[str, Json]:

@@ -35,21 +35,7 @@ def experiment_ellipses(
         flat = None if white is None else experiment.raw_covariance(white)
     except np.linalg.LinAlgError:  # a parameter that this excitation does not show
         return None
-    return ellipse_curves(experiment.model.names, experiment.model.theta, covariance, flat, pairs)
-
-
-def ellipse_curves(
-    names: Sequence[str],
-    theta: Array,
-    covariance: Array,
-    white: Array | None = None,
-    pairs: Sequence[tuple[str, str]] | None = None,
-) -> EllipseCurves:
-    """Predicted confidence ellipses of the chosen `pairs`, by default of the most correlated ones.
-
-    Args:
-        covariance, white: (k, k) of the raw parameters, by the design and by flat excitation.
-    """
+    names, theta = experiment.model.names, experiment.model.theta
     if pairs is None:
         scale = np.sqrt(np.diag(covariance))
         correlation = np.triu(np.abs(covariance / np.outer(scale, scale)), 1)
@@ -65,7 +51,7 @@ def ellipse_curves(
                 (names[i], names[j]),
                 theta[[i, j]],
                 covariance[chosen],
-                None if white is None else white[chosen],
+                None if flat is None else flat[chosen],
             )
         )
     return EllipseCurves(tuple(found))

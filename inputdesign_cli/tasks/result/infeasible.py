@@ -10,7 +10,7 @@ from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import LinesBasis
 
@@ -59,7 +59,7 @@ def explain(units: Units, question: Question, unreachable: UnreachableError) -> 
     if problem.densities and stated:
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
-    return InfeasibleError(Diagnostic("infeasible", message, hint, key))
+    return InfeasibleError.because("infeasible", message, hint, key)
 
 
 def _conflicting(unreachable: UnreachableError) -> list[tuple[Requirement, float | None]]:
@@ -110,14 +110,12 @@ def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError
     upper = [limit for limit in involved if limit.upper]
     names = ", ".join(dict.fromkeys(limit.key for limit in (*lower, *upper))) or "limits.spectrum"
     where = [*lower, *upper][0].key if involved else "limits"
-    return InfeasibleError(
-        Diagnostic(
-            "contradictory-limits",
-            f"no spectrum of this type keeps to {names}: the upper limits would have to be {proved:.4g} "
-            "times as large for the lower ones to be reached",
-            "lower min, or raise max",
-            where,
-        )
+    return InfeasibleError.because(
+        "contradictory-limits",
+        f"no spectrum of this type keeps to {names}: the upper limits would have to be {proved:.4g} "
+        "times as large for the lower ones to be reached",
+        "lower min, or raise max",
+        where,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inputdesign_cli.design.convex.problem import Weight, weights_of
+from inputdesign_cli.design.convex.problem import Weight, weighted_sum
 from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
 from inputdesign_cli.monte_carlo.study import Study, Tried
@@ -54,7 +54,7 @@ def input_entry(
     names, r_adm = trials.names, predicted.r_adm
     entry = fractions(tried, predicted, errors) | {
         "mean_estimate": dict(zip(names, trials.theta.mean(axis=0).tolist(), strict=True)),
-        "cost": _cost(trials.power, cost),
+        "cost": weighted_sum(cost, trials.power),
         "power": trials.power,
         "total_power": trials.total_power,
         "not_converged": int(np.sum(~trials.converged)),
@@ -103,13 +103,6 @@ def covariance_in_theory(information: Array) -> Array:
     """M^-1 (k, k) by way of unit diagonal."""
     scale = np.sqrt(np.diag(information))
     return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
-
-
-def _cost(power: Mapping[str, list[float]], weights: Mapping[PowerKind, Weight]) -> float:
-    return sum(
-        weight * (sum(power[kind]) if channel is None else power[kind][channel])
-        for kind, channel, weight in weights_of(weights)
-    )
 
 
 def gap_notes(units: Units, inputs: Mapping[str, Json]) -> list[str]:

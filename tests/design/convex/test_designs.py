@@ -1,9 +1,8 @@
-"""Limits, criteria and lengths: against plain programs in cvxpy, against each other, and by their laws."""
+"""The three goals against each other, families of spectra, and published examples recomputed."""
 
 import dataclasses
 import itertools
 
-import cvxpy as cp
 import numpy as np
 import pytest
 
@@ -12,160 +11,24 @@ from inputdesign_cli.accuracy import (
     EllipsoidError,
     InformationTarget,
     ModelError,
-    Relative,
     WeightedVariance,
 )
-from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.design.convex.exchange import exchange
-from inputdesign_cli.design.convex.feasible import UnreachableError
-from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
-from inputdesign_cli.errors import InfeasibleError, SpecError
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel, zero_order_hold
-from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from inputdesign_cli.spectrum import LinesBasis
+from tests.support.convex_designs import (
+    GRID,
+    anywhere,
+    check,
+    criterion,
+    model_error,
+    relative,
+    resonant,
+    solve,
+)
 from tests.support.on_grid import OnGrid
-
-GRID = np.unique(np.concatenate([np.linspace(0.0, np.pi, 4001), np.geomspace(1e-4, np.pi, 4001)]))
-ORDER = 8
-
-
-def solve(experiment, goal="cost", requirements=(), order=ORDER, **more):
-    basis = more.pop("basis", FirBasis(order))
-    if goal == "cost":
-        more.setdefault("cost", {"input": 1.0})
-    question = Question(experiment, basis, goal, list(requirements), **more)
-    return solve_design(question, tolerance=1e-7)
-
-
-def model_error(experiment, fraction, alpha, kind=ModelError):
-    """The error of G of one input and output, relative to |G|, at every frequency."""
-    admissible = Relative(experiment.model, fraction, (0, 0))
-    return kind(experiment=experiment, band=(0.0, np.pi), entry=(0, 0), admissible=admissible, alpha=alpha)
-
-
-def relative(fraction=0.01, alpha=2.45):
-    return [lambda e: model_error(e, fraction, alpha)]
-
-
-def anywhere():
-    return LinesBasis.anywhere(0.0, np.pi, 1)
-
-
-def criterion(letter):
-    return [lambda e: Criterion(letter, e.factor)]
-
-
-def check(design, tolerance=1e-6):
-    """Proof, limits and requirements of a design, recomputed on a dense grid."""
-    result, problem = design.result, design.problem
-    assert result.certificate.bound <= result.objective * (1 + 1e-9)
-    assert result.gap <= tolerance
-    assert design.any_spectrum.certificate.bound <= result.objective * (1 + 1e-9)
-    basis, x = result.basis, result.x
-    for limit in problem.limits:
-        power = dataclasses.replace(problem, basis=basis, finer=None).power(limit.kind).at(x)
-        assert power <= limit.bound * (1 + 1e-9) if limit.upper else power >= limit.bound * (1 - 1e-9)
-    if isinstance(basis, FirBasis):
-        phi = basis.density(x, GRID)
-        assert phi.min() >= -1e-9 * phi.max()
-        for density in problem.densities:
-            level = density.level(GRID)
-            assert np.all(phi <= level * (1 + 1e-6)) if density.upper else np.all(phi >= level * (1 - 1e-6))
-
-
-# --- plain programs, solved by cvxpy on a Gram matrix and a frequency grid ------------------------------
-
-
-def gram_program(problem, order, unit=1.0):
-    """A FIR spectrum as a Gram matrix: (c, M as an expression, constraints), unknowns over `unit`."""
-    scaled = cp.Variable(order + 1)
-    c = unit * scaled
-    gram = cp.Variable((order + 1, order + 1), PSD=True)
-    constraints = [cp.trace(gram) == scaled[0]]
-    constraints += [cp.sum(cp.diag(gram, k)) == scaled[k] for k in range(1, order + 1)]
-    maps = problem.information_map
-    M = problem.baseline_information + sum(c[i] * maps[i] for i in range(order + 1))
-    return c, M, constraints
-
-
-@pytest.mark.parametrize("letter", ["D", "A", "E", "T"])
-def test_criteria_agree_with_a_plain_program(letter):
-    """log_det, tr_inv, lambda_min and trace of cvxpy under two power limits."""
-    model = PolynomialModel.single([0, 1.0, 0.4], A=[1, -0.8], variance=0.5)
-    experiment = Experiment(model, 100)
-    limits = [PowerLimit("input", 1.0), PowerLimit("output", 2.5)]
-    design = solve(experiment, "factor", criterion(letter), limits=limits)
-    check(design)
-    raw = dataclasses.replace(design.problem, experiment=experiment, finer=None)
-    c, M, constraints = gram_program(raw, ORDER)
-    constraints += [raw.power(limit.kind).vector @ c <= limit.bound for limit in limits]
-    value = {
-        "D": lambda: cp.log_det(M),
-        "A": lambda: -cp.tr_inv(M),
-        "E": lambda: cp.lambda_min(M),
-        "T": lambda: cp.trace(M),
-    }[letter]()
-    plain = cp.Problem(cp.Maximize(value), constraints).solve(solver=cp.CLARABEL)
-    ours = Criterion(letter, np.eye(3))
-    assert ours.value(1 / design.result.objective) == pytest.approx(plain, rel=1e-5)
-
-
-def resonant():
-    """A lightly damped OE system, where cheap inputs and quiet outputs are different things."""
-    model = PolynomialModel.single([0, 1.0, 0.3], F=[1, -1.4, 0.81], variance=0.2)
-    return Experiment(model, 300)
-
-
-def test_capped_least_cost_agrees_with_a_plain_program():
-    """A cost that pulls one way and a limit that pulls the other: input cost under a cap on the output."""
-    experiment, kind, order = resonant(), "output", 10
-    free = solve(experiment, requirements=relative(0.1), order=order)
-    quiet = solve(experiment, requirements=relative(0.1), order=order, cost={"output": 1.0})
-    loud = free.problem.power(kind).at(free.result.x)
-    assert quiet.result.objective < 0.9 * loud
-    bound = 0.5 * (quiet.result.objective + loud)
-    limits = [PowerLimit(kind, bound)]
-    design = solve(experiment, requirements=relative(0.1), order=order, limits=limits)
-    check(design)
-    assert design.result.objective > free.result.objective
-    problem = design.problem
-    c, M, constraints = gram_program(problem, order, unit=design.result.objective)
-    scale, requirement = design.result.objective, problem.requirements[0]
-    w = np.union1d(np.linspace(0.0, np.pi, 200), design.result.active_frequencies)
-    K = np.linalg.inv(np.linalg.cholesky(design.result.information))
-    for at in w:
-        slack = K @ (M - requirement.cut(float(at)).matrix) @ K.T
-        constraints.append(0.5 * (slack + slack.T) >> 0)
-    constraints.append(problem.power(kind).vector @ c / bound <= 1.0)
-    plain = cp.Problem(cp.Minimize(problem.price.vector @ c / scale), constraints).solve(solver=cp.CLARABEL)
-    assert plain == pytest.approx(1.0, rel=1e-5)
-
-
-def test_density_limits_agree_with_a_plain_program(first_order):
-    """Upper and lower bounds on Phi at every frequency against 400 rows of them."""
-    upper = DensityLimit(lambda w: 1.5 + 0.5 * np.cos(w), np.linspace(0.0, np.pi, 300))
-    lower = DensityLimit(lambda w: np.full(np.shape(w), 0.02), np.linspace(0.0, np.pi, 300), upper=False)
-    design = solve(first_order, requirements=relative(0.02), densities=[upper, lower])
-    check(design)
-    problem = design.problem
-    c, M, constraints = gram_program(problem, ORDER)
-    requirement = problem.requirements[0]
-    w = np.linspace(0.0, np.pi, 400)
-    constraints += [M - requirement.cut(float(at)).matrix >> 0 for at in np.linspace(0, np.pi, 60)]
-    functions = problem.basis.functions(w)
-    constraints += [functions @ c <= upper.level(w), functions @ c >= lower.level(w)]
-    plain = cp.Problem(cp.Minimize(problem.price.vector @ c), constraints).solve(solver=cp.CLARABEL)
-    assert design.result.objective == pytest.approx(plain, rel=1e-4)
-    assert design.result.objective >= plain * (1 - 1e-6)
-
-
-def test_implied_power_bounds_the_power_of_every_spectrum_below(first_order):
-    density = DensityLimit(lambda w: 2.0 + np.cos(3 * w), np.linspace(0.0, np.pi, 500))
-    assert implied_power(density).bound == pytest.approx(2.0, rel=1e-2)
-    assert implied_power(density).bound >= 2.0
-
-
-# --- the three goals against each other ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("case", ["first_order", "flexible"])
@@ -256,42 +119,43 @@ def test_the_shadow_price_is_the_slope():
     assert at(middle).result.certificate.limits[0] == pytest.approx(-slope, rel=1e-3)
 
 
-# --- infeasible ------------------------------------------------------------------------------------------
+def test_free_optimum_of_the_first_order_system(first_order):
+    """docs/errata.md: 0.1925467, one line at 0.1553."""
+    design = solve(first_order, requirements=relative(), basis=anywhere())
+    check(design)
+    assert design.result.objective == pytest.approx(0.1925467, rel=1e-6)
+    basis, x = design.result.basis, design.result.x
+    centre = np.sum(basis.frequencies * x) / x.sum()
+    assert centre == pytest.approx(0.1553, abs=1e-3)
 
 
-def test_unreachable_accuracy_is_proved(first_order):
-    """Half the least power: the limits must be doubled, and the proof says so."""
-    least = solve(first_order, requirements=relative()).result.objective
-    with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), limits=[PowerLimit("input", 0.5 * least)])
-    assert caught.value.nearest.certificate.bound == pytest.approx(2.0, rel=1e-4)
-    assert not caught.value.limits_alone
+def test_more_lines_cost_less(first_order):
+    """Lines of a period within those of its double; all above the optimum over every spectrum."""
+    costs = [
+        solve(
+            first_order, requirements=relative(), basis=LinesBasis.at(np.pi * np.arange(1, n + 1) / n, 1)
+        ).result.objective
+        for n in (10, 20, 40, 80)
+    ]
+    assert all(fewer >= more * (1 - 1e-7) for fewer, more in itertools.pairwise(costs))
+    assert costs[-1] >= 0.1925467 * (1 - 1e-6)
+    assert costs[-1] == pytest.approx(0.1925467, rel=1e-2)
 
 
-def test_contradictory_limits_are_proved(first_order):
-    """Input power times the peak of |G|^2 is the most output power there is."""
-    floors = [PowerLimit("output", 288.0, upper=False), PowerLimit("input", 1.0)]
-    with pytest.raises(UnreachableError) as caught:
-        solve(first_order, requirements=relative(), basis=anywhere(), limits=floors)
-    assert caught.value.limits_alone
-    assert caught.value.nearest.certificate.bound == pytest.approx(288.0 / 144.0, rel=1e-4)
+def test_order_300(first_order):
+    design = solve(first_order, requirements=relative(), order=300)
+    check(design, 1e-7)
+    assert 0.1925467 <= design.result.objective <= 0.1942
 
 
-def test_too_few_lines_are_refused():
-    B, A = [0, 1.0, 0.5], [1, -0.5, 0.3]
-    experiment = Experiment(PolynomialModel.single(B, A=A), 100000)
-    oe = Experiment(PolynomialModel.single(B, F=A), 100)
-    with pytest.raises(SpecError) as caught:
-        solve(oe, requirements=relative(0.1), basis=LinesBasis.at(np.array([0.4]), 1))
-    assert caught.value.diagnostics[0].code == "too-few-lines"
-    # ARX learns from the noise as well, so that a modest accuracy is within reach of a single line.
-    line = LinesBasis.at(np.array([0.4]), 1)
-    assert solve(experiment, requirements=relative(0.3), basis=line).result.gap <= 1e-6
-    with pytest.raises(InfeasibleError):
-        solve(experiment, requirements=relative(0.001), basis=line)
-
-
-# --- the peer's examples (MOOSE2), optima recomputed independently -----------------------------------------
+def test_ellipsoid_needs_more_than_the_linearisation(first_order):
+    """A third of |G| is far from linear: the exact region costs more; one per cent barely differs."""
+    exact, linear = (
+        solve(first_order, requirements=[lambda e, f=f, kind=kind: model_error(e, f, 2.45, kind)])
+        for f, kind in ((0.01, EllipsoidError), (0.01, ModelError))
+    )
+    check(exact)
+    assert linear.result.objective < exact.result.objective < 1.05 * linear.result.objective
 
 
 def test_application_example_of_the_peer():
@@ -339,45 +203,3 @@ def test_weighted_variance_example_of_the_peer():
     coarse = dataclasses.replace(design.problem, requirements=(OnGrid(requirement, grid),))
     answer = exchange(coarse, design.white_power * coarse.basis.even, tolerance=1e-7)
     assert answer.objective == pytest.approx(0.5692322, rel=1e-5)
-
-
-# --- families of spectra -----------------------------------------------------------------------------------
-
-
-def test_free_optimum_of_the_first_order_system(first_order):
-    """docs/errata.md: 0.1925467, one line at 0.1553."""
-    design = solve(first_order, requirements=relative(), basis=anywhere())
-    check(design)
-    assert design.result.objective == pytest.approx(0.1925467, rel=1e-6)
-    basis, x = design.result.basis, design.result.x
-    centre = np.sum(basis.frequencies * x) / x.sum()
-    assert centre == pytest.approx(0.1553, abs=1e-3)
-
-
-def test_more_lines_cost_less(first_order):
-    """Lines of a period within those of its double; all above the optimum over every spectrum."""
-    costs = [
-        solve(
-            first_order, requirements=relative(), basis=LinesBasis.at(np.pi * np.arange(1, n + 1) / n, 1)
-        ).result.objective
-        for n in (10, 20, 40, 80)
-    ]
-    assert all(fewer >= more * (1 - 1e-7) for fewer, more in itertools.pairwise(costs))
-    assert costs[-1] >= 0.1925467 * (1 - 1e-6)
-    assert costs[-1] == pytest.approx(0.1925467, rel=1e-2)
-
-
-def test_order_300(first_order):
-    design = solve(first_order, requirements=relative(), order=300)
-    check(design, 1e-7)
-    assert 0.1925467 <= design.result.objective <= 0.1942
-
-
-def test_ellipsoid_needs_more_than_the_linearisation(first_order):
-    """A third of |G| is far from linear: the exact region costs more; one per cent barely differs."""
-    exact, linear = (
-        solve(first_order, requirements=[lambda e, f=f, kind=kind: model_error(e, f, 2.45, kind)])
-        for f, kind in ((0.01, EllipsoidError), (0.01, ModelError))
-    )
-    check(exact)
-    assert linear.result.objective < exact.result.objective < 1.05 * linear.result.objective
