@@ -14,7 +14,7 @@ from inputdesign_cli.tasks.build.regression import build_regression_task
 
 
 class Task(Protocol):
-    """A question, built from a spec once (`tasks.build`); it holds objects, and functions made of the spec, never the spec.
+    """A question, built from a spec once; it holds objects, and functions made from the spec, not the spec.
 
     Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`), not its
     place in a file: the dispatch adds that (`Spec.place`).
