@@ -24,8 +24,9 @@ from pathlib import Path
 from typing import IO
 
 from inputdesign_cli.errors import Diagnostic, OutputError
+from inputdesign_cli.runs.record import RESULT
 from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import RESULT, output_errors, replace_text
+from inputdesign_cli.runs.run_directory import output_errors, replace_text
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, WORKERS = ".lock", ".workers"
@@ -82,7 +83,7 @@ class Layout:
     def clear(self) -> None:
         """Remove what killed processes left half written. Only the holder of the lock may."""
         for folder in (self.root, self.root / "points", self.root / "failures"):
-            for path in folder.glob(".*.partial-*"):
+            for path in folder.glob(".*.partial*"):
                 if path.is_dir():
                     shutil.rmtree(path, ignore_errors=True)
                 else:
