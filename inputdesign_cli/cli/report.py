@@ -27,7 +27,8 @@ def report(
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.report.render import PAGE, report_text
+        from inputdesign_cli.report.render import report_text
+        from inputdesign_cli.runs.record import PAGE
         from inputdesign_cli.runs.run_directory import replace_text
 
         file = output or directory / PAGE

@@ -127,6 +127,7 @@ def sweep(
     """
     plan = build_plan(spec, settings, zipped=zipped, verb=verb)
     with opened(directory) as layout:
+        layout.remove_page()
         replace_text(layout.root / SPEC, to_yaml(plan.data()))
         _write_summary(plan, layout, {})
         run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, figures, watch)
