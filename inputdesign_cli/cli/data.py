@@ -7,8 +7,19 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import DataFile, Figures, Json, Means, Output, Overrides, Quiet, SpecFile
-from inputdesign_cli.cli.run import keep
+from inputdesign_cli.cli.options import (
+    DataFile,
+    EstimateOutput,
+    Figures,
+    Json,
+    Means,
+    Overrides,
+    Overwrite,
+    Quiet,
+    SpecFile,
+    VerdictOutput,
+)
+from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED
 
@@ -19,7 +30,8 @@ def identify(
         Path, typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure.")
     ],
     overrides: Overrides = None,
-    output: Output = None,
+    output: EstimateOutput = None,
+    overwrite: Overwrite = False,
     remove_means: Means = False,
     figures: Figures = True,
     json_output: Json = False,
@@ -36,15 +48,16 @@ def identify(
         from inputdesign_cli.specification import load_spec
 
         results = tasks.identify(load_spec(spec, overrides or []), data, remove_means=remove_means)
-    name = f"{data.stem}_identified"
-    keep(results, output, name, figures=figures, json_output=json_output, quiet=quiet)
+    place = Place(output, f"{data.stem}_identified", [spec, data], overwrite)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def assess(
     spec: SpecFile,
     data: DataFile,
     overrides: Overrides = None,
-    output: Output = None,
+    output: VerdictOutput = None,
+    overwrite: Overwrite = False,
     remove_means: Means = False,
     figures: Figures = True,
     json_output: Json = False,
@@ -61,7 +74,7 @@ def assess(
         from inputdesign_cli.specification import load_spec
 
         assessment = tasks.assess(load_spec(spec, overrides or []), data, remove_means=remove_means)
-    name = f"{data.stem}_assessed"
-    keep(assessment.results, output, name, figures=figures, json_output=json_output, quiet=quiet)
+    place = Place(output, f"{data.stem}_assessed", [spec, data], overwrite)
+    keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
     if not assessment.met:
         raise typer.Exit(EXIT_MISSED)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputdesign_cli.cli.options import Figures, Json, Output, Overrides, Quiet, SpecFile
-from inputdesign_cli.cli.run import keep
+from inputdesign_cli.cli.options import Figures, Json, Output, Overrides, Overwrite, Quiet, SpecFile
+from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
 
@@ -20,6 +20,7 @@ def solve(
     spec: SpecFile,
     overrides: Overrides = None,
     output: Output = None,
+    overwrite: Overwrite = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -30,13 +31,15 @@ def solve(
     proof of optimality; prints a summary.
     """
     results = _results("solve", spec, overrides, quiet)
-    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+    place = Place(output, spec.stem, [spec], overwrite)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def analyse(
     spec: SpecFile,
     overrides: Overrides = None,
     output: Output = None,
+    overwrite: Overwrite = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -47,13 +50,15 @@ def analyse(
     directory and prints a summary.
     """
     results = _results("analyse", spec, overrides, quiet)
-    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+    place = Place(output, spec.stem, [spec], overwrite)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def simulate(
     spec: SpecFile,
     overrides: Overrides = None,
     output: Output = None,
+    overwrite: Overwrite = False,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
     figures: Figures = True,
@@ -67,7 +72,8 @@ def simulate(
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
     results = _results("simulate", spec, overrides, quiet, executor(jobs, cluster))
-    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+    place = Place(output, spec.stem, [spec], overwrite)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def _results(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -25,14 +25,27 @@ Overrides = Annotated[
         autocompletion=spec_keys,
     ),
 ]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Directory of the run. The default is runs/ and the name of the spec.",
-    ),
+
+
+def path_option(text: str) -> Path:
+    """The path that an option gives; an empty text (of a variable that is not set) is none."""
+    if not text.strip():
+        raise typer.BadParameter("the name is empty")
+    return Path(text)
+
+
+def _into(default: str) -> Any:
+    told = f"Directory to write. The default is {default}."
+    return typer.Option("--output", "-o", metavar="DIR", help=told, parser=path_option)
+
+
+Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]
+EstimateOutput = Annotated[Path | None, _into("runs/DATA_identified, without the ending of the file")]
+VerdictOutput = Annotated[Path | None, _into("runs/DATA_assessed, without the ending of the file")]
+SweepOutput = Annotated[Path | None, _into("runs/SPEC-sweep, without the ending of the file")]
+Overwrite = Annotated[
+    bool,
+    typer.Option("--overwrite", help="Replace a run of another spec, or one whose spec.yaml was changed."),
 ]
 Json = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")

@@ -2,34 +2,74 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.errors import Diagnostic, OutputError
 
 if TYPE_CHECKING:
     from inputdesign_cli.runs.results import Results
 
 
-def keep(
-    results: Results, output: Path | None, name: str, *, figures: bool, json_output: bool, quiet: bool
-) -> None:
-    """Write a run to `output` or else to runs/`name`, and print its result or its summary."""
-    directory = output or Path("runs") / name
+@dataclass(frozen=True)
+class Place:
+    """Where a run goes: to `output` or else to runs/`name`; what it was made from, the spec first."""
+
+    output: Path | None
+    name: str
+    sources: Sequence[Path]
+    overwrite: bool = False
+
+    @property
+    def directory(self) -> Path:
+        """The run directory."""
+        return self.output or Path("runs") / self.name
+
+
+def keep(results: Results, place: Place, *, figures: bool, json_output: bool, quiet: bool) -> None:
+    """Write a run to its place, and print its result or its summary.
+
+    Raises:
+        OutputError: as `write_run`, and `output-is-the-spec`.
+    """
+    directory = place.directory
     with status(f"{directory}: writing ...", quiet=quiet):
         from inputdesign_cli.runs.run_directory import write_run
 
+        results = _spare_the_spec(results, place)
         drawings = {}
         if figures:
             from inputdesign_cli.figures.plots import draw_all
 
             drawings = draw_all(results)
-        files = write_run(results, directory, drawings)
+        files = write_run(results, directory, drawings, sources=place.sources, overwrite=place.overwrite)
     if json_output:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         from inputdesign_cli.cli.summary import summary
 
         typer.echo(summary(results.result, results.time_unit, files))
+
+
+def _spare_the_spec(results: Results, place: Place) -> Results:
+    """The results with the user's own text where the spec is the spec.yaml of the run itself."""
+    from inputdesign_cli.runs.record import SPEC
+    from inputdesign_cli.specification import same_content
+    from inputdesign_cli.specification.yaml.files import read_text
+
+    target = place.directory / SPEC
+    if not (target.exists() and place.sources and target.samefile(place.sources[0])):
+        return results
+    text = read_text(target)
+    if not same_content(text, results.resolved_spec):
+        message = (
+            f"{target} is the spec itself, and what it includes or --set changes would be written into it"
+        )
+        hint = "choose another directory with -o, or write the changes into the file"
+        raise OutputError(Diagnostic("output-is-the-spec", message, hint))
+    return replace(results, resolved_spec=text)

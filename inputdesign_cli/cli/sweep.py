@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Json, Quiet, SpecFile
+from inputdesign_cli.cli.options import Json, Quiet, SpecFile, SweepOutput
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
 
@@ -42,15 +42,7 @@ def sweep(
     zipped: Annotated[
         bool, typer.Option("--zip", help="Take the values side by side, not in every combination.")
     ] = False,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Directory of the sweep. The default is runs/ and the name of the spec with -sweep.",
-        ),
-    ] = None,
+    output: SweepOutput = None,
     verb: Annotated[SweepVerb, typer.Option(help="The command to run at every point.")] = SweepVerb.SOLVE,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,

@@ -13,7 +13,6 @@ from inputdesign_cli.runs.record import RESULT, unreadable
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.version import __version__
 
-
 # What a record leads to that somebody else wrote or changed: no schema says what each of its numbers must be.
 _BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 

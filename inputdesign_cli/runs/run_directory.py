@@ -10,12 +10,13 @@ import errno
 import filecmp
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 
 from inputdesign_cli.errors import DataError, Diagnostic, OutputError
+from inputdesign_cli.runs.origin import check_origin, made_from
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.record import RESULT, SPEC, load_result, owned_files
 from inputdesign_cli.runs.replacing import heal, put_in_place, sync, workplace
@@ -41,7 +42,12 @@ def finished_result(results: Results) -> dict[str, Json]:
 
 
 def write_run(
-    results: Results, directory: Path, figures: Mapping[str, bytes] = MappingProxyType({})
+    results: Results,
+    directory: Path,
+    figures: Mapping[str, bytes] = MappingProxyType({}),
+    *,
+    sources: Sequence[Path] | None = None,
+    overwrite: bool = False,
 ) -> list[Path]:
     """Write a run directory and return the paths of its files, `result.json` last.
 
@@ -54,10 +60,13 @@ def write_run(
         results: what a verb of the package returned.
         directory: where to write it.
         figures: file name ("bound.png") -> content, as `figures.plots.draw_all` draws them.
+        sources: the spec and the data that the run was made from; a run of others is then not replaced.
+        overwrite: replace it all the same.
 
     Raises:
         OutputError: `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a
-            file of the user's would be overwritten).
+            file of the user's would be overwritten), `output-other-run`, `output-spec-changed`,
+            `output-busy`.
     """
     result = finished_result(results)
     target = Path(os.path.realpath(directory))
@@ -67,7 +76,11 @@ def write_run(
             hint = "choose another directory with -o"
             raise OutputError(Diagnostic("output-not-a-directory", message, hint))
         target.parent.mkdir(parents=True, exist_ok=True)
+        if sources is not None:
+            result["made_from"] = made_from(sources, target)
         with workplace(target) as work:
+            if sources is not None and not overwrite:
+                check_origin(result["made_from"], results.resolved_spec, target, shown=directory)
             names = _write_files(results, result, work / "new", figures)
             if work.parent == target:
                 owned = owned_files(target)

@@ -96,6 +96,16 @@ def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -
     return SpecTemplate(text, file, folder, tuple(overrides), tree.data)
 
 
+def same_content(one: str, other: str) -> bool:
+    """Whether two texts of a spec say the same, whatever their comments, layout and order of keys.
+
+    Raises:
+        SpecError: One of them is not YAML.
+    """
+    first, second = (read(text, "spec.yaml").data for text in (one, other))
+    return fingerprint(first) == fingerprint(second)
+
+
 def _texts(value: Plain) -> list[str]:
     """Every text in the data that could be the name of a file."""
     if isinstance(value, dict | list):

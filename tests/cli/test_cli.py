@@ -26,6 +26,7 @@ from inputdesign_cli.errors import (
     SpecError,
 )
 from inputdesign_cli.runs.results import Results, Table
+from inputdesign_cli.sweep import golden_runs
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
 GROUP = typer.main.get_command(app)
@@ -78,7 +79,7 @@ def verbs(monkeypatch):
         return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
     monkeypatch.setattr(specification, "load_spec", load_spec)
-    monkeypatch.setattr("inputdesign_cli.sweep.golden_runs.load_spec", load_spec)
+    monkeypatch.setattr(golden_runs, "load_spec", load_spec)
     for verb in ("solve", "analyse"):
         monkeypatch.setattr(tasks, verb, results)
     monkeypatch.setattr(tasks, "validate", lambda spec: None)
