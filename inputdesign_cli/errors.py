@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+STANDARD_INPUT = "-"  # in place of the name of a spec
+
 EXIT_DONE = 0
 EXIT_MISSED = 1
 EXIT_BAD_INPUT = 2

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from inputdesign_cli.cli.options import (
+    Confine,
     DataFile,
     EstimateOutput,
     Figures,
@@ -19,6 +20,7 @@ from inputdesign_cli.cli.options import (
     SpecFile,
     VerdictOutput,
 )
+from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED
@@ -30,6 +32,7 @@ def identify(
         Path, typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure.")
     ],
     overrides: Overrides = None,
+    confine: Confine = None,
     output: EstimateOutput = None,
     overwrite: Overwrite = False,
     remove_means: Means = False,
@@ -45,9 +48,8 @@ def identify(
     """
     with status(f"{data}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
-        from inputdesign_cli.specification import load_spec
 
-        results = tasks.identify(load_spec(spec, overrides or []), data, remove_means=remove_means)
+        results = tasks.identify(read_spec(spec, overrides, confine), data, remove_means=remove_means)
     place = Place(output, f"{data.stem}_identified", [spec, data], overwrite)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
@@ -56,6 +58,7 @@ def assess(
     spec: SpecFile,
     data: DataFile,
     overrides: Overrides = None,
+    confine: Confine = None,
     output: VerdictOutput = None,
     overwrite: Overwrite = False,
     remove_means: Means = False,
@@ -71,9 +74,8 @@ def assess(
     """
     with status(f"{data}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
-        from inputdesign_cli.specification import load_spec
 
-        assessment = tasks.assess(load_spec(spec, overrides or []), data, remove_means=remove_means)
+        assessment = tasks.assess(read_spec(spec, overrides, confine), data, remove_means=remove_means)
     place = Place(output, f"{data.stem}_assessed", [spec, data], overwrite)
     keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
     if not assessment.met:

@@ -9,7 +9,14 @@ import typer
 
 from inputdesign_cli.cli.completion import spec_keys
 
-SpecFile = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
+SpecFile = Annotated[
+    Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file; - is standard input.")
+]
+SpecOnDisc = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
+Confine = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Refuse a spec that names files outside DIR (links followed)."),
+]
 DataFile = Annotated[
     Path, typer.Argument(metavar="DATA", help="The record of an experiment: a CSV file with columns u and y.")
 ]

@@ -63,7 +63,8 @@ def _spare_the_spec(results: Results, place: Place) -> Results:
     from inputdesign_cli.specification.yaml.files import read_text
 
     target = place.directory / SPEC
-    if not (target.exists() and place.sources and target.samefile(place.sources[0])):
+    spec = place.sources[0]
+    if not (target.exists() and spec.exists() and target.samefile(spec)):
         return results
     text = read_text(target)
     if not same_content(text, results.resolved_spec):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Json, Quiet, SpecFile, SweepOutput
+from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
 
@@ -28,7 +28,7 @@ class SweepVerb(StrEnum):
 
 
 def sweep(
-    spec: SpecFile,
+    spec: SpecOnDisc,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -42,6 +42,7 @@ def sweep(
     zipped: Annotated[
         bool, typer.Option("--zip", help="Take the values side by side, not in every combination.")
     ] = False,
+    confine: Confine = None,
     output: SweepOutput = None,
     verb: Annotated[SweepVerb, typer.Option(help="The command to run at every point.")] = SweepVerb.SOLVE,
     jobs: Jobs = 1,
@@ -74,7 +75,12 @@ def sweep(
     from inputdesign_cli.sweep import running as batch
 
     directory = output or Path("runs") / f"{spec.stem}-sweep"
-    common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb.value}
+    common: dict[str, Any] = {
+        "directory": directory,
+        "zipped": zipped,
+        "verb": verb.value,
+        "confine": confine,
+    }
     if dry_run:
         _list(batch.list_points(spec, settings or [], **common), json_output=json_output)
         return

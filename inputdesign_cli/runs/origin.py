@@ -11,14 +11,17 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from inputdesign_cli.errors import DataError, Diagnostic, OutputError
+from inputdesign_cli.errors import STANDARD_INPUT, DataError, Diagnostic, OutputError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.record import SPEC, load_result
 
 
 def made_from(files: Sequence[Path], target: Path) -> list[str]:
-    """The paths of a spec (none if it came from standard input) and of data relative to `target`."""
-    return [os.path.relpath(os.path.realpath(file), target) for file in files]
+    """The paths of a spec (`-` if it came from standard input) and of data relative to `target`."""
+    return [
+        STANDARD_INPUT if str(file) == STANDARD_INPUT else os.path.relpath(os.path.realpath(file), target)
+        for file in files
+    ]
 
 
 def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -> None:
@@ -46,7 +49,8 @@ def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -
         raise OutputError(Diagnostic("output-spec-changed", message, hint))
     theirs = result.get("made_from")
     known = theirs if isinstance(theirs, list) else []
-    if known[1:] != ours[1:] or not (same or ours[:1] == known[:1] != [] or ours[:1] == [SPEC]):
+    same_file = ours[:1] == known[:1] and ours[0] != STANDARD_INPUT
+    if known[1:] != ours[1:] or not (same or same_file or ours[0] == SPEC):
         of = f" of {', '.join(map(str, known))} (as seen from there)" if known else " of something else"
         message = f"{shown} holds the run{of}, and would lose it"
         raise OutputError(Diagnostic("output-other-run", message, hint))

@@ -71,8 +71,8 @@ def verbs(monkeypatch):
     """Stand-ins for the verbs of the package; `calls` keeps what they were called with."""
     calls = []
 
-    def load_spec(path, overrides):
-        calls.append((path, overrides))
+    def load_spec(path, overrides, **_):
+        calls.append((path, list(overrides)))
         return path
 
     def results(spec):

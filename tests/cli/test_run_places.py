@@ -1,5 +1,6 @@
 """Where runs go: none is lost to one of another spec, and a spec that is worked on is not overwritten."""
 
+import io
 import json
 import shutil
 import sys
@@ -106,6 +107,22 @@ def test_a_spec_that_lies_in_the_directory_from_the_start(analyse, tmp_path):
     assert own.read_text() == SPEC.format("one")
     shutil.copy(own, tmp_path / "b.yaml")
     assert analyse("b.yaml", "-o", "r") == (2, "output-other-run")
+
+
+def test_a_spec_from_standard_input(analyse, tmp_path, monkeypatch):
+    def piped(text):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+        return analyse("-")
+
+    assert piped(SPEC.format("one")) == (0, "")
+    assert json.loads((tmp_path / "runs" / "stdin" / "result.json").read_text())["title"] == "one"
+    assert piped(SPEC.format("one")) == (0, "")
+    assert piped(SPEC.format("two")) == (2, "output-other-run")
+    assert piped("plant: [") == (2, "yaml-syntax")
+    assert piped("\x00")[0] == 2
+    assert piped(" " * 11 * 2**20) == (2, "file-too-large")
+    monkeypatch.setattr(sys, "stdin", None)
+    assert analyse("-") == (2, "file-unreadable")
 
 
 @pytest.mark.parametrize("name", ["", "  "])

@@ -44,6 +44,20 @@ def read_text(path: str | os.PathLike[str]) -> str:
     return decode(raw, name)
 
 
+def is_outside(path: Path, folder: Path) -> bool:
+    """Whether a file lies outside a folder, links followed."""
+    try:
+        return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+    except ValueError:
+        return True
+
+
+def outside(name: str, confine: Path, key: str, location: Location | None) -> Diagnostic:
+    """The diagnostic about a file that a spec names and may not read."""
+    message = f"{key} names {name}, which lies outside {confine}"
+    return Diagnostic("file-outside", message, "move the file there, or widen --confine", key, location)
+
+
 def decode(raw: bytes, file: str) -> str:
     """The text of UTF-8 bytes; a byte order mark is dropped.
 
