@@ -15,6 +15,7 @@ from inputdesign_cli.cli.designs import analyse, simulate, solve
 from inputdesign_cli.cli.init import init
 from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
+from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
@@ -25,7 +26,8 @@ app = typer.Typer(
     name="idesign",
     help="Optimal experiments for system identification: from a YAML file to a signal and a proof.",
     epilog="Exit codes: 0 done, 1 a golden mismatch or a missed target, 2 bad input or usage, "
-    "3 infeasible, 4 the required accuracy was not proved, 130 interrupted.",
+    "3 infeasible, 4 the required accuracy was not proved, 130 interrupted, 141 the reader of the output has "
+    "gone, 143 terminated.",
     no_args_is_help=True,
     add_completion=True,
     rich_markup_mode=None,
@@ -57,5 +59,7 @@ for command in COMMANDS:
 
 def main() -> None:
     """The `idesign` command."""
+    prepare_streams()
+    prepare_signals()
     use_one_thread()  # numpy, which reads it, has not been imported yet
     app(prog_name="idesign")

@@ -98,7 +98,7 @@ def sweep(
             figures=plots,
             watch=line,
         )
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit):  # Ctrl-C, SIGTERM
         line.close()
         if not quiet:
             typer.echo(f"what is done is in {directory}; the same command finishes the rest", err=True)
