@@ -9,7 +9,7 @@ from inputdesign_cli.cli.options import Confine, Figures, Json, Output, Override
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
-from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
+from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -65,6 +65,7 @@ def simulate(
     overwrite: Overwrite = False,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
+    worker_timeout: WorkerTimeout = None,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -75,7 +76,9 @@ def simulate(
     noise, and adds to the run directory of `solve` what the models did; prints a summary.
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
-    results = _results("simulate", spec, overrides, confine, quiet, executor(jobs, cluster))
+    results = _results(
+        "simulate", spec, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
+    )
     place = Place(output, name_of(spec), [spec], overwrite)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 

@@ -13,7 +13,7 @@ import typer
 from inputdesign_cli.cli.completion import spec_keys
 from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
-from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
+from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
@@ -47,6 +47,7 @@ def sweep(
     verb: Annotated[SweepVerb, typer.Option(help="The command to run at every point.")] = SweepVerb.SOLVE,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
+    worker_timeout: WorkerTimeout = None,
     fail_fast: Annotated[
         bool,
         typer.Option(
@@ -92,7 +93,7 @@ def sweep(
             spec,
             settings or [],
             **common,
-            executor=executor(jobs, cluster),
+            executor=executor(jobs, cluster, worker_timeout, quiet=quiet),
             fail_fast=fail_fast,
             rerun_failed=rerun_failed,
             figures=plots,
