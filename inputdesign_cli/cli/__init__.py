@@ -12,6 +12,7 @@ import typer
 from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.data import assess, identify
 from inputdesign_cli.cli.designs import analyse, simulate, solve
+from inputdesign_cli.cli.examples import examples
 from inputdesign_cli.cli.init import init
 from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
@@ -52,7 +53,21 @@ def _start(
     pass
 
 
-COMMANDS = (solve, analyse, simulate, identify, assess, sweep, report, validate, check, init, explain, schema)
+COMMANDS = (
+    solve,
+    analyse,
+    simulate,
+    identify,
+    assess,
+    sweep,
+    report,
+    validate,
+    check,
+    examples,
+    init,
+    explain,
+    schema,
+)
 for command in COMMANDS:
     app.command()(guarded(command))
 

@@ -14,6 +14,7 @@ from inputdesign_cli.cli.options import (
     Figures,
     Json,
     Means,
+    NoOutput,
     Overrides,
     Overwrite,
     Quiet,
@@ -35,6 +36,7 @@ def identify(
     confine: Confine = None,
     output: EstimateOutput = None,
     overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     remove_means: Means = False,
     figures: Figures = True,
     json_output: Json = False,
@@ -50,7 +52,7 @@ def identify(
         from inputdesign_cli import tasks
 
         results = tasks.identify(read_spec(spec, overrides, confine), data, remove_means=remove_means)
-    place = Place(output, f"{data.stem}_identified", [spec, data], overwrite)
+    place = Place(output, f"{data.stem}_identified", [spec, data], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
@@ -61,6 +63,7 @@ def assess(
     confine: Confine = None,
     output: VerdictOutput = None,
     overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     remove_means: Means = False,
     figures: Figures = True,
     json_output: Json = False,
@@ -76,7 +79,7 @@ def assess(
         from inputdesign_cli import tasks
 
         assessment = tasks.assess(read_spec(spec, overrides, confine), data, remove_means=remove_means)
-    place = Place(output, f"{data.stem}_assessed", [spec, data], overwrite)
+    place = Place(output, f"{data.stem}_assessed", [spec, data], overwrite, no_output)
     keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
     if not assessment.met:
         raise typer.Exit(EXIT_MISSED)

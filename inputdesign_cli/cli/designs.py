@@ -5,7 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputdesign_cli.cli.options import Confine, Figures, Json, Output, Overrides, Overwrite, Quiet, SpecFile
+from inputdesign_cli.cli.options import (
+    Confine,
+    Figures,
+    Json,
+    NoOutput,
+    Output,
+    Overrides,
+    Overwrite,
+    Quiet,
+    SpecFile,
+)
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
@@ -23,6 +33,7 @@ def solve(
     confine: Confine = None,
     output: Output = None,
     overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -33,7 +44,7 @@ def solve(
     proof of optimality; prints a summary.
     """
     results = _results("solve", spec, overrides, confine, quiet)
-    place = Place(output, name_of(spec), [spec], overwrite)
+    place = Place(output, name_of(spec), [spec], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
@@ -43,6 +54,7 @@ def analyse(
     confine: Confine = None,
     output: Output = None,
     overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -53,7 +65,7 @@ def analyse(
     directory and prints a summary.
     """
     results = _results("analyse", spec, overrides, confine, quiet)
-    place = Place(output, name_of(spec), [spec], overwrite)
+    place = Place(output, name_of(spec), [spec], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
@@ -63,6 +75,7 @@ def simulate(
     confine: Confine = None,
     output: Output = None,
     overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
     worker_timeout: WorkerTimeout = None,
@@ -79,7 +92,7 @@ def simulate(
     results = _results(
         "simulate", spec, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
     )
-    place = Place(output, name_of(spec), [spec], overwrite)
+    place = Place(output, name_of(spec), [spec], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 

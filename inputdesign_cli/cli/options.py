@@ -50,6 +50,9 @@ Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file
 EstimateOutput = Annotated[Path | None, _into("runs/DATA_identified, without the ending of the file")]
 VerdictOutput = Annotated[Path | None, _into("runs/DATA_assessed, without the ending of the file")]
 SweepOutput = Annotated[Path | None, _into("runs/SPEC-sweep, without the ending of the file")]
+NoOutput = Annotated[
+    bool, typer.Option("--no-output", help="Write no files; print the summary, or the result with --json.")
+]
 Overwrite = Annotated[
     bool,
     typer.Option("--overwrite", help="Replace a run of another spec, or one whose spec.yaml was changed."),

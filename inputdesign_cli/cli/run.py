@@ -24,6 +24,11 @@ class Place:
     name: str
     sources: Sequence[Path]
     overwrite: bool = False
+    nowhere: bool = False  # nothing is written
+
+    def __post_init__(self) -> None:
+        if self.nowhere and self.output is not None:
+            raise typer.BadParameter("--no-output writes nothing, and --output says where")
 
     @property
     def directory(self) -> Path:
@@ -37,6 +42,9 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
     Raises:
         OutputError: as `write_run`, and `output-is-the-spec`.
     """
+    if place.nowhere:
+        _show(results, [], json_output=json_output, quiet=quiet)
+        return
     directory = place.directory
     with status(f"{directory}: writing ...", quiet=quiet):
         from inputdesign_cli.runs.run_directory import write_run
@@ -48,8 +56,18 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
 
             drawings = draw_all(results)
         files = write_run(results, directory, drawings, sources=place.sources, overwrite=place.overwrite)
-    if json_output:
+    _show(results, files, json_output=json_output, quiet=quiet)
+
+
+def _show(results: Results, files: Sequence[Path], *, json_output: bool, quiet: bool) -> None:
+    """Print the result as it was written, if it was, or its summary."""
+    if json_output and files:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
+    elif json_output:
+        from inputdesign_cli.runs.run_directory import finished_result
+        from inputdesign_cli.runs.text_formats import json_text
+
+        typer.echo(json_text(finished_result(results)), nl=False)
     elif not quiet:
         from inputdesign_cli.cli.summary import summary
 
