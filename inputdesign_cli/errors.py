@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
+STANDARD_INPUT = "-"  # in place of the name of a spec
+
 EXIT_DONE = 0
 EXIT_MISSED = 1
 EXIT_BAD_INPUT = 2

@@ -12,9 +12,11 @@ import typer
 from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.data import assess, identify
 from inputdesign_cli.cli.designs import analyse, simulate, solve
+from inputdesign_cli.cli.examples import examples
 from inputdesign_cli.cli.init import init
 from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
+from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
@@ -25,7 +27,8 @@ app = typer.Typer(
     name="idesign",
     help="Optimal experiments for system identification: from a YAML file to a signal and a proof.",
     epilog="Exit codes: 0 done, 1 a golden mismatch or a missed target, 2 bad input or usage, "
-    "3 infeasible, 4 the required accuracy was not proved, 130 interrupted.",
+    "3 infeasible, 4 the required accuracy was not proved, 130 interrupted, 141 the reader of the output has "
+    "gone, 143 terminated.",
     no_args_is_help=True,
     add_completion=True,
     rich_markup_mode=None,
@@ -50,12 +53,28 @@ def _start(
     pass
 
 
-COMMANDS = (solve, analyse, simulate, identify, assess, sweep, report, validate, check, init, explain, schema)
+COMMANDS = (
+    solve,
+    analyse,
+    simulate,
+    identify,
+    assess,
+    sweep,
+    report,
+    validate,
+    check,
+    examples,
+    init,
+    explain,
+    schema,
+)
 for command in COMMANDS:
     app.command()(guarded(command))
 
 
 def main() -> None:
     """The `idesign` command."""
+    prepare_streams()
+    prepare_signals()
     use_one_thread()  # numpy, which reads it, has not been imported yet
     app(prog_name="idesign")

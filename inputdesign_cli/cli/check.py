@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inputdesign_cli.cli.examples import shipped
 from inputdesign_cli.cli.options import Json, Quiet
 from inputdesign_cli.cli.terminal import aligned, status
-from inputdesign_cli.errors import EXIT_MISSED, DataError, Diagnostic
+from inputdesign_cli.errors import EXIT_MISSED, DataError, IdesignError
 
 if TYPE_CHECKING:
     from inputdesign_cli.runs.golden import Row
@@ -22,7 +24,10 @@ HEADER = ("", "run", "quantity", "computed", "expected", "deviation", "tolerance
 def check(
     files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[GOLDEN]...", help="Golden files; the default is golden/*.yaml."),
+        typer.Argument(
+            metavar="[GOLDEN]...",
+            help="Golden files; the default is golden/*.yaml, or else those of the package.",
+        ),
     ] = None,
     junit: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a JUnit report for a CI server too.")
@@ -35,22 +40,20 @@ def check(
     Runs the specs that the golden files name. Prints computed and expected values with their deviation,
     tolerance and source; exits with 1 if a value lies outside its tolerance.
     """
-    from inputdesign_cli.runs.golden import compare
-    from inputdesign_cli.runs.golden_file import load_golden
-    from inputdesign_cli.sweep.verbs import execute
-
     rows: list[Row] = []
-    for golden in [load_golden(path) for path in files or _default_files()]:
-        results = {}
-        for run in golden.runs:
-            with status(f"{golden.file}: {run.name} ...", quiet=quiet):
-                results[run.name] = execute(golden, run)
-        rows += compare(golden, results)
+    seconds: dict[tuple[str, str], float] = {}
+    stopped: IdesignError | None = None
+    try:
+        _compare(files or _default_files(), rows, seconds, quiet=quiet)
+    except IdesignError as error:
+        stopped = error
     if junit is not None:
         from inputdesign_cli.cli.junit import junit_text
         from inputdesign_cli.runs.run_directory import write_text
 
-        write_text(junit, junit_text(rows))
+        write_text(junit, junit_text(rows, seconds, stopped))
+    if stopped is not None:
+        raise stopped
     failed = sum(not row.passed for row in rows)
     if json_output:
         content = {"passed": failed == 0, "rows": [row.as_dict() for row in rows]}
@@ -62,12 +65,34 @@ def check(
         raise typer.Exit(EXIT_MISSED)
 
 
+def _compare(
+    files: Sequence[Path], rows: list[Row], seconds: dict[tuple[str, str], float], *, quiet: bool
+) -> None:
+    """Run what the golden files name; rows and times are added file by file.
+
+    Raises:
+        IdesignError: a file, or a spec that it names, is not good.
+    """
+    from inputdesign_cli.runs.golden import compare
+    from inputdesign_cli.runs.golden_file import load_golden
+    from inputdesign_cli.sweep.verbs import execute
+
+    for golden in [load_golden(path) for path in files]:
+        results = {}
+        for run in golden.runs:
+            started = time.perf_counter()
+            with status(f"{golden.file}: {run.name} ...", quiet=quiet):
+                results[run.name] = execute(golden, run)
+            seconds[golden.file.stem, run.name] = time.perf_counter() - started
+        rows += compare(golden, results)
+
+
 def _default_files() -> list[Path]:
-    found = sorted(Path("golden").glob("*.yaml"))
+    """Those of the current folder, or else those that come with the package."""
+    found = sorted(Path("golden").glob("*.yaml")) or sorted((shipped() / "golden").glob("*.yaml"))
     if not found:
-        message = "there is no golden/*.yaml in the current folder, and idesign installs none"
-        hint = "name golden files, or run this in a checkout of the project"
-        raise DataError(Diagnostic("golden-missing", message, hint))
+        message = "there is no golden/*.yaml in the current folder, and this installation has none"
+        raise DataError.because("golden-missing", message, "name golden files")
     return found
 
 

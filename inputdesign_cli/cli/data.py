@@ -7,8 +7,22 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import DataFile, Figures, Json, Means, Output, Overrides, Quiet, SpecFile
-from inputdesign_cli.cli.run import keep
+from inputdesign_cli.cli.options import (
+    Confine,
+    DataFile,
+    EstimateOutput,
+    Figures,
+    Json,
+    Means,
+    NoOutput,
+    Overrides,
+    Overwrite,
+    Quiet,
+    SpecFile,
+    VerdictOutput,
+)
+from inputdesign_cli.cli.reading import read_spec
+from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED
 
@@ -19,7 +33,10 @@ def identify(
         Path, typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure.")
     ],
     overrides: Overrides = None,
-    output: Output = None,
+    confine: Confine = None,
+    output: EstimateOutput = None,
+    overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     remove_means: Means = False,
     figures: Figures = True,
     json_output: Json = False,
@@ -33,18 +50,20 @@ def identify(
     """
     with status(f"{data}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
-        from inputdesign_cli.specification import load_spec
 
-        results = tasks.identify(load_spec(spec, overrides or []), data, remove_means=remove_means)
-    name = f"{data.stem}_identified"
-    keep(results, output, name, figures=figures, json_output=json_output, quiet=quiet)
+        results = tasks.identify(read_spec(spec, overrides, confine), data, remove_means=remove_means)
+    place = Place(output, f"{data.stem}_identified", [spec, data], overwrite, no_output)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def assess(
     spec: SpecFile,
     data: DataFile,
     overrides: Overrides = None,
-    output: Output = None,
+    confine: Confine = None,
+    output: VerdictOutput = None,
+    overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     remove_means: Means = False,
     figures: Figures = True,
     json_output: Json = False,
@@ -58,10 +77,9 @@ def assess(
     """
     with status(f"{data}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
-        from inputdesign_cli.specification import load_spec
 
-        assessment = tasks.assess(load_spec(spec, overrides or []), data, remove_means=remove_means)
-    name = f"{data.stem}_assessed"
-    keep(assessment.results, output, name, figures=figures, json_output=json_output, quiet=quiet)
+        assessment = tasks.assess(read_spec(spec, overrides, confine), data, remove_means=remove_means)
+    place = Place(output, f"{data.stem}_assessed", [spec, data], overwrite, no_output)
+    keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
     if not assessment.met:
         raise typer.Exit(EXIT_MISSED)

@@ -5,10 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inputdesign_cli.cli.options import Figures, Json, Output, Overrides, Quiet, SpecFile
-from inputdesign_cli.cli.run import keep
+from inputdesign_cli.cli.options import (
+    Confine,
+    Figures,
+    Json,
+    NoOutput,
+    Output,
+    Overrides,
+    Overwrite,
+    Quiet,
+    SpecFile,
+)
+from inputdesign_cli.cli.reading import name_of, read_spec
+from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
-from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
+from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -19,7 +30,10 @@ if TYPE_CHECKING:
 def solve(
     spec: SpecFile,
     overrides: Overrides = None,
+    confine: Confine = None,
     output: Output = None,
+    overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -29,14 +43,18 @@ def solve(
     Writes a run directory with the spectrum, the signal to apply, the model error that it buys, and the
     proof of optimality; prints a summary.
     """
-    results = _results("solve", spec, overrides, quiet)
-    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+    results = _results("solve", spec, overrides, confine, quiet)
+    place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def analyse(
     spec: SpecFile,
     overrides: Overrides = None,
+    confine: Confine = None,
     output: Output = None,
+    overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -46,16 +64,21 @@ def analyse(
     Nothing is optimised: the excitation stands in the spec under `spectrum.given`. Writes a run
     directory and prints a summary.
     """
-    results = _results("analyse", spec, overrides, quiet)
-    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+    results = _results("analyse", spec, overrides, confine, quiet)
+    place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def simulate(
     spec: SpecFile,
     overrides: Overrides = None,
+    confine: Confine = None,
     output: Output = None,
+    overwrite: Overwrite = False,
+    no_output: NoOutput = False,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
+    worker_timeout: WorkerTimeout = None,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -66,16 +89,23 @@ def simulate(
     noise, and adds to the run directory of `solve` what the models did; prints a summary.
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
-    results = _results("simulate", spec, overrides, quiet, executor(jobs, cluster))
-    keep(results, output, spec.stem, figures=figures, json_output=json_output, quiet=quiet)
+    results = _results(
+        "simulate", spec, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
+    )
+    place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def _results(
-    verb: Verb, file: Path, overrides: list[str] | None, quiet: bool, executor: Executor | None = None
+    verb: Verb,
+    file: Path,
+    overrides: list[str] | None,
+    confine: Path | None,
+    quiet: bool,
+    executor: Executor | None = None,
 ) -> Results:
     """What a verb makes of a spec file; the numerical libraries are imported behind the message."""
     with status(f"{file}: computing ...", quiet=quiet):
-        from inputdesign_cli.specification import load_spec
         from inputdesign_cli.sweep.verbs import run_verb
 
-        return run_verb(verb, load_spec(file, overrides or []), executor)
+        return run_verb(verb, read_spec(file, overrides, confine), executor)

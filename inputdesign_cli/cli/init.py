@@ -9,7 +9,9 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.errors import Diagnostic, OutputError
+from inputdesign_cli.errors import OutputError
+
+SCHEMA = "idesign.schema.json"
 
 
 class Kind(StrEnum):
@@ -32,15 +34,21 @@ def init(
 ) -> None:
     """Write a commented starter spec.
 
-    It is complete: `idesign solve` runs it as it is.
+    It is complete: `idesign solve` runs it as it is. Beside FILE stands idesign.schema.json afterwards, from
+    which editors complete and check the spec.
     """
-    text = (resources.files(__package__) / "starters" / f"{kind.value}.yaml").read_text(encoding="utf-8")
+    text = f"# yaml-language-server: $schema={SCHEMA}\n" + (
+        resources.files(__package__) / "starters" / f"{kind.value}.yaml"
+    ).read_text(encoding="utf-8")
     if file is None:
         typer.echo(text, nl=False)
         return
     if file.exists() and not force:
         hint = "choose another name, or overwrite it with --force"
-        raise OutputError(Diagnostic("output-exists", f"{file} exists already", hint))
+        raise OutputError.because("output-exists", f"{file} exists already", hint)
+    from inputdesign_cli.cli.reference import schema_text
     from inputdesign_cli.runs.run_directory import write_text
 
     write_text(file, text)
+    if not (file.parent / SCHEMA).exists():
+        write_text(file.parent / SCHEMA, schema_text())

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
 
-SpecFile = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
+SpecFile = Annotated[
+    Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file; - is standard input.")
+]
+SpecOnDisc = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
+Confine = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Refuse a spec that names files outside DIR (links followed)."),
+]
 DataFile = Annotated[
     Path, typer.Argument(metavar="DATA", help="The record of an experiment: a CSV file with columns u and y.")
 ]
@@ -25,14 +32,30 @@ Overrides = Annotated[
         autocompletion=spec_keys,
     ),
 ]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Directory of the run. The default is runs/ and the name of the spec.",
-    ),
+
+
+def path_option(text: str) -> Path:
+    """The path that an option gives; an empty text (of a variable that is not set) is none."""
+    if not text.strip():
+        raise typer.BadParameter("the name is empty")
+    return Path(text)
+
+
+def _into(default: str) -> Any:
+    told = f"Directory to write. The default is {default}."
+    return typer.Option("--output", "-o", metavar="DIR", help=told, parser=path_option)
+
+
+Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]
+EstimateOutput = Annotated[Path | None, _into("runs/DATA_identified, without the ending of the file")]
+VerdictOutput = Annotated[Path | None, _into("runs/DATA_assessed, without the ending of the file")]
+SweepOutput = Annotated[Path | None, _into("runs/SPEC-sweep, without the ending of the file")]
+NoOutput = Annotated[
+    bool, typer.Option("--no-output", help="Write no files; print the summary, or the result with --json.")
+]
+Overwrite = Annotated[
+    bool,
+    typer.Option("--overwrite", help="Replace a run of another spec, or one whose spec.yaml was changed."),
 ]
 Json = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")

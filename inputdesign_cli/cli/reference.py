@@ -37,6 +37,11 @@ def schema() -> None:
 
     Editors use it for completion and for checks while you type.
     """
+    typer.echo(schema_text(), nl=False)
+
+
+def schema_text() -> str:
+    """The JSON schema of a spec as the text of a file."""
     from inputdesign_cli.specification import json_schema
 
-    typer.echo(json.dumps(json_schema(), indent=1, ensure_ascii=False))
+    return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Quiet
+from inputdesign_cli.cli.options import Quiet, path_option
 from inputdesign_cli.cli.terminal import status
 
 
@@ -16,7 +16,11 @@ def report(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", metavar="FILE", help="The file to write. The default is report.html in RUN."
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="The file to write. The default is report.html in RUN.",
+            parser=path_option,
         ),
     ] = None,
     quiet: Quiet = False,
@@ -27,7 +31,8 @@ def report(
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.report.render import PAGE, report_text
+        from inputdesign_cli.report.render import report_text
+        from inputdesign_cli.runs.record import PAGE
         from inputdesign_cli.runs.run_directory import replace_text
 
         file = output or directory / PAGE

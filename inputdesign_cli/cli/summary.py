@@ -33,7 +33,7 @@ def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
         *_named("proved", proofs(result)),
         *_simulated(result),
         *(("note", text) for text in result.get("notes", [])),
-        ("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}"),
+        *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
     ]
     title = result.get("title")
     return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Json, Quiet, SpecFile
+from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
-from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
+from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
@@ -28,7 +28,7 @@ class SweepVerb(StrEnum):
 
 
 def sweep(
-    spec: SpecFile,
+    spec: SpecOnDisc,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -42,18 +42,12 @@ def sweep(
     zipped: Annotated[
         bool, typer.Option("--zip", help="Take the values side by side, not in every combination.")
     ] = False,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="DIR",
-            help="Directory of the sweep. The default is runs/ and the name of the spec with -sweep.",
-        ),
-    ] = None,
+    confine: Confine = None,
+    output: SweepOutput = None,
     verb: Annotated[SweepVerb, typer.Option(help="The command to run at every point.")] = SweepVerb.SOLVE,
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
+    worker_timeout: WorkerTimeout = None,
     fail_fast: Annotated[
         bool,
         typer.Option(
@@ -82,7 +76,12 @@ def sweep(
     from inputdesign_cli.sweep import running as batch
 
     directory = output or Path("runs") / f"{spec.stem}-sweep"
-    common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb.value}
+    common: dict[str, Any] = {
+        "directory": directory,
+        "zipped": zipped,
+        "verb": verb.value,
+        "confine": confine,
+    }
     if dry_run:
         _list(batch.list_points(spec, settings or [], **common), json_output=json_output)
         return
@@ -94,13 +93,13 @@ def sweep(
             spec,
             settings or [],
             **common,
-            executor=executor(jobs, cluster),
+            executor=executor(jobs, cluster, worker_timeout, quiet=quiet),
             fail_fast=fail_fast,
             rerun_failed=rerun_failed,
             figures=plots,
             watch=line,
         )
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit):  # Ctrl-C, SIGTERM
         line.close()
         if not quiet:
             typer.echo(f"what is done is in {directory}; the same command finishes the rest", err=True)

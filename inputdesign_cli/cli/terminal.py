@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
-from inputdesign_cli.errors import EXIT_INTERRUPTED, IdesignError
+from inputdesign_cli.errors import EXIT_INTERRUPTED, Diagnostic, IdesignError, OutputError
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 EXIT_INTERNAL = 70  # EX_SOFTWARE of sysexits.h
-EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
 _ENDLESS = 100_000  # characters of a line that nobody sees whole
 
 
@@ -35,42 +34,59 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     @wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
         try:
-            _run(command, *args, **kwargs)
-            sys.stdout.flush()
-        except BrokenPipeError:
-            # The reader has gone. What is still in the buffer goes nowhere, or Python would complain
-            # about it on its way out.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(EXIT_PIPE) from None
+            command(*args, **kwargs)
+        except (typer.Exit, typer.Abort, typer.BadParameter):
+            raise
+        except IdesignError as error:
+            raise typer.Exit(_told(error, as_data=kwargs.get("json_output", False))) from None
+        except KeyboardInterrupt:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+        except (OSError, MemoryError) as error:
+            _trace()
+            refused = OutputError(_refusal(error))
+            raise typer.Exit(_told(refused, as_data=kwargs.get("json_output", False))) from None
+        except Exception as error:
+            _trace()
+            typer.echo(
+                f"internal error: {type(error).__name__}: {error}\n"
+                "This is a mistake in idesign, not in your spec. Please report it with the spec and with "
+                "what IDESIGN_DEBUG=1 prints.",
+                err=True,
+            )
+            raise typer.Exit(EXIT_INTERNAL) from None
+        sys.stdout.flush()
 
     return run
 
 
-def _run(command: Callable[..., None], *args: Any, **kwargs: Any) -> None:
-    try:
-        command(*args, **kwargs)
-    except (typer.Exit, typer.Abort, typer.BadParameter, BrokenPipeError):
-        raise
-    except IdesignError as error:
-        from inputdesign_cli.diagnostics import as_json, render
+def _told(error: IdesignError, *, as_data: bool) -> int:
+    """Tell an error, on stdout too if that is to be data; its exit code."""
+    from inputdesign_cli.diagnostics import as_json, render
 
-        if kwargs.get("json_output"):
-            typer.echo(json.dumps({"errors": as_json(error)}, indent=1, ensure_ascii=False))
-        typer.echo(render(error, color=colourful(sys.stderr)).rstrip("\n"), err=True)
-        raise typer.Exit(error.exit_code) from None
-    except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    except Exception as error:
-        if os.environ.get("IDESIGN_DEBUG") == "1":
-            traceback.print_exc()
-        typer.echo(
-            f"internal error: {type(error).__name__}: {error}\n"
-            "This is a mistake in idesign, not in your spec. Please report it with the spec and with what "
-            "IDESIGN_DEBUG=1 prints.",
-            err=True,
+    if as_data:
+        typer.echo(json.dumps({"errors": as_json(error)}, indent=1, ensure_ascii=False))
+    typer.echo(render(error, color=colourful(sys.stderr)).rstrip("\n"), err=True)
+    return error.exit_code
+
+
+def _refusal(error: OSError | MemoryError) -> Diagnostic:
+    """What the operating system refuses to the whole program."""
+    if isinstance(error, MemoryError):
+        return Diagnostic(
+            "system-refuses", "there is not enough memory", "shorten the record or lower the order"
         )
-        raise typer.Exit(EXIT_INTERNAL) from None
+    try:
+        os.getcwd()
+    except OSError:
+        return Diagnostic("system-refuses", "the current folder has been removed", "change to another one")
+    about = f": {error.filename}" if error.filename else ""
+    return Diagnostic("system-refuses", f"{error.strerror or error}{about}", "mend that, and try again")
+
+
+def _trace() -> None:
+    if os.environ.get("IDESIGN_DEBUG") == "1":
+        traceback.print_exc()
 
 
 def colourful(stream: TextIO) -> bool:

@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
-from inputdesign_cli.cli.options import Json, Overrides, Quiet
+from inputdesign_cli.cli.options import Confine, Json, Overrides, Quiet
+from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.errors import IdesignError
 
 
 def validate(
     specs: Annotated[list[Path], typer.Argument(metavar="SPEC...", help="The specs to check, YAML files.")],
     overrides: Overrides = None,
+    confine: Confine = None,
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -22,13 +24,12 @@ def validate(
 
     A valid spec can be read and is well posed. All problems of all files are reported at once.
     """
-    from inputdesign_cli.specification import load_spec
     from inputdesign_cli.tasks import validate as check
 
     errors: list[IdesignError] = []
     for path in specs:
         try:
-            check(load_spec(path, overrides or []))
+            check(read_spec(path, overrides, confine))
         except IdesignError as error:
             errors.append(error)
         else:

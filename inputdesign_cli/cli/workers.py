@@ -16,18 +16,31 @@ Jobs = Annotated[
 ClusterAddress = Annotated[
     str | None,
     typer.Option(
-        "--cluster", metavar="ADDRESS", help="Compute on the Dask cluster at this address (tcp://HOST:PORT)."
+        "--cluster",
+        metavar="ADDRESS",
+        help="Compute on the Dask cluster at this address, tcp://HOST:PORT or tls://HOST:PORT. Without TLS "
+        "anybody who reaches it can run programs there and here (docs/security.md).",
+    ),
+]
+WorkerTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--worker-timeout",
+        metavar="SECONDS",
+        min=0.0,
+        help="Give up when the cluster has been without workers for so long; the default is to wait.",
     ),
 ]
 
 
-def executor(jobs: int, cluster: str | None) -> Executor:
-    """What the two options ask for; an address comes first."""
+def executor(jobs: int, cluster: str | None, worker_timeout: float | None, *, quiet: bool) -> Executor:
+    """What the options ask for; an address comes first."""
     from inputdesign_cli.compute.cluster import Cluster
     from inputdesign_cli.compute.executor import InProcess
     from inputdesign_cli.compute.processes import Processes
 
     if cluster is not None:
-        return Cluster(cluster)
+        tell = (lambda text: None) if quiet else (lambda text: typer.echo(text, err=True))
+        return Cluster(cluster, worker_timeout=worker_timeout, tell=tell)
     count = jobs or len(os.sched_getaffinity(0))
     return Processes(count) if count > 1 else InProcess()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +15,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.version import __version__
 
 _AHEAD = 2  # jobs on their way for each thread of the cluster
+_TICK = 2.0  # seconds after which it is asked whether there still are workers
 
 
 @dataclass(frozen=True)
@@ -26,43 +28,62 @@ class Cluster:
 
     address: str
     patience: float = 10.0  # seconds to find the scheduler, and a first worker
+    worker_timeout: float | None = None  # seconds without any worker before the work is given up
+    tell: Callable[[str], None] = field(default=lambda text: None)  # what a user should know meanwhile
     shares_files: bool = field(default=False, init=False)
 
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer, in the order in which they are finished.
 
         Raises:
-            DataError: `cluster-extra`, `cluster-unreachable`, `cluster-version`.
+            DataError: `cluster-extra`, `cluster-unreachable`, `cluster-version`, `cluster-no-workers`.
         """
         with self._client() as client:
-            from distributed import as_completed
             from distributed.scheduler import KilledWorker
 
             source = iter(jobs)
-            known: dict[str, Job] = {}
-            running = as_completed(loop=client.loop)
+            known: dict[Any, Job] = {}
             while True:
                 with _reaching(self.address):
                     free = _AHEAD * _threads(client) - len(known)
                 for job in _take(source, free):
                     with _reaching(self.address):
-                        future = client.submit(function, job, pure=False)
-                        known[future.key] = job
-                        running.add(future)
+                        known[client.submit(function, job, pure=False)] = job
                 if not known:
                     return
-                with _reaching(self.address):
-                    future = next(running)
-                    if future.cancelled():
-                        raise CancelledError
-                    error = future.exception()
-                job = known.pop(future.key)
-                if isinstance(error, KilledWorker):
-                    error = WorkerLostError(
-                        f"the workers that were given it ended in the middle of it: {error}"
+                for future in self._finished(client, list(known)):
+                    job = known.pop(future)
+                    with _reaching(self.address):
+                        error = future.exception()
+                    if isinstance(error, KilledWorker):
+                        lost = f"the workers that were given it ended in the middle of it: {error}"
+                        error = WorkerLostError(lost)
+                    yield Finished(job, None if error else future.result(), error)
+                    future.release()
+
+    def _finished(self, client: Any, futures: list[Any]) -> Iterable[Any]:
+        """Those that are finished, one at least; while there are no workers it says so, and waits."""
+        from distributed import wait
+
+        alone_since = None
+        while True:
+            with _reaching(self.address), suppress(TimeoutError), client.as_current():
+                return wait(futures, timeout=_TICK, return_when="FIRST_COMPLETED").done
+            with _reaching(self.address):
+                workers = client.nthreads()
+            if workers:
+                alone_since = None
+            elif alone_since is None:
+                alone_since = time.monotonic()
+                self.tell(f"no workers at {self.address}; waiting")
+            if alone_since is not None and self.worker_timeout is not None:
+                alone = time.monotonic() - alone_since
+                if alone > self.worker_timeout:
+                    message = f"the cluster at {self.address} has had no workers for {alone:.0f} seconds"
+                    hint = (
+                        "start workers (`dask worker ADDRESS --nthreads 1`), then give the same command again"
                     )
-                yield Finished(job, None if error else future.result(), error)
-                future.release()
+                    raise DataError.because("cluster-no-workers", message, hint)
 
     @contextmanager
     def _client(self) -> Iterator[Any]:

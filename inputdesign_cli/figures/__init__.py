@@ -1,1 +1,6 @@
 """What a reader looks at: figures of a run."""
+
+import logging
+
+# That its cache cannot be written is no news for the user: it takes another place by itself.
+logging.getLogger("matplotlib").setLevel(logging.ERROR)

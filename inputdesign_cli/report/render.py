@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Callable
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
+from inputdesign_cli.runs.record import RESULT, unreadable
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.version import __version__
 
-PAGE = "report.html"
+# What a record leads to that somebody else wrote or changed: no schema says what each of its numbers must be.
+_BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
 
 
 def report_text(directory: Path) -> str:
@@ -21,16 +24,21 @@ def report_text(directory: Path) -> str:
         DataError: `run-missing`, `run-incomplete`, `run-unreadable`.
     """
     if (directory / "sweep.json").is_file():
-        return _filled("sweep.html", directory, sweep_page(directory))
-    if (directory / "result.json").is_file():
-        return _filled("run.html", directory, run_page(directory))
+        return _filled("sweep.html", directory, "sweep.csv", sweep_page)
+    if (directory / RESULT).is_file():
+        return _filled("run.html", directory, RESULT, run_page)
     message = f"{directory} holds neither a finished run nor a sweep"
     hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
     raise DataError.because("run-missing", message, hint)
 
 
-def _filled(template: str, directory: Path, content: Mapping[str, Json]) -> str:
-    """A template with its content; whatever text comes from a spec or a result is escaped."""
+def _filled(
+    template: str, directory: Path, record: str, content_of: Callable[[Path], dict[str, Json]]
+) -> str:
+    """A template with its content; whatever text comes from a spec or a result is escaped.
+
+    The page carries the SHA-256 of the file `record`, which tells whether it is about what stands beside it.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -41,4 +49,10 @@ def _filled(template: str, directory: Path, content: Mapping[str, Json]) -> str:
         lstrip_blocks=True,
     )
     page = environment.get_template(template)
-    return page.render(version=__version__, source=directory.name or directory.resolve().name, **content)
+    try:
+        digest = hashlib.sha256((directory / record).read_bytes()).hexdigest()
+        content = content_of(directory)
+        source = directory.name or directory.resolve().name
+        return page.render(version=__version__, source=source, record=record, digest=digest, **content)
+    except _BROKEN as error:
+        raise unreadable(directory / record, f"{type(error).__name__}: {error}") from error

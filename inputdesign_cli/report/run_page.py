@@ -31,7 +31,7 @@ _SECTIONS = (
 )
 _OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound")
 _OF_RUNS = ("errors_", "cloud_", "disturbance_")
-_NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256"})
+_NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "made_from"})
 _MOST_ENTRIES = 16
 _COMMANDS = {
     "assess": "idesign assess spec.yaml DATA",

@@ -28,7 +28,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, ValidationError
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.models.fields import FileName, Number, Positive, Text
+from inputdesign_cli.specification.models.fields import FileName, Number, Positive, Several, Text
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
 from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.section import Section
@@ -89,12 +89,12 @@ class GoldenRun(Section):
     spec: FileName
     command: Literal["solve", "analyse", "simulate"] = "solve"
     overrides: tuple[Text, ...] = ()
-    quantities: tuple[Quantity, ...]
+    quantities: Several[Quantity]
 
 
 class _Content(Section):
     title: Text = ""
-    runs: tuple[GoldenRun, ...]
+    runs: Several[GoldenRun]
 
     def check(self) -> Iterator[PathDiagnostic]:
         """The names of the runs differ."""

@@ -9,7 +9,7 @@ from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.schema import json_schema
-from inputdesign_cli.specification.template import SpecTemplate, read_template
+from inputdesign_cli.specification.template import SpecTemplate, read_template, same_content
 
 __all__ = [
     "ClosedLoopError",
@@ -25,4 +25,5 @@ __all__ = [
     "load_spec",
     "parse_spec",
     "read_template",
+    "same_content",
 ]

@@ -16,6 +16,7 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
+from inputdesign_cli.specification.named_files import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.overrides import compose
 from inputdesign_cli.specification.yaml.places import Path, Places, Source
@@ -28,12 +29,15 @@ _STAND_IN: dict[str, dict[str, Plain]] = {"plant": {"B": [0, 1]}, "noise": {"var
 _MOST_ROUNDS = 50
 
 
-def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Spec:
+def load_spec(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), *, confine: FilePath | None = None
+) -> Spec:
     """Read a spec file.
 
     Args:
         path: The YAML file.
         overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
+        confine: The folder outside of which the spec may name no files.
 
     Returns:
         The checked spec, with defaults filled in.
@@ -41,11 +45,17 @@ def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Sp
     Raises:
         SpecError: With one diagnostic for everything that is wrong, in the order of the file.
     """
-    return parse_spec(read_text(path), os.fspath(path), overrides, folder=FilePath(path).parent)
+    folder = FilePath(path).parent
+    return parse_spec(read_text(path), os.fspath(path), overrides, folder=folder, confine=confine)
 
 
 def parse_spec(
-    text: str, file: str = "<spec>", overrides: Sequence[str] = (), *, folder: FilePath | None = None
+    text: str,
+    file: str = "<spec>",
+    overrides: Sequence[str] = (),
+    *,
+    folder: FilePath | None = None,
+    confine: FilePath | None = None,
 ) -> Spec:
     """Read a spec from its text, as `load_spec` does from a file.
 
@@ -54,12 +64,13 @@ def parse_spec(
         file: The name in diagnostics.
         overrides: As for `load_spec`.
         folder: What the paths in the spec are relative to (default: the current folder).
+        confine: As for `load_spec`.
 
     Raises:
         SpecError: As `load_spec`.
     """
     folder = folder or FilePath()
-    tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder)
+    tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine)
     spec, found = _validate(tree)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
@@ -69,8 +80,12 @@ def parse_spec(
     return spec
 
 
-def read_tree(text: str, file: str, overrides: Sequence[str], folder: FilePath) -> Tree:
+def read_tree(
+    text: str, file: str, overrides: Sequence[str], folder: FilePath, confine: FilePath | None = None
+) -> Tree:
     """The plain data of a spec with what it includes and the overrides, not yet checked.
+
+    A file that lies outside `confine` is a diagnostic of the tree.
 
     Raises:
         SpecError: The text is no mapping in YAML, or a file cannot be included.
@@ -84,7 +99,9 @@ def read_tree(text: str, file: str, overrides: Sequence[str], folder: FilePath) 
             "`idesign init` writes a spec to start from",
             location=tree.places.location(tree.places.mark(())) or Location(file, 1, 1),
         )
-    compose(tree, folder, overrides)
+    compose(tree, folder, overrides, known=Spec.model_fields.keys(), confine=confine)
+    if confine is not None:
+        keep_inside(tree, folder, confine)
     return tree
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.include import KEY
 from inputdesign_cli.specification.yaml.plain import Plain
+from inputdesign_cli.version import __version__
 
 
 def json_schema() -> dict[str, Plain]:
@@ -21,6 +22,7 @@ def json_schema() -> dict[str, Plain]:
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": [KEY]}]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:inputdesign-cli:spec:{__version__}",
         "title": "idesign experiment design",
         **{key: value for key, value in schema.items() if key != "title"},
     }

@@ -16,7 +16,8 @@ from inputdesign_cli.specification.loading import parse_spec, read_tree
 from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
-from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.named_files import named_files
+from inputdesign_cli.specification.yaml.files import is_outside, read_text
 from inputdesign_cli.specification.yaml.overrides import apply_overrides
 from inputdesign_cli.specification.yaml.places import Places
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -26,13 +27,18 @@ from inputdesign_cli.specification.yaml.writer import fingerprint
 
 @dataclass(frozen=True)
 class SpecTemplate:
-    """The text of a spec, where it came from, the overrides that hold for all variants, and their data."""
+    """The text of a spec, where it came from, the overrides that hold for all variants, and their data.
+
+    `included` are files whose blocks are in the data; outside `confine` the spec may name no files.
+    """
 
     text: str
     file: str
     folder: FilePath
     overrides: tuple[str, ...]
     data: dict[str, Plain]
+    included: tuple[str, ...] = ()
+    confine: FilePath | None = None
 
     def spec(self, overrides: Sequence[str]) -> Spec:
         """The checked spec of one variant, without the `sweep` block.
@@ -41,7 +47,7 @@ class SpecTemplate:
             SpecError: As `load_spec`.
         """
         every = [*self.overrides, *overrides, "sweep=null"]
-        return parse_spec(self.text, self.file, every, folder=self.folder)
+        return parse_spec(self.text, self.file, every, folder=self.folder, confine=self.confine)
 
     def variant(self, overrides: Sequence[str]) -> dict[str, Plain]:
         """The plain data of one variant, without the `sweep` block; nothing is checked but the overrides.
@@ -61,8 +67,9 @@ class SpecTemplate:
         return fingerprint({"spec": data, "files": contents} if contents else data)
 
     def files(self, data: dict[str, Plain]) -> list[str]:
-        """The texts of a variant that name files which are there, as the spec writes them."""
-        return sorted({name for name in _texts(data) if (self.folder / name).is_file()})
+        """The files that a variant names, is free to name and finds, as it writes them."""
+        named = {name for _, name in named_files(data) if os.path.isfile(self.folder / name)}
+        return sorted(n for n in named if not (self.confine and is_outside(self.folder / n, self.confine)))
 
     def sweep(self) -> Sweep | None:
         """The `sweep` block, checked; None where there is none.
@@ -81,7 +88,9 @@ class SpecTemplate:
             raise SpecError([one.placed(places, "the spec") for one in absolute]) from None
 
 
-def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> SpecTemplate:
+def read_template(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), *, confine: FilePath | None = None
+) -> SpecTemplate:
     """Read a spec file with `overrides` applied, and check nothing yet.
 
     Raises:
@@ -90,15 +99,17 @@ def read_template(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -
     """
     text, file = read_text(path), os.fspath(path)
     folder = FilePath(path).parent
-    tree = read_tree(text, file, overrides, folder)
+    tree = read_tree(text, file, overrides, folder, confine)
     if tree.diagnostics:
         raise SpecError(tree.diagnostics)
-    return SpecTemplate(text, file, folder, tuple(overrides), tree.data)
+    return SpecTemplate(text, file, folder, tuple(overrides), tree.data, tuple(tree.included), confine)
 
 
-def _texts(value: Plain) -> list[str]:
-    """Every text in the data that could be the name of a file."""
-    if isinstance(value, dict | list):
-        items = value.values() if isinstance(value, dict) else value
-        return [text for item in items for text in _texts(item)]
-    return [value] if isinstance(value, str) and 0 < len(value) < 1000 and value.isprintable() else []
+def same_content(one: str, other: str) -> bool:
+    """Whether two texts of a spec say the same, whatever their comments, layout and order of keys.
+
+    Raises:
+        SpecError: One of them is not YAML.
+    """
+    first, second = (read(text, "spec.yaml").data for text in (one, other))
+    return fingerprint(first) == fingerprint(second)

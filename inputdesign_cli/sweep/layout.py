@@ -24,8 +24,10 @@ from pathlib import Path
 from typing import IO
 
 from inputdesign_cli.errors import OutputError
+from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.runs.record import PAGE, RESULT, is_page, unreadable
 from inputdesign_cli.runs.results import Json
-from inputdesign_cli.runs.run_directory import RESULT, output_errors, replace_text
+from inputdesign_cli.runs.run_directory import output_errors, replace_text
 
 SPEC, SUMMARY, TABLE = "sweep.yaml", "sweep.json", "sweep.csv"
 LOCK, WORKERS = ".lock", ".workers"
@@ -54,10 +56,19 @@ class Layout:
         return self.failure(key).is_file()
 
     def read(self, key: str) -> dict[str, Json] | None:
-        """The result of a point, or its failure (which has a `code`), or None."""
+        """The result of a point, or its failure (which has a `code`), or None.
+
+        Raises:
+            DataError: `run-unreadable`.
+        """
         for path in (self.run(key) / RESULT, self.failure(key)):
             with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-                content: dict[str, Json] = json.loads(path.read_text(encoding="utf-8"))
+                try:
+                    content = json.loads(read_regular(path))
+                except (ValueError, RecursionError) as error:
+                    raise unreadable(path, str(error)) from error
+                if not isinstance(content, dict):
+                    raise unreadable(path, "it is no mapping")
                 return content
         return None
 
@@ -79,10 +90,15 @@ class Layout:
                 (partial / name).write_bytes(content)
             partial.rename(target)
 
+    def remove_page(self) -> None:
+        """Remove the page about what the sweep was before."""
+        if is_page(self.root / PAGE):
+            (self.root / PAGE).unlink()
+
     def clear(self) -> None:
         """Remove what killed processes left half written. Only the holder of the lock may."""
         for folder in (self.root, self.root / "points", self.root / "failures"):
-            for path in folder.glob(".*.partial-*"):
+            for path in folder.glob(".*.partial*"):
                 if path.is_dir():
                     shutil.rmtree(path, ignore_errors=True)
                 else:

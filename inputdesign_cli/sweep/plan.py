@@ -48,7 +48,7 @@ class Plan:
         files = None
         if with_files:
             with suppress(SpecError):
-                names = self.draft.files(self.draft.variant(overrides))
+                names = [*self.draft.included, *self.draft.files(self.draft.variant(overrides))]
                 files = {name: (self.draft.folder / name).read_bytes() for name in names}
         return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
 
@@ -75,7 +75,9 @@ class Plan:
         return {**content, "sweep": self.grid.block()}
 
 
-def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb) -> Plan:
+def build_plan(
+    spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb, confine: Path | None = None
+) -> Plan:
     """Read the spec and the settings.
 
     Raises:
@@ -85,7 +87,7 @@ def build_plan(spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb)
         hint = "sweep with --verb solve"
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
-    draft = read_template(spec, fixed)
+    draft = read_template(spec, fixed, confine=confine)
     plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
     plan.check()
     return plan

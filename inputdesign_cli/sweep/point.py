@@ -82,7 +82,7 @@ def run_point_elsewhere(job: PointJob) -> PointEnd:
             if path.is_relative_to(folder):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
-        end = _compute(replace(job, draft=replace(job.draft, folder=data)), run)
+        end = _compute(replace(job, draft=replace(job.draft, folder=data, confine=None)), run)
         if end.failure:
             return end
         return replace(end, files={path.name: path.read_bytes() for path in sorted(run.iterdir())})

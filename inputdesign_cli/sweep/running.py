@@ -86,10 +86,16 @@ class SweepSummary:
 
 
 def list_points(
-    spec: Path, settings: Sequence[str] = (), *, directory: Path, zipped: bool = False, verb: Verb = "solve"
+    spec: Path,
+    settings: Sequence[str] = (),
+    *,
+    directory: Path,
+    zipped: bool = False,
+    verb: Verb = "solve",
+    confine: Path | None = None,
 ) -> Iterator[Listing]:
     """The points of a sweep and whether they are done; nothing is computed or written."""
-    plan = build_plan(spec, settings, zipped=zipped, verb=verb)
+    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine)
     layout = Layout(directory)
     for index, point in enumerate(plan.grid):
         key = plan.key(index)
@@ -105,6 +111,7 @@ def sweep(
     directory: Path,
     zipped: bool = False,
     verb: Verb = "solve",
+    confine: Path | None = None,
     executor: Executor | None = None,
     fail_fast: bool = False,
     rerun_failed: bool = False,
@@ -115,6 +122,7 @@ def sweep(
 
     Args:
         settings: `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points.
+        confine: the folder outside of which the spec may name no files.
         executor: where the points are computed (default: in this process).
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
@@ -125,8 +133,9 @@ def sweep(
         SpecError, OutputError: before anything is computed; later OutputError only.
         IdesignError: the first failure, with `fail_fast`.
     """
-    plan = build_plan(spec, settings, zipped=zipped, verb=verb)
+    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine)
     with opened(directory) as layout:
+        layout.remove_page()
         replace_text(layout.root / SPEC, to_yaml(plan.data()))
         _write_summary(plan, layout, {})
         run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, figures, watch)

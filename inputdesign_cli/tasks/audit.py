@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import Criterion, Requirement
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.design.convex.problem import weights_of
-from inputdesign_cli.errors import Diagnostic, InaccurateError
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -46,14 +46,12 @@ def audit(done: Designed, result: Mapping[str, Json], *, on_grid: bool) -> None:
         InaccurateError: `internal-disagreement`.
     """
     for claim in _Audit(done, json.loads(json_text(result))).disagreements(on_grid):
-        raise InaccurateError(
-            Diagnostic(
-                "internal-disagreement",
-                claim,
-                hint="rescale the signals, restrict the band, or look for poles near the unit circle; if the "
-                "spec is plain, please report it: the spec is enough to see the same",
-                key="accuracy",
-            )
+        raise InaccurateError.because(
+            "internal-disagreement",
+            claim,
+            hint="rescale the signals, restrict the band, or look for poles near the unit circle; if the "
+            "spec is plain, please report it: the spec is enough to see the same",
+            key="accuracy",
         )
 
 

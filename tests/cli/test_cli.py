@@ -70,8 +70,8 @@ def verbs(monkeypatch):
     """Stand-ins for the verbs of the package; `calls` keeps what they were called with."""
     calls = []
 
-    def load_spec(path, overrides):
-        calls.append((path, overrides))
+    def load_spec(path, overrides, **_):
+        calls.append((path, list(overrides)))
         return path
 
     def results(spec):
@@ -336,8 +336,13 @@ def test_check_fails_with_1(run, verbs, tmp_path):
     code, out, _ = run("check", "g.yaml", "--junit", "report.xml")
     assert code == 1
     assert "1 of 2 quantities agree" in out
-    suite = ElementTree.parse(tmp_path / "report.xml").getroot()
-    assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    root = ElementTree.parse(tmp_path / "report.xml").getroot()
+    assert root.tag == "testsuites"
+    (suite,) = root
+    for counted in (root, suite):
+        assert [counted.get(name) for name in ("tests", "failures", "errors")] == ["2", "1", "0"]
+    times = [float(case.get("time")) for case in suite]
+    assert sum(times) == pytest.approx(float(root.get("time")), abs=2e-3)
     failed = [case.get("name") for case in suite if case.find("failure") is not None]
     assert failed == ["white: cost (paper, Section 1)"]
     code, out, err = run("check", "g.yaml", "--json")
@@ -355,22 +360,76 @@ def test_check_of_an_infeasible_run_says_why(run, failing, tmp_path):
     assert out.count("the plant is unstable") == 2
 
 
-def test_check_without_golden_files(run):
-    code, _, err = run("check")
+def test_check_without_golden_files(run, monkeypatch, tmp_path):
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "nowhere")
+    code, _, err = run("check", "--junit", "report.xml")
     assert code == 2
     assert "golden/*.yaml" in err
+    root = ElementTree.parse(tmp_path / "report.xml").getroot()
+    assert (root.tag, root.get("errors"), root.get("tests")) == ("testsuites", "1", "1")
+    assert root.find("testsuite/testcase/error").get("type") == "golden-missing"
+
+
+@pytest.mark.parametrize(
+    "text", ["runs: []\n", "runs:\n", "{}\n", "runs: [{name: a, spec: a.yaml, quantities: []}]\n"]
+)
+def test_a_golden_file_that_compares_nothing_fails(run, verbs, tmp_path, text):
+    (tmp_path / "g.yaml").write_text(text)
+    assert run("check", "g.yaml", "--junit", "report.xml")[0] == 2
+    assert ElementTree.parse(tmp_path / "report.xml").getroot().get("errors") == "1"
+
+
+def test_golden_files_come_with_the_package(run, verbs, monkeypatch, tmp_path):
+    (tmp_path / "shipped" / "golden").mkdir(parents=True)
+    (tmp_path / "shipped" / "golden" / "g.yaml").write_text(GOLDEN % "0.2585")
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "shipped")
+    code, out, _ = run("check")
+    assert code == 0
+    assert "2 of 2 quantities agree" in out
+
+
+def test_nothing_is_written_with_no_output(run, verbs, tmp_path):
+    code, out, err = run("solve", "a.yaml", "--json", "--no-output")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["objective"] == RESULT["objective"]
+    code, out, err = run("solve", "a.yaml", "--no-output")
+    assert "0.258498" in out
+    assert "files" not in out
+    assert run("solve", "a.yaml", "--no-output", "-o", "x")[0] == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_examples_are_listed_and_copied_once(run, tmp_path):
+    code, out, _ = run("examples")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == sorted(
+        p.stem for p in (ROOT / "specs").glob("*.yaml")
+    )
+    assert run("examples", "first_order", "-o", "mine") == (0, "mine/first_order.yaml\n", "")
+    copied = tmp_path / "mine" / "first_order.yaml"
+    assert copied.read_text() == (ROOT / "specs" / "first_order.yaml").read_text()
+    copied.write_text("mine")
+    assert run("examples", "first_order.yaml", "-o", "mine")[0] == 2
+    assert copied.read_text() == "mine"
+    code, _, err = run("examples", "frist_order")
+    assert code == 2
+    assert 'did you mean "first_order"' in err
 
 
 def test_init_writes_once(run, tmp_path):
     assert run("init", "mine.yaml") == (0, "", "")
     text = (tmp_path / "mine.yaml").read_text()
     assert run("init") == (0, text, "")
+    assert text.startswith("# yaml-language-server: $schema=idesign.schema.json\n")
+    assert json.loads((tmp_path / "idesign.schema.json").read_text())["$id"].startswith("urn:")
+    (tmp_path / "idesign.schema.json").write_text("mine")
     (tmp_path / "mine.yaml").write_text("changed")
     code, _, err = run("init", "mine.yaml")
     assert code == 2
     assert "--force" in err
     assert (tmp_path / "mine.yaml").read_text() == "changed"
     assert run("init", "mine.yaml", "--force")[0] == 0
+    assert (tmp_path / "idesign.schema.json").read_text() == "mine"
     assert (tmp_path / "mine.yaml").read_text() == text
 
 

@@ -109,13 +109,33 @@ def test_a_sweep_survives_the_loss_of_a_worker_to_the_last_digit(loopback, tmp_p
 def test_data_files_travel_with_the_points(loopback, tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "r.csv").write_text("frequency,r_adm\n0,1\n3.2,1\n")
+    (tmp_path / "a" / "more.yaml").write_text("title: included\n")
     spec = tmp_path / "a" / "t.yaml"
-    spec.write_text(SPEC.replace("relative: 0.1", "table: ../r.csv"))
-    settings = ["experiment.samples=60,70"]
+    spec.write_text(SPEC.replace("relative: 0.1", "table: ../r.csv").replace("title", "# title"))
+    settings = ["experiment.samples=60,70", "include=more.yaml"]
     sweep(spec, settings, directory=tmp_path / "here")
     sweep(spec, settings, directory=tmp_path / "there", executor=Cluster(loopback.address))
     assert timeless_files(tmp_path / "there") == timeless_files(tmp_path / "here")
     assert {row["status"] for row in timeless_rows(tmp_path / "there")} == {"optimal"}
+
+
+def test_a_cluster_without_workers_says_so_and_is_given_up(tmp_path):
+    cluster = Loopback(tmp_path)
+    worker = cluster.add_worker()
+    told = []
+    executor = Cluster(cluster.address, worker_timeout=1.0, tell=told.append)
+    answers = executor.run(jobs.slow_identity, range(100))
+    try:
+        next(answers)
+        worker.kill()
+        started = time.monotonic()
+        with pytest.raises(DataError) as caught:
+            list(answers)
+    finally:
+        cluster.end()
+    assert caught.value.diagnostics[0].code == "cluster-no-workers"
+    assert told == [f"no workers at {executor.address}; waiting"]
+    assert time.monotonic() - started < 10
 
 
 @pytest.mark.slow

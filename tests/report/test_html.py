@@ -1,9 +1,11 @@
 """The page about a run or a sweep: strict HTML that needs nothing, says what it must, and escapes text."""
 
 import base64
+import hashlib
 import json
 import re
 import shutil
+from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -87,6 +89,25 @@ def test_the_page_of_a_run(runs, name):
     ):
         assert part in said, part
     assert (runs / name / "spec.yaml").read_text() in "".join(page.itertext())
+
+
+def test_a_page_tells_which_result_it_is_about(runs):
+    digest = hashlib.sha256((runs / "open" / "result.json").read_bytes()).hexdigest()
+    page = parse(report_text(runs / "open"))
+    (stamp,) = [meta for meta in page.iter(f"{XHTML}meta") if meta.get("name") == "sha256"]
+    assert stamp.get("content") == digest
+    assert digest in words(page)
+
+
+@pytest.mark.parametrize("broken", [None, 7, "x", [], {}, {"value": "x", "kind": 3}, [[1]]])
+def test_a_result_that_somebody_changed_is_an_error_or_a_page(runs, tmp_path, monkeypatch, broken):
+    monkeypatch.setattr("inputdesign_cli.report.run_page.run_charts", lambda *_, **__: {})
+    whole = json.loads((runs / "open" / "result.json").read_text())
+    shutil.copytree(runs / "open", tmp_path / "a")
+    for key in whole:
+        (tmp_path / "a" / "result.json").write_text(json.dumps(whole | {key: broken}))
+        with suppress(DataError):
+            report_text(tmp_path / "a")
 
 
 def test_charts_are_pictures_with_words(runs):

@@ -6,12 +6,15 @@ import json
 import os
 import pathlib
 import platform
+import shutil
+from contextlib import suppress
 from importlib import metadata
 
 import numpy as np
 import pytest
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.runs import replacing
 from inputdesign_cli.runs.results import OptimalityCurves, Results, SignalCurves, Table
 from inputdesign_cli.runs.run_directory import read_run, write_run
 
@@ -146,6 +149,10 @@ def test_a_destination_below_a_file(tmp_path):
     assert caught.value.diagnostics[0].code == "output-not-writable"
 
 
+def contents(directory) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
 class Saboteur:
     """Makes the n-th of the file operations of the run fail, and every operation before it work."""
 
@@ -199,20 +206,38 @@ def test_a_failure_at_any_step_of_a_new_run_leaves_nothing(tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize(("error", "raised"), ERRORS, ids=["full", "denied", "interrupted"])
-def test_a_failure_at_any_step_of_a_replacement_keeps_the_old_run(tmp_path, monkeypatch, error, raised):
+@pytest.mark.parametrize("exchange", [True, False])
+def test_a_failure_at_any_step_of_a_replacement_keeps_a_whole_run(
+    tmp_path, monkeypatch, error, raised, exchange
+):
+    if not exchange:
+        monkeypatch.setattr(replacing, "_exchange", lambda: None)
     write_with_figures(a_run("first", optimality=True), tmp_path / "probe")
     steps = count_operations(monkeypatch, lambda: write_run(a_run("second"), tmp_path / "probe"))
     assert steps > 12
     old = tmp_path / "a"
     write_with_figures(a_run("first", optimality=True), old)
     (old / "notes.txt").write_text("mine")
-    before = {path.name: path.read_bytes() for path in old.iterdir()}
+    before = contents(old)
+    outcomes = []
     for step in range(1, steps + 1):
         with monkeypatch.context() as patch:
             Saboteur(patch, step, error)
-            with pytest.raises(raised):
+            with suppress(raised):
                 write_run(a_run("second"), old)
-        assert {path.name: path.read_bytes() for path in old.iterdir()} == before, step
+                assert not (exchange and raised is KeyboardInterrupt)
+        assert names(tmp_path) == {"a", "probe"}, step
+        outcomes.append(contents(old) == before)
+        if not outcomes[-1]:
+            # What fails in the exchange leads to moves; what fails after it, to a new run in place.
+            assert exchange or step == steps
+            assert marks(old) == {"second"}
+            assert (old / "notes.txt").read_text() == "mine"
+            shutil.rmtree(old)
+            write_with_figures(a_run("first", optimality=True), old)
+            (old / "notes.txt").write_text("mine")
+            before = contents(old)
+    assert outcomes.count(True) > 8
 
 
 def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch):
@@ -236,31 +261,6 @@ def test_whoever_kills_the_writer_never_finds_a_mixed_run(tmp_path, monkeypatch)
     assert all(len(found) == 1 for found in seen)
     assert seen[0] == {"first"}
     assert seen[-1] == {"second"}
-
-
-def test_a_run_after_a_power_cut_in_the_middle_of_a_replacement(tmp_path, monkeypatch):
-    write_with_figures(a_run("first"), tmp_path / "a")
-
-    class PowerCut(BaseException):
-        pass
-
-    moves = []
-    rename = pathlib.Path.rename
-
-    def cut(self, target):
-        moves.append(self)
-        if len(moves) > 5:
-            raise PowerCut
-        return rename(self, target)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(pathlib.Path, "rename", cut)
-        patch.setattr(pathlib.Path, "unlink", lambda self, missing_ok=False: None)
-        with pytest.raises(PowerCut):
-            write_with_figures(a_run("second"), tmp_path / "a")
-    assert not (tmp_path / "a" / "result.json").exists()
-    write_with_figures(a_run("second"), tmp_path / "a")
-    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "result.json"}
 
 
 def test_a_disc_that_fills_up_while_writing(tmp_path, monkeypatch):
@@ -306,6 +306,10 @@ def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
         ({}, "run-missing"),
         ({"result.json": "{"}, "run-unreadable"),
         ({"result.json": "[]"}, "run-unreadable"),
+        ({"result.json": "[" * 100_000}, "run-unreadable"),
+        ({"result.json": '{"format": 1, "files": [1, null]}'}, "run-unreadable"),
+        ({"result.json": '{"format": 1, "files": 7}'}, "run-unreadable"),
+        ({"result.json": '{"format": %s}' % ("1" * 10_000)}, "run-unreadable"),
         ({"result.json": '{"format": 1, "files": ["spec.yaml"]}'}, "run-incomplete"),
     ],
 )
@@ -321,3 +325,67 @@ def test_read_run_of_no_directory(tmp_path):
     with pytest.raises(DataError) as caught:
         read_run(tmp_path / "nowhere")
     assert caught.value.diagnostics[0].code == "run-missing"
+
+
+@pytest.mark.parametrize(
+    "name", ["../precious.txt", "/tmp/../{}/precious.txt", "..", ".", "", "a/b", "x\0y", 7]
+)
+@pytest.mark.parametrize("exchange", [True, False])
+def test_a_record_that_names_files_elsewhere_moves_none(tmp_path, monkeypatch, name, exchange):
+    if not exchange:
+        monkeypatch.setattr(replacing, "_exchange", lambda: None)
+    precious = tmp_path / "precious.txt"
+    precious.write_text("mine")
+    target = tmp_path / "a"
+    target.mkdir()
+    listed = name.format(tmp_path) if isinstance(name, str) else name
+    record = {"format": 1, "files": [listed]}
+    (target / "result.json").write_text(json.dumps(record))
+    # As if a writer had been killed in the middle, too.
+    for part in ("new", "old"):
+        (target / ".run.partial" / part).mkdir(parents=True)
+        (target / ".run.partial" / part / "result.json").write_text(json.dumps(record))
+    with pytest.raises((OutputError, DataError)) as caught:
+        write_run(a_run("first"), target)
+    assert caught.value.diagnostics[0].code == "output-not-a-run"
+    with pytest.raises(DataError):
+        read_run(target)
+    assert precious.read_text() == "mine"
+
+
+def test_links_in_a_run_directory_lead_nowhere(tmp_path):
+    (tmp_path / "elsewhere" / "new").mkdir(parents=True)
+    (tmp_path / "elsewhere" / "new" / "result.json").write_text("mine")
+    (tmp_path / "a").mkdir()
+    for name in (".run.partial", "signal.csv"):
+        (tmp_path / "a" / name).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OutputError):
+        write_run(a_run("first"), tmp_path / "a")
+    assert (tmp_path / "elsewhere" / "new" / "result.json").read_text() == "mine"
+
+
+def test_two_writers_take_turns(tmp_path, monkeypatch):
+    monkeypatch.setattr(replacing, "_PATIENCE", 0.05)
+    with replacing.workplace(tmp_path / "a"), pytest.raises(OutputError) as caught:
+        write_run(a_run("first"), tmp_path / "a")
+    assert caught.value.diagnostics[0].code == "output-busy"
+    write_run(a_run("first"), tmp_path / "a")
+
+
+def test_a_page_about_the_run_before_does_not_stay(tmp_path):
+    write_run(a_run("first"), tmp_path / "a")
+    page = '<html><head><meta name="generator" content="idesign 0.1.0"></head></html>'
+    (tmp_path / "a" / "report.html").write_text(page)
+    write_run(a_run("second"), tmp_path / "a")
+    assert "report.html" not in names(tmp_path / "a")
+    (tmp_path / "a" / "report.html").write_text("<html>mine</html>")
+    write_run(a_run("first"), tmp_path / "a")
+    assert (tmp_path / "a" / "report.html").read_text() == "<html>mine</html>"
+
+
+def test_a_run_into_the_current_folder_leaves_it_the_current_one(tmp_path, monkeypatch):
+    write_run(a_run("first"), tmp_path / "a")
+    monkeypatch.chdir(tmp_path / "a")
+    write_run(a_run("second"), pathlib.Path())
+    assert pathlib.Path.cwd() == tmp_path / "a"
+    assert marks(pathlib.Path()) == {"second"}

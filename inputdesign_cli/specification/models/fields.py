@@ -85,7 +85,14 @@ Flag = Annotated[bool, Strict()]
 Text = Annotated[
     str, Strict(), BeforeValidator(as_text), WithJsonSchema({"type": ["string", "number", "boolean"]})
 ]
-FileName = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("the name of a file")]
+FILE_FORMAT = "path"
+"""What the JSON schema calls a text that names a file."""
+FileName = Annotated[
+    str,
+    Strict(),
+    Field(pattern=r"\S", json_schema_extra={"format": FILE_FORMAT}),
+    Wording("the name of a file"),
+]
 Name = Annotated[str, Strict(), Field(pattern=r"\S"), Wording("a parameter name")]
 
 # Lists

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, TypeVar
 
 from pydantic import Field, PrivateAttr
 
-from inputdesign_cli.errors import Diagnostic, IdesignError, Location, SpecError
+from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.accuracy import Accuracy
 from inputdesign_cli.specification.models.experiment import Cost, Experiment, Noise
 from inputdesign_cli.specification.models.fields import Positive, Text
@@ -132,7 +132,7 @@ class Spec(Section):
 
     def complain(self, code: str, message: str, *, hint: str = "", key: str = "") -> SpecError:
         """An error with a single diagnostic that points at the line of `key`, for the caller to raise."""
-        return SpecError(Diagnostic(code, message, hint, key, self.locate(key)))
+        return SpecError.because(code, message, hint, key, self.locate(key))
 
     def place(self, error: _Error) -> _Error:
         """An error of the same type whose keyed diagnostics point at their lines."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import os
 from pathlib import Path
 
-from inputdesign_cli.errors import Location, SpecError
+from inputdesign_cli.errors import Diagnostic, Location, SpecError
+from inputdesign_cli.regular_file import read_regular
 
 MAX_BYTES = 10 * 1024 * 1024
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
@@ -25,8 +27,7 @@ def read_text(path: str | os.PathLike[str]) -> str:
             inside = sorted(p.name for p in Path(name).glob("*.y*ml"))[:3]
             hint = f"it holds {', '.join(inside)}" if inside else "name the YAML file itself"
             raise _error("file-unreadable", f"{name} is a folder, not a spec file", name, hint)
-        with open(name, "rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
+        raw = read_regular(name, MAX_BYTES + 1)
     except FileNotFoundError:
         raise _error("file-missing", f"there is no file {name}", name, _nearby(Path(name))) from None
     except PermissionError:
@@ -34,11 +35,27 @@ def read_text(path: str | os.PathLike[str]) -> str:
         raise _error("file-unreadable", f"{name} may not be read", name, hint) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "the name is not a file name"
-        raise _error("file-unreadable", f"{name!r} cannot be read: {reason}", name, "") from None
+        piped = isinstance(error, OSError) and error.errno == errno.EINVAL
+        hint = "name a file, or give - to read the spec from standard input" if piped else ""
+        raise _error("file-unreadable", f"{name!r} cannot be read: {reason}", name, hint) from None
     if len(raw) > MAX_BYTES:
         hint = "is it a data file? A spec is a page of text; data belong into a CSV file that it names"
         raise _error("file-too-large", f"{name} is larger than {MAX_BYTES // 2**20} MiB", name, hint)
     return decode(raw, name)
+
+
+def is_outside(path: Path, folder: Path) -> bool:
+    """Whether a file lies outside a folder, links followed."""
+    try:
+        return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+    except ValueError:
+        return True
+
+
+def outside(name: str, confine: Path, key: str, location: Location | None) -> Diagnostic:
+    """The diagnostic about a file that a spec names and may not read."""
+    message = f"{key} names {name}, which lies outside {confine}"
+    return Diagnostic("file-outside", message, "move the file there, or widen --confine", key, location)
 
 
 def decode(raw: bytes, file: str) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path as FilePath
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.yaml.files import is_outside, outside, read_text
 from inputdesign_cli.specification.yaml.places import Path, format_key
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
@@ -15,10 +16,11 @@ KEY = "include"
 _WHOLE = ("plant", "noise")
 
 
-def apply_includes(tree: Tree, folder: FilePath) -> None:
+def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], confine: FilePath | None) -> None:
     """Put the blocks of included files where the spec has none; other mappings are joined key by key.
 
-    A key that stands in both becomes a diagnostic of the tree.
+    A key that stands in both becomes a diagnostic of the tree. Nothing is shown of a file that has none of
+    the `known` blocks: it may be any file of the machine.
 
     Raises:
         SpecError: A name is no text, or a file cannot be read, holds no blocks or includes others.
@@ -31,10 +33,16 @@ def apply_includes(tree: Tree, folder: FilePath) -> None:
         path: Path = (KEY, number) if isinstance(stated, list) else (KEY,)
         if not isinstance(name, str) or not name:
             raise _error(tree, path, "{key} is not the name of a file", "write include: model.yaml")
-        included = _read(tree, path, folder / name)
+        if confine is not None and is_outside(folder / name, confine):
+            location = tree.places.location(tree.places.mark(path, at_key=True))
+            raise SpecError(outside(name, confine, format_key(path), location))
+        included = _read(tree, path, folder, name)
         if not isinstance(included.data, dict) or KEY in included.data:
             what = "includes others itself" if isinstance(included.data, dict) else "holds no blocks"
             raise _error(tree, path, f"{name} {what}", "name a file of blocks such as plant: and noise:")
+        if not known & included.data.keys():
+            raise _error(tree, path, f"{name} holds no block of a spec", "name a file with plant: and noise:")
+        tree.included.append(name)
         tree.places.sources.append(included.places.sources[0])
         tree.diagnostics.extend(included.diagnostics)
         tree.broken |= included.broken
@@ -43,13 +51,22 @@ def apply_includes(tree: Tree, folder: FilePath) -> None:
     tree.places.forget((KEY,))
 
 
-def _read(tree: Tree, path: Path, file: FilePath) -> Tree:
+def _read(tree: Tree, path: Path, folder: FilePath, name: str) -> Tree:
+    file = folder / name
     try:
         text = read_text(file)
     except SpecError as error:
         found = error.diagnostics[0]
-        raise _error(tree, path, found.message, found.hint) from error
-    return read(text, str(file), source=len(tree.places.sources))
+        message = f"{name} is not UTF-8" if found.code == "file-encoding" else found.message
+        raise _error(tree, path, message, found.hint) from error
+    try:
+        return read(text, str(file), source=len(tree.places.sources))
+    except SpecError as error:
+        if not is_outside(file, folder):
+            raise
+        place = error.diagnostics[0].location
+        line = f", line {place.line}," if place else ""
+        raise _error(tree, path, f"{name}{line} is not YAML of a spec", "name a file of blocks") from error
 
 
 def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path as FilePath
 
 from inputdesign_cli.errors import Location, SpecError
@@ -13,11 +13,26 @@ from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import Tree, read
 
 
-def compose(tree: Tree, folder: FilePath, overrides: Sequence[str]) -> None:
-    """The spec with the files that it includes, then the overrides; `--set include=..` comes first."""
+def compose(
+    tree: Tree,
+    folder: FilePath,
+    overrides: Sequence[str],
+    *,
+    known: Collection[str],
+    confine: FilePath | None = None,
+) -> None:
+    """The spec with the files that it includes, then the overrides; `--set include=..` comes first.
+
+    Args:
+        tree: the spec as it is written.
+        folder: what names of files are relative to.
+        overrides: `key.path=value` texts.
+        known: the names of blocks.
+        confine: the folder outside of which nothing may be included.
+    """
     first = [override for override in overrides if override.partition("=")[0].strip() == KEY]
     apply_overrides(tree, first)
-    apply_includes(tree, folder)
+    apply_includes(tree, folder, known=known, confine=confine)
     apply_overrides(tree, [override for override in overrides if override not in first])
 
 

@@ -22,13 +22,15 @@ _PLAIN_TAGS = (None, "!")
 class Tree:
     """What a text holds: nested dicts, lists and scalars, their places, and what was wrong on the way.
 
-    `diagnostics` are those that did not stop the reading; `broken` are the paths where something is lost.
+    `diagnostics` are those that did not stop the reading; `broken` are the paths where something is lost;
+    `included` are the files whose blocks it has, as it names them.
     """
 
     data: Plain
     places: Places
     diagnostics: list[Diagnostic] = field(default_factory=list)
     broken: set[Path] = field(default_factory=set)
+    included: list[str] = field(default_factory=list)
 
 
 def read(text: str, file: str, *, source: int = 0, before: str = "", at: Path = ()) -> Tree:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,7 +12,7 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.tasks.build.tables import read_columns, read_header
 
 _UNITS = ("s", "ms", "us", "min", "h", "d")
 # Times may jitter by this share of the sample time.
@@ -41,7 +40,7 @@ def read_data(path: Path, units: Units, *, remove_means: bool = False) -> Data:
         DataError: the file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
             the spec says.
     """
-    header = _header(path)
+    header = read_header(path, key="")
     channels = {"u": _names("u", units.inputs, header), "y": _names("y", units.outputs, header)}
     wanted = {name: column for names in channels.values() for name, column in names.items()}
     timed = [name for name in header if name == "time" or name.startswith("time_")]
@@ -76,7 +75,7 @@ def blaming_columns(path: Path) -> Iterator[None]:
     try:
         yield
     except SpecError as error:
-        header = _header(path)
+        header = read_header(path, key="")
 
         def placed(diagnostic: Diagnostic) -> Diagnostic:
             named = [name for name in header if name.startswith(diagnostic.key or "u")]
@@ -95,26 +94,15 @@ def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:
     return {f"{letter}{i + 1}": f"{letter}{i + 1}" for i in range(channels)}
 
 
-def _header(path: Path) -> list[str]:
-    """Names of the columns; empty where the file cannot be read, which `read_columns` complains about."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            return [name.strip().lower() for name in next(csv.reader(file), [])]
-    except (OSError, UnicodeDecodeError, csv.Error):
-        return []
-
-
 def _check_unit(path: Path, units: Units, name: str) -> None:
     unit = name.removeprefix("time").removeprefix("_")
     if unit in _UNITS and unit != units.time_unit:
-        raise DataError(
-            Diagnostic(
-                "data-wrong-unit",
-                f"the times are in {unit}, but the spec counts in {units.time_unit}",
-                f"set time_unit: {unit} (and sample_time in it), or convert the column",
-                "time_unit",
-                Location(str(path), 1, 1, name),
-            )
+        raise DataError.because(
+            "data-wrong-unit",
+            f"the times are in {unit}, but the spec counts in {units.time_unit}",
+            f"set time_unit: {unit} (and sample_time in it), or convert the column",
+            "time_unit",
+            Location(str(path), 1, 1, name),
         )
 
 
@@ -133,14 +121,12 @@ def _check_times(path: Path, units: Units, time: Array) -> None:
             f"the time advances by {steps[row]:.6g} {units.time_unit} here ({int(off.sum())} such places)"
         )
         hint = "fill the gap, or use a part of the record without gaps"
-    raise DataError(
-        Diagnostic(
-            "data-not-uniform",
-            f"{message}, but sample_time is {units.sample_time:g} {units.time_unit}",
-            hint,
-            "sample_time",
-            Location(str(path), row + 3, 1, f"{time[row + 1]:.10g}"),
-        )
+    raise DataError.because(
+        "data-not-uniform",
+        f"{message}, but sample_time is {units.sample_time:g} {units.time_unit}",
+        hint,
+        "sample_time",
+        Location(str(path), row + 3, 1, f"{time[row + 1]:.10g}"),
     )
 
 

@@ -3,19 +3,47 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic, Location
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 _MOST_BYTES = 100 * 2**20
+
+
+@dataclass(frozen=True)
+class _File:
+    """The rows of a CSV file that are not empty, with their line numbers; the key that names it."""
+
+    path: Path
+    key: str
+    rows: list[tuple[int, list[str]]]
+
+    @property
+    def header(self) -> list[str]:
+        """The names of the columns."""
+        return [name.strip().lower() for name in self.rows[0][1]]
+
+    @property
+    def shown(self) -> bool:
+        """Whether messages may show what the file holds: it is a table of numbers, and no secret."""
+        cells = [cell for _, row in self.rows[1:] for cell in row if cell.strip()]
+        return 2 * sum(map(_is_number, cells)) >= max(len(cells), 1)
+
+    def error(self, code: str, message: str, hint: str, line: int, row: list[str]) -> Diagnostic:
+        """A diagnostic that points at a line."""
+        text = ",".join(row) if self.shown else ""
+        return Diagnostic(code, message, hint, self.key, Location(str(self.path), line, 1, text))
 
 
 def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, Array]:
@@ -26,13 +54,12 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
         key: the key of the spec that names the file, for diagnostics.
 
     Raises:
-        DataError: `data-unreadable`, `data-missing-column` or `data-not-a-number`.
+        DataError: `data-unreadable`, `data-missing-column`, `data-extra-field` or `data-not-a-number`.
     """
-    rows = _rows(path, key)
-    header = [name.strip().lower() for name in rows[0][1]]
-    found = {role: _named(header, start.lower()) for role, start in wanted.items()}
+    file = _read(path, key)
+    found = {role: _named(file.header, start.lower()) for role, start in wanted.items()}
     wrong = [
-        _unclear(path, key, rows[0][1], what, [wanted[role] for role in roles])
+        _unclear(file, what, [wanted[role] for role in roles])
         for what, roles in (
             ("no column", [role for role, at in found.items() if not at]),
             ("several columns", [role for role, at in found.items() if len(at) > 1]),
@@ -41,10 +68,24 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
     ]
     if wrong:
         raise DataError(wrong)
+    for line, row in file.rows[1:]:
+        if len(row) > len(file.header):
+            message = f"line {line} has {len(row)} fields, and the header {len(file.header)}"
+            hint = "separate the columns with commas, and write numbers with a decimal point: 1.5, not 1,5"
+            raise DataError(file.error("data-extra-field", message, hint, line, row))
     return {
-        role: np.array([_number(path, key, line, row, at, header[at]) for line, row in rows[1:]])
+        role: np.array([_number(file, line, row, at, wanted[role]) for line, row in file.rows[1:]])
         for role, (at,) in found.items()
     }
+
+
+def read_header(path: Path, *, key: str) -> list[str]:
+    """The names of the columns of a CSV file, in small letters.
+
+    Raises:
+        DataError: `data-unreadable`.
+    """
+    return _read(path, key).header
 
 
 def _named(header: list[str], start: str) -> list[int]:
@@ -57,19 +98,17 @@ def _named(header: list[str], start: str) -> list[int]:
     ]
 
 
-def _unclear(path: Path, key: str, header: list[str], what: str, names: list[str]) -> Diagnostic:
+def _unclear(file: _File, what: str, names: list[str]) -> Diagnostic:
+    line, header = file.rows[0]
     hint = f"name one column {' and one '.join(names)}"
     if names == ["frequency"]:
         hint += ", such as frequency_rad_per_s"
     if len(header) == 1 and any(mark in header[0] for mark in ";\t|"):
         hint = "separate the columns with commas, and write numbers with a decimal point"
-    return Diagnostic(
-        "data-missing-column",
-        f"{path.name} has {what} for {', '.join(names)} (its header is: {', '.join(header)})",
-        hint,
-        key,
-        Location(str(path), 1, 1, ",".join(header)),
-    )
+    message = f"{file.path.name} has {what} for {', '.join(names)}"
+    if file.shown:
+        message += f" (its header is: {', '.join(header)})"
+    return file.error("data-missing-column", message, hint, line, header)
 
 
 def has_column(path: Path, start: str, *, key: str) -> bool:
@@ -78,47 +117,48 @@ def has_column(path: Path, start: str, *, key: str) -> bool:
     Raises:
         DataError: `data-unreadable`.
     """
-    return any(name.strip().lower().startswith(start) for name in _rows(path, key)[0][1])
+    return any(name.startswith(start) for name in read_header(path, key=key))
 
 
-def _rows(path: Path, key: str) -> list[tuple[int, list[str]]]:
-    """The rows that are not empty with their line numbers, at least a header and one row."""
+def _read(path: Path, key: str) -> _File:
+    """A file with at least a header and one row."""
     try:
-        if path.stat().st_size > _MOST_BYTES:
+        raw = read_regular(path, _MOST_BYTES + 1)
+        if len(raw) > _MOST_BYTES:
             raise _unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [
-                (number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))
-            ]
+        reader = csv.reader(io.StringIO(raw.decode("utf-8-sig"), newline=""))
+        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except FileNotFoundError:
         hint = "paths are relative to the folder of the spec" if key else "check the name and the folder"
         raise _unreadable(path, key, "does not exist", hint) from None
     except IsADirectoryError:
         raise _unreadable(path, key, "is a folder", "name a CSV file") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise _unreadable(path, key, f"cannot be read ({error})", "name a CSV file in UTF-8") from None
+    except UnicodeDecodeError:
+        raise _unreadable(path, key, "is not UTF-8", "name a CSV file in UTF-8") from None
+    except (OSError, ValueError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise _unreadable(path, key, f"cannot be read: {reason}", "name a CSV file in UTF-8") from None
     if len(rows) < 2:
         raise _unreadable(path, key, "holds no rows of numbers", "write a header line and rows below it")
-    return rows
+    return _File(path, key, rows)
 
 
-def _number(path: Path, key: str, line: int, row: list[str], column: int, name: str) -> float:
-    text = row[column].strip() if column < len(row) else ""
+def _is_number(text: str) -> bool:
     try:
-        value = float(text)
+        return math.isfinite(float(text))
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise DataError.because(
-            "data-not-a-number",
-            f"{text!r} in column {name} is not a finite number"
-            if text
-            else f"a number is missing in column {name}",
-            "write plain numbers with a decimal point, one row a line",
-            key,
-            Location(str(path), line, 1, ",".join(row)),
-        )
-    return value
+        return False
+
+
+def _number(file: _File, line: int, row: list[str], column: int, name: str) -> float:
+    text = row[column].strip() if column < len(row) else ""
+    if _is_number(text):
+        return float(text)
+    message = f"{repr(text) if file.shown else 'a value'} in column {name} is not a finite number"
+    if not text:
+        message = f"a number is missing in column {name}"
+    hint = "write plain numbers with a decimal point, one row a line"
+    raise DataError(file.error("data-not-a-number", message, hint, line, row))
 
 
 def _unreadable(path: Path, key: str, what: str, hint: str) -> DataError:

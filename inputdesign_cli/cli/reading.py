@@ -1,0 +1,37 @@
+"""The spec of a command: from a file, or from standard input."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from inputdesign_cli.errors import STANDARD_INPUT, bad_spec
+
+if TYPE_CHECKING:
+    from inputdesign_cli.specification import Spec
+
+
+def read_spec(file: Path, overrides: Sequence[str] | None, confine: Path | None) -> Spec:
+    """The spec in a file; `-` is standard input, whose names of files are relative to the current folder.
+
+    Raises:
+        SpecError: as `load_spec`.
+    """
+    from inputdesign_cli import specification
+    from inputdesign_cli.specification.yaml.files import MAX_BYTES, decode
+
+    if str(file) != STANDARD_INPUT:
+        return specification.load_spec(file, overrides or (), confine=confine)
+    if sys.stdin is None:
+        raise bad_spec("file-unreadable", "standard input is closed", hint="name a file")
+    raw = sys.stdin.buffer.read(MAX_BYTES + 1)
+    if len(raw) > MAX_BYTES:
+        raise bad_spec("file-too-large", f"the spec is larger than {MAX_BYTES // 2**20} MiB")
+    return specification.parse_spec(decode(raw, "<stdin>"), "<stdin>", overrides or (), confine=confine)
+
+
+def name_of(file: Path) -> str:
+    """What a spec is called in the names of directories."""
+    return "stdin" if str(file) == STANDARD_INPUT else file.stem

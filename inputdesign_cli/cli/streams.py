@@ -1,0 +1,83 @@
+"""Standard streams that may be closed, full or cut off, and signals that end the program."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+import threading
+from types import FrameType
+from typing import BinaryIO, NoReturn
+
+from inputdesign_cli.errors import EXIT_BAD_INPUT
+
+EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
+
+
+class _Errors(io.TextIOWrapper):
+    """Standard error: what cannot be written there is lost, for there is nobody to tell."""
+
+    def __init__(self, stream: BinaryIO, encoding: str, *, by_line: bool) -> None:
+        super().__init__(stream, encoding, errors="backslashreplace", line_buffering=by_line)
+
+    def write(self, text: str) -> int:
+        try:
+            return super().write(text)
+        except OSError as error:
+            self._failed(error)
+            return len(text)
+
+    def flush(self) -> None:
+        try:
+            super().flush()
+        except OSError as error:
+            self._failed(error)
+
+    def _failed(self, _error: OSError) -> None:
+        # What is still in the buffer goes nowhere, or Python would complain about it on its way out.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+
+
+class _Output(_Errors):
+    """Standard output: where it cannot be written the program ends; quietly, if its reader has gone."""
+
+    def _failed(self, error: OSError) -> NoReturn:
+        super()._failed(error)
+        if isinstance(error, BrokenPipeError):
+            raise SystemExit(EXIT_PIPE) from None
+        sys.stderr.write(f"error: standard output cannot be written: {error.strerror}\n")
+        raise SystemExit(EXIT_BAD_INPUT) from None
+
+
+def prepare_streams() -> None:
+    """Make the standard streams fail in an orderly way; no file takes the place of a closed one."""
+    for number, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, flags)  # gets the lowest number that is free
+    # Whoever calls from Python may have put streams of their own in place.
+    if sys.stderr is sys.__stderr__:
+        sys.stderr = _Errors(*_parts(sys.stderr, 2), by_line=True)
+    if sys.stdout is sys.__stdout__:
+        sys.stdout = _Output(*_parts(sys.stdout, 1), by_line=os.isatty(1))
+
+
+def _parts(stream: io.TextIOBase | None, number: int) -> tuple[BinaryIO, str]:
+    if isinstance(stream, io.TextIOWrapper):
+        return stream.buffer, stream.encoding
+    return open(number, "wb", closefd=False), "utf-8"
+
+
+def prepare_signals() -> None:
+    """End in order after SIGTERM and SIGHUP, as after Ctrl-C, unless the caller had them ignored."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _terminate)
+
+
+def _terminate(number: int, _frame: FrameType | None) -> NoReturn:
+    raise SystemExit(128 + number)

@@ -1,0 +1,21 @@
+"""Files that others name are read only if they are plain files: a pipe or a device may never end."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+
+
+def read_regular(path: str | os.PathLike[str], most: int = -1) -> bytes:
+    """The bytes of a file, `most` of them at most; what is no plain file is refused without waiting for it.
+
+    Raises:
+        OSError: it cannot be read; `IsADirectoryError` for a folder, and with errno EINVAL for a pipe, a
+            socket or a device.
+        ValueError: the path holds what the operating system cannot name.
+    """
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is a pipe or a device, not a file", os.fspath(path))
+        return file.read(most)

@@ -1,0 +1,133 @@
+"""Where runs go: none is lost to one of another spec, and a spec that is worked on is not overwritten."""
+
+import io
+import json
+import shutil
+import sys
+
+import pytest
+
+from inputdesign_cli.cli import main
+
+SPEC = """\
+title: {}
+plant: {{B: [0, 1], F: [1, -0.5]}}
+noise: {{variance: 1}}  # by hand
+experiment: {{samples: 100}}
+spectrum: {{given: {{type: white, power: 1.0}}}}
+"""
+
+
+@pytest.fixture
+def analyse(monkeypatch, capsys, tmp_path):
+    """`idesign analyse ..`: its exit code and the code of its error."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        command = ["idesign", "analyse", *map(str, arguments), "--no-figures", "--json"]
+        monkeypatch.setattr(sys, "argv", command)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        code = ended.value.code or 0
+        return code, json.loads(out)["errors"][0]["code"] if code and out else err[-200:] if code else ""
+
+    return call
+
+
+def write(path, title):
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(SPEC.format(title))
+    return path
+
+
+def test_two_specs_of_one_name_do_not_share_a_directory(analyse, tmp_path):
+    one, two = write(tmp_path / "one" / "a.yaml", "one"), write(tmp_path / "two" / "a.yaml", "two")
+    assert analyse(one) == (0, "")
+    first = (tmp_path / "runs" / "a" / "result.json").read_bytes()
+    assert analyse(two) == (2, "output-other-run")
+    assert (tmp_path / "runs" / "a" / "result.json").read_bytes() == first
+    assert analyse(two, "--overwrite") == (0, "")
+    assert analyse(one) == (2, "output-other-run")
+
+
+def test_a_spec_is_run_again_as_it_changes(analyse, tmp_path, monkeypatch):
+    spec = write(tmp_path / "p" / "a.yaml", "one")
+    assert analyse(spec) == (0, "")
+    write(spec, "edited")
+    assert analyse(spec, "--set", "experiment.samples=200") == (0, "")
+    (tmp_path / "link").symlink_to(tmp_path / "p")
+    assert analyse("link/a.yaml") == (0, "")
+    assert analyse(spec, "-o", tmp_path / "p" / "run") == (0, "")
+    (tmp_path / "p").rename(tmp_path / "moved")
+    monkeypatch.chdir(tmp_path / "moved")
+    write(tmp_path / "moved" / "a.yaml", "edited in its new place")
+    assert analyse("a.yaml", "-o", "run") == (0, "")
+
+
+def test_a_copy_that_says_the_same_may_replace_its_run(analyse, tmp_path):
+    assert analyse(write(tmp_path / "p" / "a.yaml", "one")) == (0, "")
+    copied = write(tmp_path / "q" / "a.yaml", "one")
+    copied.write_text("# a copy\n" + copied.read_text())
+    assert analyse(copied) == (0, "")
+
+
+def test_a_run_without_a_record_of_its_spec_is_kept(analyse, tmp_path):
+    spec = write(tmp_path / "a.yaml", "one")
+    assert analyse(spec) == (0, "")
+    write(spec, "edited")
+    result = tmp_path / "runs" / "a" / "result.json"
+    for record in (None, 7, "a.yaml", {}, [7]):
+        result.write_text(json.dumps(json.loads(result.read_text()) | {"made_from": record}))
+        assert analyse(spec) == (2, "output-other-run")
+
+
+def test_changes_of_the_spec_in_the_run_directory_are_kept(analyse, tmp_path):
+    spec = write(tmp_path / "a.yaml", "one")
+    assert analyse(spec, "-o", "r") == (0, "")
+    own = tmp_path / "r" / "spec.yaml"
+    edited = "# my notes\n" + SPEC.format("edited")
+    own.write_text(edited)
+    assert analyse(spec, "-o", "r") == (2, "output-spec-changed")
+    assert analyse(own, "-o", "r", "--set", "experiment.samples=50") == (2, "output-is-the-spec")
+    assert analyse(own, "-o", "r", "--set", "title=x", "--overwrite") == (2, "output-is-the-spec")
+    assert own.read_text() == edited
+    assert analyse(own, "-o", "r") == (0, "")
+    assert own.read_text() == edited
+    assert json.loads((tmp_path / "r" / "result.json").read_text())["title"] == "edited"
+    own.write_text(edited.replace("edited", "edited again"))
+    assert analyse(own, "-o", "r") == (0, "")
+    assert analyse(spec, "-o", "r") == (2, "output-other-run")
+    assert analyse(spec, "-o", "r", "--overwrite") == (0, "")
+
+
+def test_a_spec_that_lies_in_the_directory_from_the_start(analyse, tmp_path):
+    own = write(tmp_path / "r" / "spec.yaml", "one")
+    assert analyse(own, "-o", "r") == (0, "")
+    assert own.read_text() == SPEC.format("one")
+    shutil.copy(own, tmp_path / "b.yaml")
+    assert analyse("b.yaml", "-o", "r") == (2, "output-other-run")
+
+
+def test_a_spec_from_standard_input(analyse, tmp_path, monkeypatch):
+    def piped(text):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+        return analyse("-")
+
+    assert piped(SPEC.format("one")) == (0, "")
+    assert json.loads((tmp_path / "runs" / "stdin" / "result.json").read_text())["title"] == "one"
+    assert piped(SPEC.format("one")) == (0, "")
+    assert piped(SPEC.format("two")) == (2, "output-other-run")
+    assert piped("plant: [") == (2, "yaml-syntax")
+    assert piped("\x00")[0] == 2
+    assert piped(" " * 11 * 2**20) == (2, "file-too-large")
+    monkeypatch.setattr(sys, "stdin", None)
+    assert analyse("-") == (2, "file-unreadable")
+
+
+@pytest.mark.parametrize("name", ["", "  "])
+def test_an_empty_name_is_no_place(analyse, tmp_path, name):
+    code, err = analyse(write(tmp_path / "a.yaml", "one"), "-o", name)
+    assert code == 2
+    assert "empty" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]

@@ -1,0 +1,94 @@
+"""Streams that are closed, full or cut off, and signals: a clear line and an exit code, never a traceback."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SPEC = ROOT / "specs" / "first_order_given.yaml"
+IDESIGN = f"{sys.executable} -m inputdesign_cli"
+
+
+def shell(command, folder, **environment):
+    """What `bash` makes of it: exit code and standard error."""
+    ended = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {command}"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert "Traceback" not in ended.stderr
+    return ended.returncode, ended.stderr
+
+
+@pytest.mark.parametrize("command", ["--help", f"validate --json {SPEC}"])
+@pytest.mark.parametrize(
+    ("stream", "code", "said"),
+    [
+        (">&-", 2, "error: standard output cannot be written"),
+        (">/dev/full", 2, "error: standard output cannot be written"),
+        ("| head -c 0", 141, ""),
+        ("2>&-", 0, ""),
+        ("2>/dev/full", 0, ""),
+        ("<&-", 0, ""),
+    ],
+)
+def test_streams_that_fail(tmp_path, command, stream, code, said):
+    ended, told = shell(f"{IDESIGN} {command} {stream}", tmp_path)
+    assert ended == code
+    assert told.startswith(said)
+    assert len(told.splitlines()) == bool(said)
+
+
+def test_a_closed_stream_never_becomes_a_file_of_the_run(tmp_path):
+    code, _ = shell(f"{IDESIGN} analyse {SPEC} -o r --no-figures >&- 2>&- <&-", tmp_path)
+    assert code == 2
+    assert (tmp_path / "r" / "result.json").read_text().startswith("{")
+    assert shell(f"{IDESIGN} analyse {SPEC} -o r --no-figures -q >&-", tmp_path)[0] == 0
+
+
+def test_a_current_folder_that_is_gone(tmp_path):
+    gone = f"mkdir gone; cd gone; rmdir ../gone; {IDESIGN}"
+    assert shell(f"{gone} validate {SPEC}", tmp_path)[0] == 0
+    code, told = shell(f"{gone} analyse {SPEC} --no-figures", tmp_path)
+    assert code == 2
+    assert "the current folder has been removed" in told
+
+
+def test_a_home_that_cannot_be_written(tmp_path):
+    assert shell(f"{IDESIGN} analyse {SPEC} -q", tmp_path, HOME="/proc/nowhere", MPLCONFIGDIR="") == (0, "")
+
+
+START = "from inputdesign_cli.__main__ import main; print(flush=True); main()"
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
+    """Also while modules are imported; Python itself needs some hundredths of a second before that."""
+    codes = set()
+    for delay in (0.0, 0.1, 0.3, 0.6):
+        process = subprocess.Popen(
+            [sys.executable, "-c", START, "solve", ROOT / "specs" / "distillation_column.yaml", "-o", "r"],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        process.stdout.readline()
+        time.sleep(delay)
+        process.send_signal(number)
+        _, told = process.communicate(timeout=60)
+        assert "Traceback" not in told, told
+        codes.add(process.returncode)
+    # Before the handlers stand, a signal ends the process by itself; a shell shows the same code.
+    assert codes <= {code, -number}
+    assert not (tmp_path / "r").exists()

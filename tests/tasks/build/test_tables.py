@@ -1,0 +1,82 @@
+"""Data files are plain files of numbers: nothing is waited for, misread or shown that is something else."""
+
+import os
+import socket
+import time
+
+import pytest
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.tasks.build.tables import read_columns, read_header
+
+
+def refused(path, wanted=None):
+    started = time.monotonic()
+    with pytest.raises(DataError) as caught:
+        read_columns(path, wanted or {"u": "u"}, key="spectrum.given.signal")
+    assert time.monotonic() - started < 1.0
+    return caught.value.diagnostics[0]
+
+
+@pytest.fixture
+def special(tmp_path):
+    """Paths of what is no plain file."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("pipe")
+    (tmp_path / "loop").symlink_to("loop")
+    listening = socket.socket(socket.AF_UNIX)
+    listening.bind(str(tmp_path / "socket"))
+    reading, writing = os.pipe()
+    yield [*tmp_path.iterdir(), tmp_path, f"/dev/fd/{reading}", "/dev/zero", "/dev/stdin", "a\0b", "x" * 300]
+    listening.close()
+    os.close(reading)
+    os.close(writing)
+
+
+def test_what_is_no_plain_file_is_refused_at_once(special, tmp_path):
+    for path in special:
+        assert refused(tmp_path / path).code == "data-unreadable", path
+
+
+@pytest.mark.parametrize("text", ["u\n1,5\n2\n", "time,u\n0,0\n1,1,5\n", "u\n1\n2,\n"])
+def test_a_row_has_no_more_fields_than_the_header(tmp_path, text):
+    path = tmp_path / "u.csv"
+    path.write_text(text)
+    found = refused(path)
+    assert found.code == "data-extra-field"
+    assert "," in text.splitlines()[found.location.line - 1]
+    assert "decimal point" in found.hint
+
+
+@pytest.mark.parametrize("cell", ['"1,5"', "1;5", "abc", "nan", "1e999", "", "1 2", "0x10"])
+def test_what_is_no_number_is_refused_with_its_line(tmp_path, cell):
+    path = tmp_path / "u.csv"
+    path.write_text(f'note,u\n1,2\n\n"3",{cell}\n4,5\n')
+    found = refused(path)
+    assert (found.code, found.location.line) == ("data-not-a-number", 4)
+
+
+SECRETS = [
+    "root:x:0:0:root:/root:/bin/bash\nbin:x:1:1:bin:/bin:/sbin/nologin\n",
+    "user,password\nann,hunter2\nbob,swordfish\n",
+    "u,password\nann,hunter2\nbob,swordfish\n",
+    "u\nhunter2\nswordfish,hunter2\n",
+    "frequency,r_adm\nhunter2,swordfish\n1,hunter2\n",
+]
+
+
+@pytest.mark.parametrize("text", SECRETS)
+def test_nothing_is_shown_of_a_file_that_holds_no_numbers(tmp_path, text):
+    path = tmp_path / "secret"
+    path.write_text(text)
+    for wanted in ({"u": "u"}, {"frequency": "frequency", "r_adm": "r_adm"}, {"y1": "y1"}):
+        told = repr(refused(path, wanted)).replace(str(path), "")
+        for word in ("root", "bash", "hunter2", "swordfish", "ann", "bob", "password"):
+            assert word not in told
+
+
+def test_the_header_of_a_table_is_shown(tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text("day,valve,level\n2026-01-01,1,2\n2026-01-02,3,4\n")
+    assert "day, valve, level" in refused(path).message
+    assert read_header(path, key="") == ["day", "valve", "level"]
