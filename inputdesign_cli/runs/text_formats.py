@@ -48,7 +48,7 @@ def json_text(value: Json) -> str:
 
 
 def csv_text(table: Table) -> str:
-    """A header line and one line a row, 17 significant digits, so that reading gives back every bit.
+    """A header line and one line a row, the fewest digits from which reading gives back every bit.
 
     Raises:
         ValueError: A column that is not a real vector, or columns of different lengths.
@@ -61,8 +61,7 @@ def csv_text(table: Table) -> str:
         lengths = ", ".join(f"{name}: {len(values)}" for name, values in columns.items())
         raise ValueError(f"the columns of a table differ in length ({lengths})")
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    layout = ",".join(["%.17g"] * len(columns))
-    lines = [",".join(columns), *(layout % row for row in rows)]
+    lines = [",".join(columns), *(",".join(repr(v).removesuffix(".0") for v in row) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
