@@ -88,7 +88,7 @@ class Cluster:
     @contextmanager
     def _client(self) -> Iterator[Any]:
         try:
-            from distributed import Client
+            from distributed import Client, Security
         except ImportError:
             raise DataError.because(
                 "cluster-extra", "Dask is not installed", hint="pip install 'inputdesign-cli[cluster]'"
@@ -96,6 +96,9 @@ class Cluster:
         # Its diagnostics about lost connections are no news: what they lead to is an error of ours.
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         try:
+            encrypts = Security().get_connection_args("client").get("ssl_context") is not None
+            if self.address.startswith("tls:") and not encrypts:
+                raise ValueError("TLS asks for certificates, which docs/security.md tells how to name")
             client = Client(self.address, timeout=self.patience, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise _unreachable(self.address, str(error).splitlines()[0] if str(error) else "") from None

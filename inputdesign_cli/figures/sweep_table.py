@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.results import Array, Json
 
 
@@ -55,9 +57,8 @@ def read_sweep(root: Path) -> SweepTable:
         DataError: `run-missing` or `run-unreadable`.
     """
     try:
-        summary = json.loads((root / "sweep.json").read_text(encoding="utf-8"))
-        with (root / "sweep.csv").open(encoding="utf-8", newline="") as file:
-            header, *rows = csv.reader(file)
+        summary = json.loads(read_regular(root / "sweep.json"))
+        header, *rows = csv.reader(io.StringIO(read_regular(root / "sweep.csv").decode(), newline=""))
         columns = {name: [row[i] for row in rows] for i, name in enumerate(header)}
         table = SweepTable(summary, columns)
         _ = table.axes, table.rows

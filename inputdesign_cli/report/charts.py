@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.numbers import spoken
 from inputdesign_cli.runs.results import (
     Array,
@@ -76,7 +77,7 @@ def svg_uri(content: bytes) -> str:
 
 def png_chart(path: Path) -> Chart:
     """A figure of the run as it is."""
-    data = base64.b64encode(path.read_bytes()).decode()
+    data = base64.b64encode(read_regular(path)).decode()
     name = path.stem.replace("_", " ")
     caption = _CAPTIONS.get(path.stem) or _caption_by_kind(path.stem) or f"The figure {name} of the run."
     return Chart(f"data:image/png;base64,{data}", caption, caption)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.runs.record import RESULT, unreadable
@@ -50,7 +51,7 @@ def _filled(
     )
     page = environment.get_template(template)
     try:
-        digest = hashlib.sha256((directory / record).read_bytes()).hexdigest()
+        digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
         content = content_of(directory)
         source = directory.name or directory.resolve().name
         return page.render(version=__version__, source=source, record=record, digest=digest, **content)

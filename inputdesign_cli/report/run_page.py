@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import run_charts
 from inputdesign_cli.report.evidence import (
     estimate_answer,
@@ -44,7 +45,7 @@ def run_page(run: Path) -> dict[str, Json]:
     """The content of the template for a run. Raises `DataError` as `read_run` does."""
     result = read_run(run)
     verb = _verb(result)
-    text = (run / "spec.yaml").read_text(encoding="utf-8")
+    text = read_regular(run / "spec.yaml").decode()
     try:
         question = read_question(text, str(run / "spec.yaml"), verb)
     except SpecError as error:

@@ -11,6 +11,7 @@ from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import QUANTITIES, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, svg_uri
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
@@ -52,7 +53,7 @@ def sweep_page(root: Path) -> dict[str, Json]:
         "left_out": table.rows - len(rows),
         "failures": _failures(table),
         "verb": summary["verb"],
-        "spec": (root / "sweep.yaml").read_text(encoding="utf-8"),
+        "spec": read_regular(root / "sweep.yaml").decode(),
         "provenance": provenance(summary.get("environment", {})),
         "citations": citations(question, result) if question else [],
     }
@@ -64,7 +65,7 @@ def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str
     if run is None:
         return None, {}
     try:
-        text = (root / run / "spec.yaml").read_text(encoding="utf-8")
+        text = read_regular(root / run / "spec.yaml").decode()
         return read_question(text, verb=table.summary["verb"]), read_run(root / run)
     except (OSError, SpecError, DataError):
         return None, {}

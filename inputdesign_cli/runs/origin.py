@@ -49,8 +49,8 @@ def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -
         raise OutputError.because("output-spec-changed", message, hint)
     theirs = result.get("made_from")
     known = theirs if isinstance(theirs, list) else []
-    same_file = ours[:1] == known[:1] and ours[0] != STANDARD_INPUT
-    if known[1:] != ours[1:] or not (same or same_file or ours[0] == SPEC):
+    same_file = ours[:1] == known[:1] and ours[:1] not in ([], [STANDARD_INPUT])
+    if known[1:] != ours[1:] or not (same or same_file or ours[:1] == [SPEC]):
         of = f" of {', '.join(map(str, known))} (as seen from there)" if known else " of something else"
         message = f"{shown} holds the run{of}, and would lose it"
         raise OutputError.because("output-other-run", message, hint)

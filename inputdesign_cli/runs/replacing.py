@@ -15,7 +15,7 @@ import shutil
 import stat
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -36,19 +36,32 @@ def workplace(target: Path) -> Iterator[Path]:
         OutputError: `output-busy`, another process writes into `target`.
         OSError: the folder cannot be made.
     """
-    heal(target)
-    # Inside a directory that exists: it may be a file system of its own (a mounted volume), and a file can
-    # be moved in one step only within one.
-    inside, beside = _places(target)
-    work = inside if target.exists() else beside
-    work.mkdir()
-    with _locked(work):
+    with ExitStack() as held:
+        work = _begun(target, held)
         try:
             (work / "new").mkdir()
             yield work
         finally:
-            for place in (inside, beside):
+            for place in _places(target):
                 _clear(place, target)
+
+
+def _begun(target: Path, held: ExitStack) -> Path:
+    """A new folder of work whose lock is held; others may be after it at the same time."""
+    inside, beside = _places(target)
+    due = time.monotonic() + _PATIENCE
+    while True:
+        heal(target)
+        # Inside a directory that exists: it may be a file system of its own (a mounted volume), and a file
+        # can be moved in one step only within one.
+        work = inside if target.exists() else beside
+        try:
+            work.mkdir()
+            if held.enter_context(_locked(work)):
+                return work
+        except (FileExistsError, FileNotFoundError):
+            if time.monotonic() > due:
+                raise
 
 
 def heal(target: Path) -> None:
@@ -59,10 +72,10 @@ def heal(target: Path) -> None:
         OSError: a file cannot be moved.
     """
     for work in _places(target):
-        if _is_folder(work):
-            with _locked(work) as held:
-                if held:
-                    _clear(work, target)
+        # Whoever else sees to it may be faster.
+        with suppress(FileNotFoundError), ExitStack() as held:
+            if _is_folder(work) and held.enter_context(_locked(work)):
+                _clear(work, target)
 
 
 def put_in_place(names: list[str], owned: Collection[str], work: Path, target: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 from collections.abc import Mapping
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.results import Array, Json, Table
 
 
@@ -67,7 +69,6 @@ def csv_text(table: Table) -> str:
 
 def read_csv(path: Path) -> dict[str, Array]:
     """The columns of a file that `csv_text` made: name -> (n,)."""
-    with path.open(encoding="utf-8", newline="") as file:
-        header, *rows = csv.reader(file)
+    header, *rows = csv.reader(io.StringIO(read_regular(path).decode(), newline=""))
     values = np.array(rows, dtype=float).reshape(len(rows), len(header))
     return {name: values[:, i] for i, name in enumerate(header)}

@@ -167,6 +167,8 @@ def test_no_cluster_is_a_complaint():
     with pytest.raises(DataError) as caught:
         list(Cluster("nonsense://x").run(jobs.square, [1]))
     assert caught.value.diagnostics[0].code == "cluster-unreachable"
+    with pytest.raises(DataError, match="TLS asks for certificates"):
+        list(Cluster("tls://127.0.0.1:9", patience=0.5).run(jobs.square, [1]))
 
 
 SPECS = Path(__file__).parents[2] / "specs"

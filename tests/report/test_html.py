@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import os
 import re
 import shutil
 from contextlib import suppress
@@ -108,6 +109,15 @@ def test_a_result_that_somebody_changed_is_an_error_or_a_page(runs, tmp_path, mo
         (tmp_path / "a" / "result.json").write_text(json.dumps(whole | {key: broken}))
         with suppress(DataError):
             report_text(tmp_path / "a")
+
+
+@pytest.mark.parametrize("name", ["spec.yaml", "bound.csv", "result.json"])
+def test_a_pipe_in_a_run_directory_is_not_waited_for(runs, tmp_path, name):
+    shutil.copytree(runs / "open", tmp_path / "a")
+    (tmp_path / "a" / name).unlink()
+    os.mkfifo(tmp_path / "a" / name)
+    with pytest.raises(DataError):
+        report_text(tmp_path / "a")
 
 
 def test_charts_are_pictures_with_words(runs):
