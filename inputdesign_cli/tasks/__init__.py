@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
@@ -25,7 +26,7 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
-    with _placed(spec):
+    with _placed(spec), time_limit(spec.solver.time_limit):
         return build_task(spec).solve()
 
 
@@ -35,7 +36,7 @@ def analyse(spec: Spec) -> Results:
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    with _placed(spec):
+    with _placed(spec), time_limit(spec.solver.time_limit):
         return build_given(spec).solve()
 
 

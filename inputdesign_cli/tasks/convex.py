@@ -108,9 +108,9 @@ class ConvexTask:
             result["signal"] = self._signal_entry(done, record)
             tables["signal"], curves["signal"] = signal_curves(self.record, self.header.units, record)
             files = other_files(self.record, self.header.units, record)
+        if done.design.result.x.any():
             notes = record_notes(self.record, done.experiment.samples, record)
-            if notes:
-                result["notes"] = [*result.get("notes", []), *notes]
+            result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
         units = self.header.units
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)

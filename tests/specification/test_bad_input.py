@@ -111,7 +111,7 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
         "plant": "{B: [[[0, 1]], [[0, 2]]], A: [[1], §[1, -3]]}"}),
     ("unstable-polynomial", "plant.F", "radius", {
         "plant": "{B: [0, 1], F: §[1, -2]}", "experiment": CONTROLLER}),
-    ("bad-polynomial", "plant.F", "order 301", {"plant": "{B: [1], F: §[1" + ", 0" * 300 + ", 0.1]}"}),
+    ("too-large", "plant.F", "at most 301", {"plant": "{B: [1], F: §[1" + ", 0" * 300 + ", 0.1]}"}),
     ("bad-polynomial", "plant.continuous.denominator", "magnitude", {
         "plant": "{continuous: {numerator: [1], denominator: §[1e-320, 1e300, 1]}}"}),
     ("zero-polynomial", "plant.B", "zero", {"plant": "{B: §[0, 0]}"}),
@@ -246,7 +246,7 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
         **REGRESSION, "objective": "§best_accuracy", "limits": "{energy: 1}"}),
     ("needs-limits", "accuracy.mean_squared_error", "add limits.energy", {
         **REGRESSION, "accuracy": "{§mean_squared_error: {estimated: [1], neglected_norm: 1}}"}),
-    ("bad-polynomial", "experiment.controller.denominator", "order 301", {
+    ("too-large", "experiment.controller.denominator", "at most 301", {
         "experiment": "{controller: {numerator: [1], denominator: §[" + ", ".join(["[1, 0.5]"] * 301) + "]}}"}),
     ("bad-polynomial", "experiment.controller.denominator", "product", {
         "experiment": "{controller: {numerator: [1], denominator: §[[1e200], [1e200]]}}"}),

@@ -28,6 +28,7 @@ from inputdesign_cli.specification.models.polynomials import (
     check_not_zero,
 )
 from inputdesign_cli.specification.models.section import TAG, tag
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.values import (
     as_text,
     as_whole,
@@ -126,11 +127,13 @@ _MATRIX = Wording(
     "for several inputs or outputs write rows of columns of polynomials: [[[0, 1], [0, 2]]]",
 )
 _CONTINUOUS = Wording(f"{_ONE}, or a list of factors, or rows (outputs) of columns (inputs) of coefficients")
-_Coefficients = Annotated[Several[Number], Wording(_ONE)]
-_Monic = Annotated[_Coefficients, holds(check_monic)]
+_Coefficients = Annotated[Several[Number], SIZES["coefficients of a numerator"], Wording(_ONE)]
+_Rooted = Annotated[Several[Number], SIZES["coefficients of a denominator"], Wording(_ONE)]
+_Monic = Annotated[_Rooted, holds(check_monic)]
 _Stable = Annotated[_Monic, holds(check_delay_stable)]
-_Leading = Annotated[_Coefficients, holds(check_leading)]
-_Rows = Annotated[Several[Several[T]], AfterValidator(same_columns)]
+_Leading = Annotated[_Rooted, holds(check_leading)]
+_Channels = Annotated[Several[T], SIZES["inputs or outputs"]]
+_Rows = Annotated[_Channels[_Channels[T]], AfterValidator(same_columns)]
 _OneOrList = Annotated[Annotated[T, tag("1")] | Annotated[Several[T], tag("2")], _DEPTH]
 _OneOrRows = Annotated[Annotated[T, tag("1")] | Annotated[_Rows[T], tag("3")], _DEPTH]
 

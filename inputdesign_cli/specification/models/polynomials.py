@@ -12,9 +12,6 @@ from inputdesign_cli.specification.wording import show
 
 Polynomial = tuple[float, ...]
 
-MAX_ORDER = 300
-"""Roots of higher orders mean nothing in double precision, and take long."""
-
 
 def product(factors: Iterable[Polynomial]) -> Polynomial:
     """The product of polynomials given by their coefficients (the order of the powers does not matter)."""
@@ -97,12 +94,6 @@ def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
 
 
 def _roots(polynomial: Polynomial) -> tuple[np.ndarray, PathDiagnostic | None]:
-    if len(polynomial) - 1 > MAX_ORDER:
-        return np.zeros(0), PathDiagnostic(
-            "bad-polynomial",
-            f"{{key}} has order {len(polynomial) - 1}; orders above {MAX_ORDER} are not supported",
-            "reduce the order, or write it as a list of factors where that is allowed",
-        )
     try:
         with np.errstate(all="ignore"):
             roots = np.roots(np.asarray(polynomial, dtype=float))

@@ -10,6 +10,7 @@ from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
+from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.refusals import refuse, stated
 from inputdesign_cli.tasks.regression import KEY, RegressionTask, RegressionTrial, TrueNoise
@@ -44,6 +45,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
             key="accuracy",
         )
     _check_supported(spec)
+    check_record(spec, plant.inputs)
     if not any(error.estimated):
         raise bad_spec(
             "zero-weights",
