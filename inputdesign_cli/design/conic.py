@@ -121,8 +121,7 @@ def _check_fits(blocks: Sequence[Block]) -> None:
     if rows > _MOST_ROWS:
         raise bad_spec(
             "too-large",
-            f"the program of this design has matrix inequalities of {rows} entries, and at most {_MOST_ROWS} fit "
-            "into memory",
+            f"matrix inequalities of {rows} entries do not fit into memory; at most {_MOST_ROWS} do",
             hint="lower the order of the spectrum, or the number of parameters",
             key="spectrum",
         )

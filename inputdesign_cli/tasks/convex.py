@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -99,6 +99,7 @@ class ConvexTask:
         if self.columns is not None:
             result["spectrum"] |= {"factor_columns": self.columns.columns}
         self._check_met(result)
+        self._check_bound(result["objective"])
         self._check_length(result)
         solved = time.perf_counter()
         record = make_record(self.record, done.design, done.experiment)
@@ -126,11 +127,10 @@ class ConvexTask:
         Raises:
             InfeasibleError, InaccurateError: see `solve`.
         """
-        with plain_errors():
-            design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
-            if self.columns is not None:
-                climbed = restrict_columns(self.columns, design)
-                design, how = climbed.design, how | climbed.how
+        design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
+        if self.columns is not None:
+            climbed = restrict_columns(self.columns, design)
+            design, how = climbed.design, how | climbed.how
         experiment = design.problem.experiment
         if design.problem.goal == "samples":
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
@@ -198,6 +198,20 @@ class ConvexTask:
                         key="accuracy",
                     )
                 )
+
+    def _check_bound(self, objective: dict[str, Json]) -> None:
+        """Raise `InaccurateError` (`internal-disagreement`) when the value is beyond its proved bound."""
+        value, upper = objective["value"], objective.get("upper_bound")
+        beyond = objective["lower_bound"] - value if upper is None else value - upper
+        if self.grid is None and beyond > 0.0 and objective["relative_gap"] > max(self.tolerance, _MISSED):
+            raise InaccurateError(
+                Diagnostic(
+                    "internal-disagreement",
+                    f"the design reaches {value:.8g}, which its own proof excludes",
+                    hint="rescale the signals, or look for parameters that are nearly indistinguishable",
+                    key="accuracy",
+                )
+            )
 
     def _check_length(self, result: dict[str, Json]) -> None:
         """Raise `InfeasibleError` when even the shortest experiment is longer than limits.samples."""
@@ -270,20 +284,3 @@ class ConvexTask:
             return None
         plant = FiniteRecord(done.experiment, len(record.samples), self.record.step)
         return plant.information(record.samples)
-
-
-@contextmanager
-def plain_errors() -> Iterator[None]:
-    """Numerical failures in the words of the spec."""
-    try:
-        yield
-    except np.linalg.LinAlgError as error:
-        raise InaccurateError(
-            Diagnostic(
-                "numerically-singular",
-                "the information matrix is singular to working precision: the parameters are nearly "
-                "indistinguishable",
-                hint="lower the orders, or look for poles and zeros that nearly cancel",
-                key="plant",
-            )
-        ) from error

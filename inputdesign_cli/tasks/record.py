@@ -185,7 +185,7 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
     if not record.met:
         notes.append(
             f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.4g}; the limits on the "
-            "powers, or the level asked for, leave no room to raise it: a little more power or a few more "
+            "powers, the level asked for or its length leave no room: a little more power or a few more "
             "samples would do"
         )
     asked = request.samples or experiment

@@ -113,7 +113,7 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
         "plant": "{B: [0, 1], F: §[1, -2]}", "experiment": CONTROLLER}),
     ("too-large", "plant.F", "at most 301", {"plant": "{B: [1], F: §[1" + ", 0" * 300 + ", 0.1]}"}),
     ("bad-polynomial", "plant.continuous.denominator", "magnitude", {
-        "plant": "{continuous: {numerator: [1], denominator: §[1e-320, 1e300, 1]}}"}),
+        "plant": "{continuous: {numerator: [1], denominator: §[1e-320, 1e90, 1]}}"}),
     ("zero-polynomial", "plant.B", "zero", {"plant": "{B: §[0, 0]}"}),
     ("wrong-shape", "plant.B", "empty", {"plant": "{B: §[]}"}),
     ("wrong-shape", "plant.B", "rows of columns", {"plant": "{B: §[[0, 1], [0, 2]]}"}),
@@ -249,7 +249,7 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
     ("too-large", "experiment.controller.denominator", "at most 301", {
         "experiment": "{controller: {numerator: [1], denominator: §[" + ", ".join(["[1, 0.5]"] * 301) + "]}}"}),
     ("bad-polynomial", "experiment.controller.denominator", "product", {
-        "experiment": "{controller: {numerator: [1], denominator: §[[1e200], [1e200]]}}"}),
+        "experiment": "{controller: {numerator: [1], denominator: §[[1e90], [1e90], [1e90], [1e90]]}}"}),
     ("contradictory-objective", "objective", "criterion", {
         "accuracy": BEST, "limits": "{input_power: 1}", "objective": "§least_cost"}),
     ("needs-limits", "accuracy.model_error", "limits its power", {

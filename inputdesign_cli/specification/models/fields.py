@@ -28,7 +28,7 @@ from inputdesign_cli.specification.models.polynomials import (
     check_not_zero,
 )
 from inputdesign_cli.specification.models.section import TAG, tag
-from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
 from inputdesign_cli.specification.models.values import (
     as_text,
     as_whole,
@@ -73,9 +73,9 @@ _DEPTH = Discriminator(lambda value: f"{TAG}{depth(value)}")
 _LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if depth(value) else "one"))
 
 # Single values
-Number = Annotated[float, Strict(), AllowInfNan(False)]
-Positive = Annotated[Number, Field(gt=0)]
-NonNegative = Annotated[Number, Field(ge=0)]
+Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0), QUANTITY]
+NonNegative = Annotated[float, Strict(), AllowInfNan(False), Field(ge=0), QUANTITY]
 Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
 Fraction = Annotated[Number, Field(gt=0, lt=1)]
 Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]

@@ -50,6 +50,36 @@ class Size:
         return {**inner, limit: self.most} if limit else inner
 
 
+@dataclass(frozen=True)
+class Magnitude:
+    """Numbers other than zero of this range: beyond, products of a few of them leave that of arithmetic."""
+
+    least: float
+    most: float
+
+    def check(self, value: float) -> float:
+        """The value itself.
+
+        Raises:
+            PydanticCustomError: `out-of-range`.
+        """
+        if value and not self.least <= abs(value) <= self.most:
+            bound = f"at most {self.most:g}" if abs(value) > 1.0 else f"at least {self.least:g}"
+            message = f"{{key}} is {show(value)}, and such a number is {bound} in size"
+            raise fail("out-of-range", message, "choose another unit")
+        return value
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+
+QUANTITY = Magnitude(1e-40, 1e40)
+"""Powers, variances, errors, times, frequencies."""
+COEFFICIENT = Magnitude(0.0, 1e100)
+"""Coefficients and entries of matrices: powers of s may be far apart, and rounding leaves small ones."""
+
 SIZES = {
     "spectrum.order of fir": Size(1000, "the time of a design grows with the cube of the order"),
     "spectrum.order of polynomial": Size(80, "its integrals lose their digits beyond"),

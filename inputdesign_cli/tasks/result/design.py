@@ -133,7 +133,8 @@ def powers(problem: Problem, basis: Basis, x: Array) -> dict[str, list[float]]:
     """The powers of input, output and excitation, one entry a channel."""
     at, model = problem.on(basis), problem.experiment.model
     channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
-    return {kind: [at.power(kind, c).at(x) for c in range(channels[kind])] for kind in POWER_KINDS}
+    # A channel without power may come out below zero by rounding.
+    return {kind: [max(at.power(kind, c).at(x), 0.0) for c in range(channels[kind])] for kind in POWER_KINDS}
 
 
 def _cost(done: Designed, basis: Basis, x: Array) -> float:
