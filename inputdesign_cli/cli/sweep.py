@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Json, Quiet, SpecFile
+from inputdesign_cli.cli.options import Json, Quiet, SpecFile, one_of
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, executor
+from inputdesign_cli.sweep.verbs import Verb
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
-
-
-class SweepVerb(StrEnum):
-    """What is run at every point."""
-
-    SOLVE = "solve"
-    ANALYSE = "analyse"
-    SIMULATE = "simulate"
 
 
 def sweep(
@@ -51,7 +43,7 @@ def sweep(
             help="Directory of the sweep. The default is runs/ and the name of the spec with -sweep.",
         ),
     ] = None,
-    verb: Annotated[SweepVerb, typer.Option(help="The command to run at every point.")] = SweepVerb.SOLVE,
+    verb: Annotated[str, one_of(get_args(Verb), "The command to run at every point")] = "solve",
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
     fail_fast: Annotated[
@@ -82,7 +74,7 @@ def sweep(
     from inputdesign_cli.sweep import running as batch
 
     directory = output or Path("runs") / f"{spec.stem}-sweep"
-    common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb.value}
+    common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb}
     if dry_run:
         _list(batch.list_points(spec, settings or [], **common), json_output=json_output)
         return

@@ -98,6 +98,7 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
     ("out-of-range", "experiment.samples", "at most", {"experiment": "{samples: §1e30}"}),
     # polynomials
     ("not-monic", "plant.F", "divide all its coefficients by 2: [1, -0.25]", {"plant": "{B: [1], F: §[2, -0.5]}"}),
+    ("not-monic", "plant.F", "did you mean [1, -0.7]?", {"plant": "{B: [1], F: §[-0.7, 1]}"}),
     ("not-monic", "plant.A", "ascending", {"plant": "{B: [1], A: §[0, 1]}"}),
     ("not-monic", "noise.C", "not 3", {"noise": "{variance: 1, C: §[3]}"}),
     ("unstable-polynomial", "plant.F", "radius 1.7 at 0 rad", {"plant": "{B: [1], F: §[1, -1.7]}"}),
@@ -279,7 +280,7 @@ ROWS: list[tuple[str, str, str, dict[str, str | None]]] = [
     ("missing-key", "spectrum.given.power", '"power"', {"spectrum": "{§given: {type: white}}"}),
     ("unsuitable-key", "spectrum.given.amplitudes", "type: multisine", {
         "spectrum": "{given: {type: white, power: 1, §amplitudes: [1]}}"}),
-    ("wrong-shape", "spectrum.given.amplitudes", "1 amplitudes for 2", {
+    ("wrong-shape", "spectrum.given.amplitudes", "1 amplitude, and", {
         "spectrum": "{given: {type: multisine, frequencies: [1, 2], amplitudes: §[1]}}"}),
     ("wrong-shape", "spectrum.given.power", "inputs is 1", {"spectrum": "{given: {type: white, power: §[1, 2]}}"}),
     # signal, solver, simulation

@@ -23,6 +23,7 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.specification.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
@@ -140,7 +141,8 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
         """Every frequency has an amplitude."""
         wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
         if wrong is not None:
-            message = f"{{key}} holds {len(wrong)} amplitudes for {len(self.frequencies)} frequencies"
+            held, wanted = count(len(wrong), "amplitude"), len(self.frequencies)
+            message = f"{{key}} holds {held}, and the number of frequencies is {wanted}"
             lists = "list per input, with one " if depth(self.amplitudes) == 2 else ""
             yield PathDiagnostic(
                 "wrong-shape", message, f"write one {lists}amplitude per frequency", ("amplitudes",)

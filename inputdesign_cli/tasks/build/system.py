@@ -54,7 +54,8 @@ def build_model(spec: Spec) -> Model:
                 raise spec.complain(
                     "not-supported",
                     "this version takes the noise of a plant in s as white",
-                    hint=f"remove {name}, or write the plant as polynomials A, B, F in q^-1",
+                    hint="sample the plant and write it as polynomials A, B, F in q^-1, with coloured "
+                    f"noise; without {name} the noise, and with it the design, would be another",
                     key=f"noise.{name}",
                 )
             matrix = plant.continuous
