@@ -7,7 +7,7 @@ PYTHON = $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 py
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test slow lint golden bench docs papers clean
+.PHONY: help setup run test slow fuzz lint golden bench docs papers clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F '|' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -28,6 +28,9 @@ test: $(READY)  ## the tests, but for the slow ones
 
 slow: $(READY)  ## the slow tests: random plants, Monte Carlo
 	$(PY) -m pytest -m slow
+
+fuzz: $(READY)  ## extreme and broken specs for FUZZ_SECONDS (60): no crash, no hang, no nonsense
+	$(PY) -m tests.fuzzing
 
 lint: $(READY)  ## ruff and mypy
 	$(PY) -m ruff check .

@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from inputdesign_cli.cli.options import one_of
 from inputdesign_cli.errors import OutputError
 
 SCHEMA = "idesign.schema.json"
 
-
-class Kind(StrEnum):
-    """The starter specs, named as their files in `starters/`."""
-
-    OPEN_LOOP = "open-loop"
-    CLOSED_LOOP = "closed-loop"
-    SWEEP = "sweep"
-    CRITERION = "criterion"
-    CONTROL = "control"
-    REGRESSION = "regression"
+KINDS = ("open-loop", "closed-loop", "sweep", "criterion", "control", "regression")
+"""The starter specs, named as their files in `starters/`."""
 
 
 def init(
     file: Annotated[
         Path | None, typer.Argument(metavar="[FILE]", help="Where to write it, if not to standard output.")
     ] = None,
-    kind: Annotated[Kind, typer.Option(help="The experiment to start from.")] = Kind.OPEN_LOOP,
+    kind: Annotated[str, one_of(KINDS, "The experiment to start from")] = "open-loop",
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")] = False,
 ) -> None:
     """Write a commented starter spec.
@@ -38,7 +30,7 @@ def init(
     which editors complete and check the spec.
     """
     text = f"# yaml-language-server: $schema={SCHEMA}\n" + (
-        resources.files(__package__) / "starters" / f"{kind.value}.yaml"
+        resources.files(__package__) / "starters" / f"{kind}.yaml"
     ).read_text(encoding="utf-8")
     if file is None:
         typer.echo(text, nl=False)

@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
+
+
+def one_of(words: Sequence[str], help_text: str) -> Any:
+    """The option that takes one of these words, the first if it is absent."""
+
+    def check(value: str) -> str:
+        if value not in words:
+            from inputdesign_cli.specification.wording import unknown_word
+
+            message, hint = unknown_word(value, words)
+            raise typer.BadParameter("; ".join(filter(None, (message.replace("{key}", "it"), hint))))
+        return value
+
+    listed = ", ".join([f"{words[0]} (default)", *words[1:]])
+    return typer.Option(
+        metavar="WORD",
+        callback=check,
+        autocompletion=lambda: list(words),
+        show_default=False,
+        help=f"{help_text}: {listed}.",
+    )
+
 
 SpecFile = Annotated[
     Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file; - is standard input.")

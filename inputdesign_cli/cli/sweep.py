@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput
+from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput, one_of
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
+from inputdesign_cli.sweep.verbs import Verb
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
-
-
-class SweepVerb(StrEnum):
-    """What is run at every point."""
-
-    SOLVE = "solve"
-    ANALYSE = "analyse"
-    SIMULATE = "simulate"
 
 
 def sweep(
@@ -44,7 +36,7 @@ def sweep(
     ] = False,
     confine: Confine = None,
     output: SweepOutput = None,
-    verb: Annotated[SweepVerb, typer.Option(help="The command to run at every point.")] = SweepVerb.SOLVE,
+    verb: Annotated[str, one_of(get_args(Verb), "The command to run at every point")] = "solve",
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
     worker_timeout: WorkerTimeout = None,
@@ -76,12 +68,7 @@ def sweep(
     from inputdesign_cli.sweep import running as batch
 
     directory = output or Path("runs") / f"{spec.stem}-sweep"
-    common: dict[str, Any] = {
-        "directory": directory,
-        "zipped": zipped,
-        "verb": verb.value,
-        "confine": confine,
-    }
+    common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb, "confine": confine}
     if dry_run:
         _list(batch.list_points(spec, settings or [], **common), json_output=json_output)
         return

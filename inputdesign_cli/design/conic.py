@@ -13,6 +13,8 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
+from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import svec_length
 
@@ -52,6 +54,7 @@ class ConicSolution:
     iterations: int
 
 
+_MOST_ROWS = 20_000  # of semidefinite blocks: their factors fill up, to 8 bytes for each pair
 _STATUS: dict[str, Literal["solved", "almost_solved", "infeasible", "unbounded", "failed"]] = {
     "Solved": "solved",
     "AlmostSolved": "almost_solved",
@@ -71,7 +74,12 @@ def solve_conic(
         q: (n,) linear cost.
         tolerance: on the relative gap and the residuals; ask for more than the design needs,
             the certificate decides what was reached.
+
+    Raises:
+        InaccurateError: `out-of-time`.
+        SpecError: `too-large` when the factors of the program would not fit into memory.
     """
+    _check_fits(blocks)
     cones = []
     for block in blocks:
         if block.kind == "zero":
@@ -86,6 +94,7 @@ def solve_conic(
     settings.verbose = False
     settings.max_threads = 1  # these programs are small: threads cost more than they gain
     settings.max_iter = max_iterations
+    settings.time_limit = seconds_left()
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     n = q.size
     solver = clarabel.DefaultSolver(
@@ -97,6 +106,7 @@ def solve_conic(
         settings,
     )
     answer = solver.solve()
+    seconds_left()
     ends = np.cumsum([b.offset.size for b in blocks])[:-1]
     return ConicSolution(
         x=np.asarray(answer.x),
@@ -104,3 +114,14 @@ def solve_conic(
         status=_STATUS.get(str(answer.status), "failed"),
         iterations=int(answer.iterations),
     )
+
+
+def _check_fits(blocks: Sequence[Block]) -> None:
+    rows = sum(block.offset.size for block in blocks if block.kind == "psd")
+    if rows > _MOST_ROWS:
+        raise bad_spec(
+            "too-large",
+            f"matrix inequalities of {rows} entries do not fit into memory; at most {_MOST_ROWS} do",
+            hint="lower the order of the spectrum, or the number of parameters",
+            key="spectrum",
+        )

@@ -17,7 +17,11 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     found = result.get("objective", {})
     kind, cost = found.get("kind"), "energy" if "moments" in result else "cost"
     if "value" in found:
-        yield cost if kind == "least_cost" else objective(kind).name, _clean(found["value"]), white(result)
+        yield (
+            cost if kind == "least_cost" else objective(kind).name,
+            _clean(found["value"], kind),
+            white(result),
+        )
     if kind != "least_cost" and "cost" in result:
         yield cost, shown(result["cost"]), ""
     powers = ", ".join(f"{name} {listed(power)}" for name, power in result.get("power", {}).items())
@@ -52,7 +56,7 @@ def white(result: Result) -> str:
     multiple = kind in ("least_cost", "closed_loop_error")
     if value is None or (multiple and (ratio is None or not value)):
         return ""
-    return f"white excitation: {_clean(value)}" + (f", {ratio:.3g} times as much" if multiple else "")
+    return f"white excitation: {_clean(value, kind)}" + (f", {ratio:.3g} times as much" if multiple else "")
 
 
 def proofs(result: Result) -> Iterator[str]:
@@ -72,9 +76,9 @@ def proofs(result: Result) -> Iterator[str]:
             yield f"no {whatever} {side} {shown(found[f'any_{what}_bound'])}"
 
 
-def _clean(value: float) -> str:
-    """Seven digits; the logarithm of one is zero, whatever rounding says."""
-    return shown(0.0 if abs(value) < 1e-12 else value)
+def _clean(value: float, kind: str) -> str:
+    """Seven digits; the logarithm of one (criterion D) is zero, whatever rounding says."""
+    return shown(0.0 if kind == "D" and abs(value) < 1e-12 else value)
 
 
 def _signal(result: Result) -> Iterator[str]:

@@ -16,18 +16,15 @@ from inputdesign_cli.report.charts import Chart, svg_uri
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import citations
-from inputdesign_cli.runs.objectives import OBJECTIVES
+from inputdesign_cli.runs.objectives import OBJECTIVES, objective
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import read_run
 
 MOST_ROWS = 200
 _SHOWN = (
-    ("status", "status"),
-    ("objective.value", "value"),
     ("objective.lower_bound", "lower bound"),
     ("objective.upper_bound", "upper bound"),
     ("objective.any_spectrum_bound", "any spectrum"),
-    ("baseline.white.cost", "white"),
     ("model_error.worst_ratio", "r_u / r_adm"),
     ("time_s", "time (s)"),
 )
@@ -37,7 +34,7 @@ def sweep_page(root: Path) -> dict[str, Json]:
     """The content of the template for a sweep. Raises `DataError` as `read_sweep` does."""
     table = read_sweep(root)
     summary = table.summary
-    columns = [(name, title) for name, title in _SHOWN if any(table.columns.get(name, []))]
+    columns = [(name, title) for name, title in _columns(table) if any(table.columns.get(name, []))]
     names = [*table.axes, *(name for name, _ in columns)]
     rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]
     question, result = _first_run(table, root)
@@ -57,6 +54,15 @@ def sweep_page(root: Path) -> dict[str, Json]:
         "provenance": provenance(summary.get("environment", {})),
         "citations": citations(question, result) if question else [],
     }
+
+
+def _columns(table: SweepTable) -> list[tuple[str, str]]:
+    """The columns that are shown, by name and title; white excitation is measured as the value is."""
+    kind = objective(table.kind)
+    value = [("objective.value", kind.name if table.kind else "value")]
+    white = [(f"baseline.white.{kind.white}", f"{kind.name} of white")] if table.kind else []
+    kinds = [] if table.kind else [("objective.kind", "objective")]
+    return [("status", "status"), *kinds, *value, *white, *_SHOWN]
 
 
 def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str, Json]]:

@@ -16,24 +16,27 @@ _MOST_GROWTH = 40.0
 # A level that leaves more than this share of the figure gains nothing worth having; so many may.
 _WORTH = 0.998
 _PATIENCE = 4
-_NOTHING = 1e-9
+_NOTHING, _PLENTY = 1e-9, 1e30
 
 
 def least_level(ratio: Callable[[float], float], start: float) -> float:
     """The level at which a `ratio` that falls continuously with the level is one, from above.
 
     Raises:
-        LinAlgError: the ratio is not defined at any level: some parameter is not excited.
+        LinAlgError: the ratio is not defined at any level, or at most one at none: some parameter is not
+            excited.
     """
     level = start
     for _ in range(3):  # exact at once when all that is known comes from the record
         reached = ratio(level)
         if abs(reached - 1.0) <= 1e-12:
             return level
-        level *= reached
+        level *= min(reached, _PLENTY)
     low = high = level
     while ratio(high) > 1.0:
         low, high = high, high * 1.5
+        if high > _PLENTY * start:
+            raise np.linalg.LinAlgError
     while ratio(low) <= 1.0:
         if low <= _NOTHING * start:  # what is known without the record is enough
             return low

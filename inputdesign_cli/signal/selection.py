@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.bounds import Bounds, limiter_of
@@ -80,6 +81,7 @@ class _Candidates:
 
     def record(self, rng: np.random.Generator) -> Record:
         """One candidate at its level."""
+        seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
         samples, met = self._levelled(values * np.sqrt(power / _power(values)))
         factor, evaluator = self.generator.factor, self.evaluator

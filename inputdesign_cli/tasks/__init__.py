@@ -7,9 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_record
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.identification import build_identification
@@ -25,8 +27,8 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
-    with _placed(spec):
-        return build_task(spec).solve()
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return finite(build_task(spec).solve(), most_extreme(spec.content))
 
 
 def analyse(spec: Spec) -> Results:
@@ -35,8 +37,8 @@ def analyse(spec: Spec) -> Results:
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
-    with _placed(spec):
-        return build_given(spec).solve()
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return finite(build_given(spec).solve(), most_extreme(spec.content))
 
 
 def validate(spec: Spec) -> None:
@@ -56,7 +58,7 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
         SpecError: what this version does not simulate, and all that `solve` raises.
     """
     with _placed(spec):
-        return build_task(spec).simulate(executor)
+        return finite(build_task(spec).simulate(executor), most_extreme(spec.content))
 
 
 def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Results:
@@ -67,7 +69,8 @@ def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Res
         DataError: the file cannot be used, or the data do not determine the parameters.
     """
     with _placed(spec):
-        return identify_record(build_identification(spec), Path(data), remove_means=remove_means)
+        found = identify_record(build_identification(spec), Path(data), remove_means=remove_means)
+        return finite(found, most_extreme(spec.content))
 
 
 def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
@@ -84,8 +87,9 @@ def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Asses
 
 @contextmanager
 def _placed(spec: Spec) -> Iterator[None]:
-    """Errors with the lines of the spec that they concern."""
+    """Errors with the lines of the spec that they concern, those of arithmetic too."""
     try:
-        yield
+        with sound_arithmetic(most_extreme(spec.content)):
+            yield
     except IdesignError as error:
         raise spec.place(error) from error

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -108,9 +108,9 @@ class ConvexTask:
             result["signal"] = self._signal_entry(done, record)
             tables["signal"], curves["signal"] = signal_curves(self.record, self.header.units, record)
             files = other_files(self.record, self.header.units, record)
+        if done.design.result.x.any():
             notes = record_notes(self.record, done.experiment.samples, record)
-            if notes:
-                result["notes"] = [*result.get("notes", []), *notes]
+            result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
         units = self.header.units
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
@@ -142,11 +142,10 @@ class ConvexTask:
         Raises:
             InfeasibleError, InaccurateError: see `solve`.
         """
-        with plain_errors():
-            design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
-            if self.columns is not None:
-                design, climbed = restrict_columns(self.columns, design)
-                how |= climbed
+        design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
+        if self.columns is not None:
+            design, climbed = restrict_columns(self.columns, design)
+            how |= climbed
         experiment = design.problem.experiment
         if design.problem.goal == "samples":
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
@@ -267,18 +266,3 @@ class ConvexTask:
             return None
         plant = FiniteRecord(done.experiment, len(record.samples), self.record.step)
         return plant.information(record.samples)
-
-
-@contextmanager
-def plain_errors() -> Iterator[None]:
-    """Numerical failures in the words of the spec."""
-    try:
-        yield
-    except np.linalg.LinAlgError as error:
-        raise InaccurateError.because(
-            "numerically-singular",
-            "the information matrix is singular to working precision: the parameters are nearly "
-            "indistinguishable",
-            hint="lower the orders, or look for poles and zeros that nearly cancel",
-            key="plant",
-        ) from error

@@ -20,7 +20,7 @@ from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
-from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, worst_ratio
+from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, record_notes, worst_ratio
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
@@ -161,6 +161,7 @@ class GivenTask:
             files = other_files(self.record, units, record)
         signal = result.get("signal", {})
         notes = broken_limits(self.limits, experiment.samples, excitation.power, signal)
+        notes += record_notes(self.record, experiment.samples, record) if record is None else []
         if notes:
             result["notes"] = notes
         result["timing_s"] = {"analysis": time.perf_counter() - started}
@@ -229,7 +230,7 @@ class GivenTask:
         """Sinusoids in phase over several inputs: their power matrices have rank one, in every period."""
         request = self.record
         samples = request.length(experiment.samples)
-        if samples < least_period(1):
+        if not request.feasible(experiment.samples, least_period(1)):
             return None
         rng = np.random.default_rng(request.settings.seed)
         record = in_phase_record(frequencies * request.step, amplitudes, samples, rng)

@@ -26,6 +26,11 @@ from inputdesign_cli.signal import (
 from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.shortest_record import shortest_record
 
+_NO_RECORD = (
+    "there is no record: it would have {} samples, and at most {} are computed for this model; "
+    "signal.samples sets a shorter one"
+)
+
 
 @dataclass(frozen=True)
 class Delivery:
@@ -56,6 +61,7 @@ class RecordRequest:
         samples: length; that of the experiment when None.
         meets: whether the record itself is to meet the accuracy; else it has the power of the design.
         most_samples: the longest experiment, where one is looked for.
+        longest: samples of the longest record that is computed at all.
         limit_keys: of the spec, for what limits single samples.
     """
 
@@ -67,6 +73,7 @@ class RecordRequest:
     samples: int | None = None
     meets: bool = True
     most_samples: int | None = None
+    longest: int = 2**20
     limit_keys: tuple[str, ...] = ()
     delivery: Delivery = Delivery()
 
@@ -74,6 +81,11 @@ class RecordRequest:
         """Samples of the record of an experiment of so many: whole periods of held values."""
         block = self.settings.block
         return -(-(self.samples or experiment) // block) * block
+
+    def feasible(self, experiment: int, least: int) -> bool:
+        """Whether a record of this length is computed, with at least so many values a period."""
+        samples = self.length(experiment)
+        return samples <= self.longest and self.settings.period(samples) >= least
 
 
 def make_record(
@@ -83,7 +95,7 @@ def make_record(
 
     Best is the least power that meets the requirements by the record itself, or the best criterion. None when
     no excitation is needed, or when the record would be too short (criteria per sample without
-    `signal.samples`).
+    `signal.samples`) or longer than any that is computed.
 
     Args:
         longer: whether to look for a longer one where none of this length is found to meet the accuracy.
@@ -93,7 +105,8 @@ def make_record(
     """
     problem, settings = design.problem, request.settings
     samples = request.length(experiment.samples)
-    if not design.result.x.any() or settings.period(samples) < least_period(experiment.inputs):
+    feasible = request.feasible(experiment.samples, least_period(experiment.inputs))
+    if not design.result.x.any() or not feasible:
         return None
     upper = tuple((limit.kind, limit.channel, limit.bound) for limit in problem.limits if limit.upper)
     bounds = replace(request.bounds, powers=upper)
@@ -116,8 +129,8 @@ def make_record(
     record = made(samples)
     if record.met or settings.level is not None or not (bounds.hard and longer):
         return record
-    longest = request.most_samples if problem.goal == "samples" and request.samples is None else 0
-    return shortest_record(record, settings.block, made, longest, request.limit_keys)
+    allowed = request.most_samples if problem.goal == "samples" and request.samples is None else 0
+    return shortest_record(record, settings.block, made, allowed, request.longest, request.limit_keys)
 
 
 def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGenerator:
@@ -137,11 +150,11 @@ def given_record(
 ) -> Record | None:
     """One record of a spectrum that was given, of its power as far as the limits on samples allow.
 
-    None when it would be too short.
+    None when it would be too short or too long.
     """
     settings = replace(request.settings, candidates=1, most_candidates=1)
     samples = request.length(experiment.samples)
-    if settings.period(samples) < least_period(experiment.inputs):
+    if not request.feasible(experiment.samples, least_period(experiment.inputs)):
         return None
     limited = partial(limited_responses, experiment, request.bounds, request.step, settings.hold)
     generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
@@ -168,13 +181,16 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
     return ratio
 
 
-def record_notes(request: RecordRequest, experiment: int, record: Record) -> list[str]:
+def record_notes(request: RecordRequest, experiment: int, record: Record | None) -> list[str]:
     """What a user should know before applying the record; the experiment has so many samples."""
+    if record is None:
+        too_long = request.length(experiment) > request.longest
+        return [_NO_RECORD.format(request.length(experiment), request.longest)] if too_long else []
     notes = []
     if not record.met:
         notes.append(
             f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.4g}; the limits on the "
-            "powers, or the level asked for, leave no room to raise it: a little more power or a few more "
+            "powers, the level asked for or its length leave no room: a little more power or a few more "
             "samples would do"
         )
     asked = request.samples or experiment

@@ -24,7 +24,12 @@ class MakeRecord(Protocol):
 
 
 def shortest_record(
-    missed: Record, block: int, made: MakeRecord, most_samples: int | None, limit_keys: Sequence[str]
+    missed: Record,
+    block: int,
+    made: MakeRecord,
+    most_samples: int | None,
+    longest: int,
+    limit_keys: Sequence[str],
 ) -> Record:
     """The longer record that does what `missed` does not, or the error that says how long it would be.
 
@@ -33,31 +38,32 @@ def shortest_record(
     Args:
         block: its length is a multiple of this.
         most_samples: the longest that may be delivered; None for any, 0 when no other length is wanted.
+        longest: samples of the longest record that is computed at all.
         limit_keys: of the spec, for what limits single samples.
 
     Raises:
         InfeasibleError: `limits-too-tight`.
     """
-    found = _search(missed, block, made)
+    found = _search(missed, block, made, min(_LONGEST * len(missed.samples), longest))
     if found is not None and (most_samples is None or len(found.samples) <= most_samples):
         return found
     raise _too_tight(missed, found, most_samples, limit_keys)
 
 
-def _search(missed: Record, block: int, made: MakeRecord) -> Record | None:
+def _search(missed: Record, block: int, made: MakeRecord, longest: int) -> Record | None:
     """The shortest record that meets the target, to one per cent, by trying; None when none does.
 
     A record at its limits gathers information in proportion to its length: that is where the search begins.
     """
     start = len(missed.samples)
     low, high = start, _rounded(max(_expected(missed), _GROWTH * start), block)
-    if high > _LONGEST * start:
+    if high > longest:
         return None
     found = made(high, _CANDIDATES)
     while not found.met:
-        if high >= _LONGEST * start:
-            return None
         low, high = high, _rounded(high * _GROWTH, block)
+        if high > longest:
+            return None
         found = made(high, _CANDIDATES)
     shorter = _rounded(high / _GROWTH, block)
     while low < shorter < high:

@@ -14,7 +14,7 @@ import typer
 import inputdesign_cli
 from inputdesign_cli import specification, tasks
 from inputdesign_cli.cli import app, main
-from inputdesign_cli.cli.init import Kind
+from inputdesign_cli.cli.init import KINDS
 from inputdesign_cli.cli.terminal import aligned, colourful, status
 from inputdesign_cli.errors import (
     DataError,
@@ -433,13 +433,24 @@ def test_init_writes_once(run, tmp_path):
     assert (tmp_path / "mine.yaml").read_text() == text
 
 
-@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("kind", KINDS)
 def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
     assert run("init", "--kind", kind, "a.yaml")[0] == 0
     spec = inputdesign_cli.load_spec(tmp_path / "a.yaml", [])
     assert (spec.experiment.controller is not None) == (kind == "closed-loop")
     assert (spec.sweep is not None) == (kind == "sweep")
     assert (tmp_path / "a.yaml").read_text().count("#") > 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "nearest"),
+    [(("init", "--kind", "closd-loop"), "closed-loop"), (("sweep", "a", "--verb", "slove"), "solve")],
+)
+def test_an_unknown_word_is_refused_in_plain_words(run, arguments, nearest):
+    code, _, err = run(*arguments)
+    assert code == 2
+    assert f'did you mean "{nearest}"?' in " ".join(err.split())
+    assert "Value error" not in err
 
 
 def test_explain(run):

@@ -164,6 +164,22 @@ def test_the_page_of_a_sweep(runs, tmp_path):
     assert (out / "sweep.yaml").read_text() in "".join(page.itertext())
 
 
+def test_the_page_of_a_sweep_compares_in_one_unit(runs, tmp_path):
+    out = tmp_path / "out"
+    settings = [
+        "objective=shortest_experiment",
+        "limits={input_power: 0.5},{input_power: 1}",
+        "spectrum.order=1",
+    ]
+    sweep(runs / "open.yaml", settings, directory=out)
+    page = parse(report_text(out))
+    table = next(t for t in page.iter(f"{XHTML}table") if "samples of white" in "".join(t.itertext()))
+    header, *rows = [[("".join(cell.itertext())).strip() for cell in row] for row in table.iter(f"{XHTML}tr")]
+    white = [float(row[header.index("samples of white")]) for row in rows]
+    design = [float(row[header.index("samples")]) for row in rows]
+    assert all(one >= other for one, other in zip(white, design, strict=True))
+
+
 def test_a_sweep_without_any_result_has_a_page(runs, tmp_path):
     out = tmp_path / "out"
     sweep(runs / "open.yaml", ["accuracy.model_error={table: a.csv},{table: b.csv}"], directory=out)

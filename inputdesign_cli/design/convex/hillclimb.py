@@ -18,6 +18,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.plant.polynomial import Array
 
 CriterionName = Literal["D", "A", "E", "T"]
@@ -123,6 +124,7 @@ def hill_climb(
 def _climb(design: QuadraticDesign, step: _Step, H: Array) -> tuple[Array, list[float]]:
     history = [design.value(design.information(H))]
     for _ in range(_MAX_STEPS):
+        seconds_left()
         found = step.best(H)
         if found is None:
             break

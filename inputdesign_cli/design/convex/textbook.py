@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.master import Proof
 from inputdesign_cli.design.convex.problem import Problem
@@ -48,7 +49,7 @@ def solve_on_grid(
         start: a spectrum of the right size (the white baseline), which scales the program.
 
     Raises:
-        InaccurateError: `solver-failed` when cvxpy reports neither an optimum nor nearly one.
+        InaccurateError: `solver-failed` when cvxpy reports neither an optimum nor nearly one; `out-of-time`.
     """
     import cvxpy as cp
 
@@ -67,9 +68,10 @@ def solve_on_grid(
         with warnings.catch_warnings():
             # An inaccurate solution shows in the gap between its cost and the bound that it proves.
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
-            program.solve(solver=cp.CLARABEL)
+            program.solve(solver=cp.CLARABEL, time_limit=seconds_left())
     except cp.SolverError as error:
         raise _failed(str(error)) from error
+    seconds_left()
     if program.status not in ("optimal", "optimal_inaccurate") or c.value is None:
         raise _failed(f"its status is {program.status}")
     x = power * c.value

@@ -16,6 +16,7 @@ from inputdesign_cli.spectrum import flat_basis
 _POLISH = 3
 # Logarithms: an excitation so much stronger is as good as any, and a ratio that moves less stands still.
 _PLENTY, _STILL = 46.0, 1e-6
+_FAINT = -650.0  # below, powers underflow
 
 
 def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
@@ -43,8 +44,10 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
                 return 0.0
         lo = hi = np.log(power)
         hi = _enough(excess, hi)
-        while excess(lo) <= 0 and lo > -200:
+        while excess(lo) <= 0:
             lo -= 2.0
+            if lo < _FAINT:
+                return 0.0  # nothing is asked
         found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
         if abs(found - power) <= 1e-3 * power:
             return found

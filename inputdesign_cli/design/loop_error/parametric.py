@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.errors import InaccurateError
@@ -182,9 +183,16 @@ def _restricted(
         # Whether the answer is accurate is judged by the bound, which we compute ourselves.
         warnings.simplefilter("ignore")
         try:
-            program.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10)
+            program.solve(
+                solver=cp.CLARABEL,
+                tol_gap_abs=1e-10,
+                tol_gap_rel=1e-10,
+                tol_feas=1e-10,
+                time_limit=seconds_left(),
+            )
         except cp.SolverError as error:
             raise _failed(str(error)) from error
+    seconds_left()
     if x.value is None:
         raise _failed(str(program.status))
     # To the power one: without the rounding below zero.

@@ -23,6 +23,7 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import TAG, Section, tag
 from inputdesign_cli.specification.models.shapes import with_paths
 from inputdesign_cli.specification.models.transfer import Controller
+from inputdesign_cli.specification.wording import count
 
 InformationSource = Annotated[
     Annotated[FileName, tag("file")] | Annotated[SemidefiniteMatrix, tag("matrix")],
@@ -127,7 +128,7 @@ def check_names(names: tuple[str, ...] | None, size: int, matrix_key: str) -> It
     if len(names) != size:
         yield PathDiagnostic(
             "wrong-shape",
-            f"{{key}} holds {len(names)} names, but {matrix_key} is {size} x {size}",
+            f"{{key}} holds {count(len(names), 'name')}, but {matrix_key} is {size} x {size}",
             "write one name per row, in the order of the rows",
             ("parameters",),
         )

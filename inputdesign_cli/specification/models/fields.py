@@ -28,6 +28,7 @@ from inputdesign_cli.specification.models.polynomials import (
     check_not_zero,
 )
 from inputdesign_cli.specification.models.section import TAG, tag
+from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
 from inputdesign_cli.specification.models.values import (
     as_text,
     as_whole,
@@ -72,9 +73,9 @@ _DEPTH = Discriminator(lambda value: f"{TAG}{depth(value)}")
 _LIST_OR_NOT = Discriminator(lambda value: TAG + ("list" if depth(value) else "one"))
 
 # Single values
-Number = Annotated[float, Strict(), AllowInfNan(False)]
-Positive = Annotated[Number, Field(gt=0)]
-NonNegative = Annotated[Number, Field(ge=0)]
+Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0), QUANTITY]
+NonNegative = Annotated[float, Strict(), AllowInfNan(False), Field(ge=0), QUANTITY]
 Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
 Fraction = Annotated[Number, Field(gt=0, lt=1)]
 Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]
@@ -133,11 +134,13 @@ _MATRIX = Wording(
     "for several inputs or outputs write rows of columns of polynomials: [[[0, 1], [0, 2]]]",
 )
 _CONTINUOUS = Wording(f"{_ONE}, or a list of factors, or rows (outputs) of columns (inputs) of coefficients")
-_Coefficients = Annotated[Several[Number], Wording(_ONE)]
-_Monic = Annotated[_Coefficients, holds(check_monic)]
+_Coefficients = Annotated[Several[Number], SIZES["coefficients of a numerator"], Wording(_ONE)]
+_Rooted = Annotated[Several[Number], SIZES["coefficients of a denominator"], Wording(_ONE)]
+_Monic = Annotated[_Rooted, holds(check_monic)]
 _Stable = Annotated[_Monic, holds(check_delay_stable)]
-_Leading = Annotated[_Coefficients, holds(check_leading)]
-_Rows = Annotated[Several[Several[T]], AfterValidator(same_columns)]
+_Leading = Annotated[_Rooted, holds(check_leading)]
+_Channels = Annotated[Several[T], SIZES["inputs or outputs"]]
+_Rows = Annotated[_Channels[_Channels[T]], AfterValidator(same_columns)]
 _OneOrList = Annotated[Annotated[T, tag("1")] | Annotated[Several[T], tag("2")], _DEPTH]
 _OneOrRows = Annotated[Annotated[T, tag("1")] | Annotated[_Rows[T], tag("3")], _DEPTH]
 

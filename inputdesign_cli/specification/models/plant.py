@@ -25,6 +25,7 @@ from inputdesign_cli.specification.models.shapes import (
     shape_words,
     size_of,
 )
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import ContinuousMatrix
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 
@@ -110,8 +111,10 @@ class ContinuousPlant(Section, family="plant", phrase="a continuous-time plant")
 class RegressionSize(Section):
     """The numbers of regressors."""
 
-    estimated: Count = Field(description="How many regressors the model has.")
-    neglected: Index = Field(
+    estimated: Annotated[Count, SIZES["plant.regression"]] = Field(
+        description="How many regressors the model has."
+    )
+    neglected: Annotated[Index, SIZES["plant.regression"]] = Field(
         default=0, description="How many regressors act on the output but are not modelled."
     )
 

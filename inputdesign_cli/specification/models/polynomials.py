@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,9 +11,6 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.wording import show
 
 Polynomial = tuple[float, ...]
-
-MAX_ORDER = 300
-"""Roots of higher orders mean nothing in double precision, and take long."""
 
 
 def product(factors: Iterable[Polynomial]) -> Polynomial:
@@ -52,13 +49,15 @@ def check_monic(polynomial: Polynomial) -> PathDiagnostic | None:
             "{key} must start with 1, not 0",
             "it is a polynomial in q^-1, ascending: the first coefficient belongs to the power 0",
         )
-    scaled = ", ".join(show(c / lead) for c in polynomial[:6])
-    more = ", ..." if len(polynomial) > 6 else ""
-    return PathDiagnostic(
-        "not-monic",
-        f"{{key}} must start with 1, not {show(lead)}",
-        f"divide all its coefficients by {show(lead)}: [{scaled}{more}]",
-    )
+    hint = f"divide all its coefficients by {show(lead)}: {_listed([c / lead for c in polynomial])}"
+    if polynomial[-1] == 1.0:
+        hint = f"its coefficients ascend in q^-1: did you mean {_listed(polynomial[::-1])}?"
+    return PathDiagnostic("not-monic", f"{{key}} must start with 1, not {show(lead)}", hint)
+
+
+def _listed(coefficients: Sequence[float]) -> str:
+    more = ", ..." if len(coefficients) > 6 else ""
+    return f"[{', '.join(show(c) for c in coefficients[:6])}{more}]"
 
 
 def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
@@ -97,12 +96,6 @@ def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
 
 
 def _roots(polynomial: Polynomial) -> tuple[np.ndarray, PathDiagnostic | None]:
-    if len(polynomial) - 1 > MAX_ORDER:
-        return np.zeros(0), PathDiagnostic(
-            "bad-polynomial",
-            f"{{key}} has order {len(polynomial) - 1}; orders above {MAX_ORDER} are not supported",
-            "reduce the order, or write it as a list of factors where that is allowed",
-        )
     try:
         with np.errstate(all="ignore"):
             roots = np.roots(np.asarray(polynomial, dtype=float))

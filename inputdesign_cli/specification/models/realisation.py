@@ -24,7 +24,9 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.sizes import SIZES
 
+Samples = Annotated[Count, SIZES["signal.samples"]]
 SignalType = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
 
 # Settings that mean something for some types of signal only.
@@ -54,14 +56,14 @@ class Signal(Section):
     type: SignalType | None = Field(
         default=None, description="Kind of signal (default: what suits the spectrum)."
     )
-    samples: Count | None = Field(default=None, description="Length (default: experiment.samples).")
+    samples: Samples | None = Field(default=None, description="Length (default: experiment.samples).")
     seed: Index | None = Field(default=None, description="Seed of the random numbers.")
     phases: Literal["random", "schroeder", "optimised"] | None = Field(
         default=None, description="Phases of a multisine; optimised: for a low crest factor."
     )
-    periods: Count | None = Field(default=None, description="Number of equal periods.")
-    hold: Count | None = Field(default=None, description="Samples for which each value is held.")
-    lines: Harmonics | None = Field(
+    periods: Samples | None = Field(default=None, description="Number of equal periods.")
+    hold: Samples | None = Field(default=None, description="Samples for which each value is held.")
+    lines: Annotated[Harmonics, SIZES["signal.lines"]] | None = Field(
         default=None, description="Harmonics of a period that are used: their number, odd, or a list."
     )
     amplitudes: PerChannel[Positive] | None = Field(
@@ -71,8 +73,10 @@ class Signal(Section):
     offset: PerChannel[Number] | None = Field(
         default=None, description="Operating point added; a number or one per input."
     )
-    ramp: Index | None = Field(default=None, description="Samples over which the signal fades in and out.")
-    order: Count | None = Field(
+    ramp: Annotated[Index, SIZES["signal.samples"]] | None = Field(
+        default=None, description="Samples over which the signal fades in and out."
+    )
+    order: Annotated[Count, SIZES["signal.order"]] | None = Field(
         default=None,
         description="States for each input of a rational filter for filtered_noise (default: a long filter).",
     )
@@ -92,7 +96,7 @@ class Signal(Section):
     also: tuple[Literal["mat", "wav"], ...] | None = Field(
         default=None, description="Other files of the signal beside signal.csv: mat, wav."
     )
-    candidates: Count | None = Field(
+    candidates: Annotated[Count, SIZES["signal.candidates"]] | None = Field(
         default=None, description="Number of random realisations to choose the best of."
     )
 
@@ -118,14 +122,19 @@ class Solver(Section):
         description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
     )
     tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
-    grid: Count = Field(default=1000, description="Number of frequencies of the lmi method (default 1000).")
+    time_limit: Positive = Field(default=600.0, description="Seconds that a design may take (default 600).")
+    grid: Annotated[Count, SIZES["solver.grid"]] = Field(
+        default=1000, description="Number of frequencies of the lmi method (default 1000)."
+    )
     positivity: Literal["kyp", "gram"] = Field(default="gram", description="Positivity in the lmi method.")
 
 
 class Simulation(Section):
     """The Monte Carlo study on the true system."""
 
-    runs: Count = Field(default=100, description="Number of runs (default 100).")
+    runs: Annotated[Count, SIZES["simulation.runs"]] = Field(
+        default=100, description="Number of runs (default 100)."
+    )
     seed: Index = Field(default=0, description="Seed of the random numbers (default 0).")
     plant: TruePlant | None = Field(default=None, description="The true system (default: the nominal plant).")
     noise: SimulationNoise | None = Field(
@@ -157,7 +166,7 @@ Pair = Annotated[tuple[Name, Name], BeforeValidator(_pair), Wording("a list of t
 class Report(Section):
     """What the figures show."""
 
-    ellipses: Several[Pair] | None = Field(
+    ellipses: Annotated[Several[Pair], SIZES["report.ellipses"]] | None = Field(
         default=None,
         description="Pairs of parameters whose confidence ellipses are drawn (default with several channels: "
         "the most correlated ones; with one: none).",

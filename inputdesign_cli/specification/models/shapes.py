@@ -55,7 +55,7 @@ def with_paths(value: tuple) -> list[tuple[tuple[int, ...], Polynomial]]:
 def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDiagnostic]:
     """A list of polynomials at `path` has one for each output."""
     if depth(value) == 2 and len(value) != outputs:
-        message = f"{{key}} holds {len(value)} polynomials for {count(outputs, 'output')}"
+        message = f"{{key}} holds {count(len(value), 'polynomial')} for {count(outputs, 'output')}"
         hint = "write one polynomial for all outputs, or a list with one per output"
         yield PathDiagnostic("wrong-shape", message, hint, path)
 

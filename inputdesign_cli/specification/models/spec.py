@@ -115,11 +115,11 @@ class Spec(Section):
     @property
     def sha256(self) -> str:
         """The hash of what the spec says, overrides applied; comments, layout and order do not count."""
-        return fingerprint(self._content())
+        return fingerprint(self.content)
 
     def to_yaml(self) -> str:
         """The keys that the user gave, overrides applied, as YAML that `parse_spec` reads back."""
-        return to_yaml(self._content())
+        return to_yaml(self.content)
 
     def locate(self, key: str) -> Location | None:
         """Where a key such as `plant.F` or `plant.B[1]` is written, or its deepest ancestor that is."""
@@ -144,5 +144,7 @@ class Spec(Section):
         placed.__cause__ = error.__cause__
         return placed
 
-    def _content(self) -> dict[str, object]:
+    @property
+    def content(self) -> dict[str, object]:
+        """What the user wrote, overrides applied, as plain data."""
         return self._source.data or self.model_dump(mode="json", exclude_none=True, exclude_unset=True)

@@ -21,7 +21,9 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import TAG, Section, pick, tag
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.specification.wording import count
 from inputdesign_cli.specification.yaml.plain import Plain
 
 
@@ -39,15 +41,19 @@ class FirSpectrum(Section, family="spectrum", phrase="type: fir"):
     """The spectrum of filtered white noise: autocovariances c_0..c_m."""
 
     type: Literal["fir"] = Field(description="A trigonometric polynomial.")
-    order: Index = Field(default=20, description="m: the last designed autocovariance (default 20).")
+    order: Annotated[Index, SIZES["spectrum.order of fir"]] = Field(
+        default=20, description="m: the last designed autocovariance (default 20)."
+    )
 
 
 class MultisineSpectrum(Section, family="spectrum", phrase="type: multisine"):
     """Lines, either evenly spaced or at given frequencies."""
 
     type: Literal["multisine"] = Field(description="Sinusoids.")
-    lines: Count | None = Field(default=None, description="Number of evenly spaced candidate frequencies.")
-    frequencies: Frequencies | None = Field(
+    lines: Annotated[Count, SIZES["spectrum.lines"]] | None = Field(
+        default=None, description="Number of evenly spaced candidate frequencies."
+    )
+    frequencies: Annotated[Frequencies, SIZES["spectrum.frequencies"]] | None = Field(
         default=None, description="The candidate frequencies, increasing."
     )
 
@@ -69,12 +75,14 @@ class PolynomialSpectrum(Section, family="spectrum", phrase="type: polynomial"):
     basis: Literal["legendre", "chebyshev", "monomial"] = Field(
         default="chebyshev", description="Basis of the polynomial (default chebyshev)."
     )
-    order: Index = Field(description="Degree of the polynomial factor.")
+    order: Annotated[Index, SIZES["spectrum.order of polynomial"]] = Field(
+        description="Degree of the polynomial factor."
+    )
     band: Band = Field(description="The band [low, high] outside of which the spectrum vanishes.")
     coefficients: Literal["real", "complex"] = Field(
         default="real", description="Kind of coefficients (default real)."
     )
-    factor_columns: Count | None = Field(
+    factor_columns: Annotated[Count, SIZES["spectrum.factor_columns"]] | None = Field(
         default=None, description="Columns of the spectral factor: the rank of the spectrum (default: full)."
     )
 
@@ -83,7 +91,9 @@ class PointwiseSpectrum(Section, family="spectrum", phrase="type: pointwise"):
     """A spectrum designed frequency by frequency."""
 
     type: Literal["pointwise"] = Field(description="Frequency by frequency.")
-    grid: Count = Field(default=512, description="Number of frequencies (default 512).")
+    grid: Annotated[Count, SIZES["spectrum.grid"]] = Field(
+        default=512, description="Number of frequencies (default 512)."
+    )
 
 
 class MomentsSpectrum(Section, family="spectrum", phrase="type: moments"):
@@ -114,7 +124,9 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
     """A sum of sinusoids."""
 
     type: Literal["multisine"] = Field(description="A sum of sinusoids.")
-    frequencies: Frequencies = Field(description="Their frequencies, increasing.")
+    frequencies: Annotated[Frequencies, SIZES["spectrum.given.frequencies"]] = Field(
+        description="Their frequencies, increasing."
+    )
     amplitudes: Amplitudes = Field(
         description="An amplitude per frequency; for several inputs one list per input."
     )
@@ -129,7 +141,8 @@ class GivenMultisine(Section, family="given", phrase="type: multisine"):
         """Every frequency has an amplitude."""
         wrong = next((row for row in self.rows if len(row) != len(self.frequencies)), None)
         if wrong is not None:
-            message = f"{{key}} holds {len(wrong)} amplitudes for {len(self.frequencies)} frequencies"
+            held, wanted = count(len(wrong), "amplitude"), len(self.frequencies)
+            message = f"{{key}} holds {held}, and the number of frequencies is {wanted}"
             lists = "list per input, with one " if depth(self.amplitudes) == 2 else ""
             yield PathDiagnostic(
                 "wrong-shape", message, f"write one {lists}amplitude per frequency", ("amplitudes",)

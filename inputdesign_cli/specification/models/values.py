@@ -8,7 +8,8 @@ from typing import TypeVar
 import numpy as np
 
 from inputdesign_cli.specification.models.path_diagnostic import fail
-from inputdesign_cli.specification.models.polynomials import MAX_ORDER, Polynomial, product
+from inputdesign_cli.specification.models.polynomials import Polynomial, product
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.wording import show
 
 PolynomialList = tuple[Polynomial, ...]
@@ -78,11 +79,9 @@ def product_exists(denominator: Nested) -> Nested:
     """The factors of a denominator can be multiplied out; one polynomial or a matrix of them passes."""
     if depth(denominator) != 2:
         return denominator
-    order = sum(len(factor) - 1 for factor in denominator)
-    if order > MAX_ORDER:
-        message = f"{{key}} has order {order}; orders above {MAX_ORDER} are not supported"
-        raise fail("bad-polynomial", message)
-    if not np.all(np.isfinite(product(denominator))):
+    multiplied = product(denominator)
+    SIZES["coefficients of a denominator"].check(multiplied)
+    if not np.all(np.isfinite(multiplied)):
         message = "the product of the factors of {key} is too large"
         raise fail("bad-polynomial", message, "rescale the factors")
     return denominator

@@ -9,6 +9,7 @@ from inputdesign_cli.design.convex.designs import Question
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
+from inputdesign_cli.tasks.build.demand import check_design
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
@@ -41,6 +42,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     check_signal(spec)
     basis = build_basis(spec, experiment.inputs, experiment.band)
     grid = _grid_method(spec)
+    check_design(spec, experiment, basis)
     question = Question(
         experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
         basis=basis,
@@ -63,7 +65,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         ellipses=spec.report.ellipses,
         grid=grid,
         columns=_few_columns(spec, basis),
-        record=build_record_request(spec),
+        record=build_record_request(spec, experiment.size),
         unstated=unstated_errors(spec, experiment),
         simulation=build_simulation(spec, experiment),
     )

@@ -76,7 +76,7 @@ def build_given(spec: Spec) -> GivenTask:
         cost=build_cost(spec),
         alpha=model_error_alpha(spec, experiment.model),
         limits=_limits(spec),
-        record=build_record_request(spec),
+        record=build_record_request(spec, experiment.size),
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
     )

@@ -23,6 +23,7 @@ from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
+from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.system import held_plant, polynomial_model
 from inputdesign_cli.tasks.build.weights import held, rational
@@ -145,6 +146,7 @@ def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
 
 
 def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalSettings:
+    check_record(spec, inputs**2)
     signal, samples = spec.signal, spec.signal_samples
     filtered = signal.type == "filtered_noise"
     if filtered and error.covariance == "parametric":

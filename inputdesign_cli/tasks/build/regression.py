@@ -10,6 +10,7 @@ from inputdesign_cli.design.regression import Regression
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.monte_carlo.regression import Contender
 from inputdesign_cli.specification import Noise, SimulationNoise, Spec
+from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.regression import KEY, RegressionTask, RegressionTrial, TrueNoise
 from inputdesign_cli.tasks.regressors import RegressorSettings
@@ -43,6 +44,7 @@ def build_regression_task(spec: Spec) -> RegressionTask:
             key="accuracy",
         )
     _check_supported(spec)
+    check_record(spec, plant.inputs)
     if not any(error.estimated):
         raise bad_spec(
             "zero-weights",

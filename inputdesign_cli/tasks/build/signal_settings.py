@@ -9,6 +9,7 @@ from inputdesign_cli.runs.results import Table
 from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.demand import check_record, longest_record
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
@@ -21,12 +22,13 @@ _OPTIMISED = 4
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
-def build_record_request(spec: Spec) -> RecordRequest:
-    """All that the spec asks of its record.
+def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
+    """All that the spec asks of its record, for a model of so many parameters.
 
     Raises:
-        SpecError: `needs-band`; `beyond-nyquist` when samples are too far apart for the band.
+        SpecError: `needs-band`; `too-large`; `beyond-nyquist` when samples are too far apart for the band.
     """
+    check_record(spec, parameters)
     step, limits, signal = record_step(spec), spec.limits, spec.signal
     lo, hi = excitation_band(spec)
     stated = {
@@ -43,6 +45,7 @@ def build_record_request(spec: Spec) -> RecordRequest:
         samples=signal.samples,
         meets=signal.scale != "design",
         most_samples=limits.samples,
+        longest=longest_record(parameters, spec.plant.outputs),
         limit_keys=tuple(key for key, value in stated.items() if value is not None),
         delivery=Delivery(
             operating_points=None if signal.offset is None else _operating_points(spec),

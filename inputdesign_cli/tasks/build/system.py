@@ -32,6 +32,7 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.specification.models.transfer import DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.tasks.build.demand import check_model
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.tables import read_columns
 from inputdesign_cli.tasks.build.weights import rational
@@ -54,7 +55,8 @@ def build_model(spec: Spec) -> Model:
                 raise spec.complain(
                     "not-supported",
                     "this version takes the noise of a plant in s as white",
-                    hint=f"remove {name}, or write the plant as polynomials A, B, F in q^-1",
+                    hint="sample the plant and write it as polynomials A, B, F in q^-1, with coloured "
+                    f"noise; without {name} the noise, and with it the design, would be another",
                     key=f"noise.{name}",
                 )
             matrix = plant.continuous
@@ -97,10 +99,12 @@ def build_experiment(spec: Spec) -> Experiment:
     """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
     Raises:
-        SpecError: `needs-band`; an unstable or algebraic loop; a prior that does not fit the parameters.
+        SpecError: `needs-band`; `too-large`; an unstable or algebraic loop; a prior that does
+            not fit the parameters.
         DataError: the record of a prior cannot be used.
     """
     model, controller = build_model(spec), spec.experiment.controller
+    check_model(spec, model)
     loop = None if controller is None else build_loop(model, controller)
     if loop is not None:
         loop.check_delay()

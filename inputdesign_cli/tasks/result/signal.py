@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, SignalCurves, Table
@@ -16,6 +17,7 @@ from inputdesign_cli.signal import DesignedSpectrum, Lines, Record
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
 
 _LAGS = 50
+_LOST = 1e-6  # of the largest sample
 
 
 def signal_entry(
@@ -66,7 +68,11 @@ def signal_entry(
 
 
 def signal_curves(request: RecordRequest, units: Units, record: Record) -> tuple[Table, SignalCurves]:
-    """signal.csv, with time stamps in the unit of the spec, and its plot with the limits on u."""
+    """signal.csv, with time stamps in the unit of the spec, and its plot with the limits on u.
+
+    Raises:
+        SpecError: see `applied`.
+    """
     time = units.sample_time * np.arange(len(record.samples), dtype=np.float64)
     channels = dict(zip(units.excitations, applied(request.delivery, record).T, strict=True))
     most, limits = request.bounds.amplitude, {}
@@ -78,9 +84,22 @@ def signal_curves(request: RecordRequest, units: Units, record: Record) -> tuple
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
-    """(n, r): the samples shifted to the operating points; a record that was given is left as it is."""
+    """(n, r): the samples shifted to the operating points; a record that was given is left as it is.
+
+    Raises:
+        SpecError: `out-of-range` when so much is added that the samples lose their digits.
+    """
     points = delivery.operating_points
-    return record.samples if points is None or record.method == "given" else record.samples + points
+    if points is None or record.method == "given":
+        return record.samples
+    if np.any(np.spacing(np.abs(points)) > _LOST * np.abs(record.samples).max(axis=0)):
+        raise bad_spec(
+            "out-of-range",
+            "the operating point is so far off that the samples added to it lose their digits",
+            hint="move the zero of the scale, or lower signal.offset",
+            key="signal.offset",
+        )
+    return record.samples + points
 
 
 def other_files(request: RecordRequest, units: Units, record: Record) -> dict[str, bytes]:

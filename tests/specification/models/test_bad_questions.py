@@ -85,10 +85,10 @@ ROWS: list[Row] = [
         **REGRESSION, "objective": "§best_accuracy", "limits": "{energy: 1}"}),
     ("needs-limits", "accuracy.mean_squared_error", "add limits.energy", {
         **REGRESSION, "accuracy": "{§mean_squared_error: {estimated: [1], neglected_norm: 1}}"}),
-    ("bad-polynomial", "experiment.controller.denominator", "order 301", {
+    ("too-large", "experiment.controller.denominator", "at most 301", {
         "experiment": "{controller: {numerator: [1], denominator: §[" + ", ".join(["[1, 0.5]"] * 301) + "]}}"}),
     ("bad-polynomial", "experiment.controller.denominator", "product", {
-        "experiment": "{controller: {numerator: [1], denominator: §[[1e200], [1e200]]}}"}),
+        "experiment": "{controller: {numerator: [1], denominator: §[[1e90], [1e90], [1e90], [1e90]]}}"}),
     ("contradictory-objective", "objective", "criterion", {
         "accuracy": "{criterion: D}", "limits": "{input_power: 1}", "objective": "§least_cost"}),
     ("needs-limits", "accuracy.model_error", "limits its power", {

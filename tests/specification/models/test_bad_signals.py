@@ -26,7 +26,7 @@ ROWS: list[Row] = [
     ("missing-key", "spectrum.given.power", '"power"', {"spectrum": "{§given: {type: white}}"}),
     ("unsuitable-key", "spectrum.given.amplitudes", "type: multisine", {
         "spectrum": "{given: {type: white, power: 1, §amplitudes: [1]}}"}),
-    ("wrong-shape", "spectrum.given.amplitudes", "1 amplitudes for 2", {
+    ("wrong-shape", "spectrum.given.amplitudes", "1 amplitude, and", {
         "spectrum": "{given: {type: multisine, frequencies: [1, 2], amplitudes: §[1]}}"}),
     ("wrong-shape", "spectrum.given.power", "inputs is 1", {"spectrum": "{given: {type: white, power: §[1, 2]}}"}),
     # signal, solver, simulation

@@ -12,6 +12,7 @@ from tests.support.bad_specs import CONTINUOUS, CONTROLLER, MIMO, Row, each
 ROWS: list[Row] = [
     # polynomials
     ("not-monic", "plant.F", "divide all its coefficients by 2: [1, -0.25]", {"plant": "{B: [1], F: §[2, -0.5]}"}),
+    ("not-monic", "plant.F", "did you mean [1, -0.7]?", {"plant": "{B: [1], F: §[-0.7, 1]}"}),
     ("not-monic", "plant.A", "ascending", {"plant": "{B: [1], A: §[0, 1]}"}),
     ("not-monic", "noise.C", "not 3", {"noise": "{variance: 1, C: §[3]}"}),
     ("unstable-polynomial", "plant.F", "radius 1.7 at 0 rad", {"plant": "{B: [1], F: §[1, -1.7]}"}),
@@ -25,9 +26,9 @@ ROWS: list[Row] = [
         "plant": "{B: [[[0, 1]], [[0, 2]]], A: [[1], §[1, -3]]}"}),
     ("unstable-polynomial", "plant.F", "radius", {
         "plant": "{B: [0, 1], F: §[1, -2]}", "experiment": CONTROLLER}),
-    ("bad-polynomial", "plant.F", "order 301", {"plant": "{B: [1], F: §[1" + ", 0" * 300 + ", 0.1]}"}),
+    ("too-large", "plant.F", "at most 301", {"plant": "{B: [1], F: §[1" + ", 0" * 300 + ", 0.1]}"}),
     ("bad-polynomial", "plant.continuous.denominator", "magnitude", {
-        "plant": "{continuous: {numerator: [1], denominator: §[1e-320, 1e300, 1]}}"}),
+        "plant": "{continuous: {numerator: [1], denominator: §[1e-320, 1e90, 1]}}"}),
     ("zero-polynomial", "plant.B", "zero", {"plant": "{B: §[0, 0]}"}),
     ("wrong-shape", "plant.B", "empty", {"plant": "{B: §[]}"}),
     ("wrong-shape", "plant.B", "rows of columns", {"plant": "{B: §[[0, 1], [0, 2]]}"}),

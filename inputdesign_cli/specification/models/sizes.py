@@ -1,0 +1,107 @@
+"""How large the counts and the lists of a spec may be, and why: the one place that says so.
+
+Beyond these, memory or time runs out, or rounding has the last word; `docs/sizes.md` shows them with what was
+measured. What depends on several keys together is estimated where it is built (`tasks.build.demand`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import core_schema
+
+from inputdesign_cli.specification.models.path_diagnostic import fail
+from inputdesign_cli.specification.wording import show
+from inputdesign_cli.specification.yaml.plain import Plain
+
+
+@dataclass(frozen=True)
+class Size:
+    """The largest number, or the longest list, that a key takes; stands in the `Annotated[..]` of a type."""
+
+    most: int
+    why: str
+
+    def check(self, value: Plain) -> Plain:
+        """The value itself.
+
+        Raises:
+            PydanticCustomError: `too-large`.
+        """
+        listed = isinstance(value, list | tuple)
+        size = len(value) if listed else value
+        if isinstance(size, int | float) and not isinstance(size, bool) and self.most < size < 2**1024:
+            held = f"has {size} entries" if listed else f"is {show(size)}"
+            hint = f"write at most {self.most}" + (" entries" if listed else "")
+            raise fail("too-large", f"{{key}} {held}, and at most {self.most} are taken: {self.why}", hint)
+        return value
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Plain]:
+        inner = handler(schema)
+        limit = {"array": "maxItems", "integer": "maximum"}.get(str(inner.get("type")))
+        return {**inner, limit: self.most} if limit else inner
+
+
+@dataclass(frozen=True)
+class Magnitude:
+    """Numbers other than zero of this range: beyond, products of a few of them leave that of arithmetic."""
+
+    least: float
+    most: float
+
+    def check(self, value: float) -> float:
+        """The value itself.
+
+        Raises:
+            PydanticCustomError: `out-of-range`.
+        """
+        if value and not self.least <= abs(value) <= self.most:
+            bound = f"at most {self.most:g}" if abs(value) > 1.0 else f"at least {self.least:g}"
+            message = f"{{key}} is {show(value)}, and such a number is {bound} in size"
+            raise fail("out-of-range", message, "choose another unit")
+        return value
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+
+QUANTITY = Magnitude(1e-40, 1e40)
+"""Powers, variances, errors, times, frequencies."""
+COEFFICIENT = Magnitude(0.0, 1e100)
+"""Coefficients and entries of matrices: powers of s may be far apart, and rounding leaves small ones."""
+
+SIZES = {
+    "spectrum.order of fir": Size(1000, "the time of a design grows with the cube of the order"),
+    "spectrum.order of polynomial": Size(80, "its integrals lose their digits beyond"),
+    "spectrum.lines": Size(5000, "a design keeps a number for each pair of lines"),
+    "spectrum.frequencies": Size(5000, "a design keeps a number for each pair of lines"),
+    "spectrum.factor_columns": Size(20, "a factor has no more columns than there are inputs"),
+    "spectrum.grid": Size(100_000, "every frequency has a matrix of its own"),
+    "spectrum.given.frequencies": Size(5000, "a number is kept for each pair of lines"),
+    "solver.grid": Size(2000, "the program has a matrix inequality at every frequency"),
+    "signal.samples": Size(1_000_000, "a record has an entry for each sample and parameter"),
+    "signal.lines": Size(1_000_000, "a period has no more harmonics than samples"),
+    "signal.candidates": Size(1000, "every candidate takes as long as one record"),
+    "signal.order": Size(100, "the filter is fitted by a search over its states"),
+    "simulation.runs": Size(1_000_000, "every run is an experiment and an estimate"),
+    "coefficients of a numerator": Size(1001, "a longer delay calls for slower sampling"),
+    "coefficients of a denominator": Size(301, "roots of higher orders mean nothing in double precision"),
+    "inputs or outputs": Size(20, "a model has parameters for each pair of them"),
+    "plant.regression": Size(200, "a design has an unknown for each pair of regressors"),
+    "report.ellipses": Size(100, "every pair is a panel of the figure"),
+}
+
+
+def most(key: str) -> int:
+    """The largest value that `SIZES` has for a key."""
+    return SIZES[key].most

@@ -1,0 +1,99 @@
+"""Whether memory and time suffice: what several keys of a spec ask for together, before it starts.
+
+What a single key may ask for stands in `specification.models.sizes`.
+"""
+
+from __future__ import annotations
+
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.sizes import most
+from inputdesign_cli.spectrum import Basis
+
+_MOST_BYTES = 4 * 2**30
+_NODES = 2000  # of an integral, where poles are well damped
+_COPIES = 4  # of a record's gradient while its information matrix is formed
+# The solver's matrix fills up: with so many cuts, steps of the solver and rounds to begin with.
+_CUTS, _STEPS, _ROUNDS, _CRITERION = 15, 10, 5, 4
+_PER_SECOND = 1e10  # multiplications
+
+
+def check_model(spec: Spec, model: Model) -> None:
+    """Whether the gradients of a model of so many parameters and channels fit.
+
+    Raises:
+        SpecError: `too-large`.
+    """
+    channels = model.outputs * model.inputs
+    room = _MOST_BYTES // (16 * _NODES * channels)
+    if len(model.names) > room:
+        raise _too_large(
+            spec,
+            "plant",
+            f"a model of {len(model.names)} parameters and {channels} entries",
+            f"{room} parameters",
+        )
+
+
+def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
+    """Whether the programs of a convex design fit, and their first rounds end within the time limit.
+
+    A program has a matrix inequality of the order of the information matrix for each frequency that binds.
+
+    Raises:
+        SpecError: `too-large`.
+    """
+    size = experiment.size
+    if basis.size * size**2 * 8 > _MOST_BYTES:
+        known = f"a spectrum of {basis.size} unknowns for a model of {size} parameters"
+        raise _too_large(spec, "spectrum", known, f"{_MOST_BYTES // (8 * size**2)} unknowns")
+    accuracy = spec.accuracy
+    inequalities = len(accuracy.standard_deviation or ()) + (_CRITERION if accuracy.criterion else 0)
+    if accuracy.model_error is not None or accuracy.weighted_variance is not None:
+        inequalities += _CUTS
+
+    def seconds(parameters: int) -> float:
+        rows = inequalities * parameters * (parameters + 1) / 2
+        return rows**3 / 3 * _STEPS * _ROUNDS / _PER_SECOND
+
+    limit = spec.solver.time_limit
+    if seconds(size) > limit:
+        fits = max(k for k in range(size) if seconds(k) <= limit)
+        raise spec.complain(
+            "too-large",
+            f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more; "
+            f"solver.time_limit is {limit:g}",
+            hint=f"{fits} parameters fit: lower the orders, or raise solver.time_limit",
+            key="plant",
+        )
+
+
+def check_record(spec: Spec, parameters: int) -> None:
+    """Whether the record fits; without a section `signal` one that does not is left out.
+
+    Raises:
+        SpecError: `too-large`.
+    """
+    room = longest_record(parameters, spec.plant.outputs)
+    samples = spec.signal_samples
+    stated = "signal" in spec.model_fields_set and spec.goal != "shortest_experiment"
+    if samples > room and (stated or spec.plant.kind == "regression"):
+        key = "signal.samples" if spec.signal.samples else "experiment.samples"
+        raise spec.complain(
+            "too-large",
+            f"the record has {samples} samples, and at most {room} are computed for a model of {parameters} "
+            "parameters",
+            hint=f"write signal.samples: {room} or less; experiment.samples may be as large as you like",
+            key=key,
+        )
+
+
+def longest_record(parameters: int, outputs: int) -> int:
+    """The most samples of a record whose gradient fits."""
+    return min(_MOST_BYTES // (8 * _COPIES * parameters * outputs), most("signal.samples"))
+
+
+def _too_large(spec: Spec, key: str, what: str, fits: str) -> Exception:
+    message = f"{what} takes more than {_MOST_BYTES / 2**30:.0f} GiB of memory"
+    return spec.complain("too-large", message, hint=f"at most {fits} fit: lower the orders", key=key)

@@ -1,0 +1,83 @@
+"""`make fuzz`: mutated specs for FUZZ_SECONDS (default 60), each in a process of its own; exit 1 on a fault.
+
+FUZZ_SEED (default 0) is that of the first spec; each spec has its own, which repeats it alone.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import random
+import resource
+import sys
+import tempfile
+import time
+from collections import Counter
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+
+from inputdesign_cli.compute.threads import use_one_thread
+
+use_one_thread()
+
+import cvxpy  # noqa: E402, F401 (once, before the processes divide)
+import yaml  # noqa: E402
+
+from tests.fuzzing.judge import judged  # noqa: E402
+from tests.fuzzing.mutations import ROOT, mutated  # noqa: E402
+
+_HANGS = 90.0  # seconds: more than time limits leave
+_MEMORY = 8 * 2**30
+_CONTEXT = multiprocessing.get_context("fork")
+
+
+def text_of(seed: int) -> str:
+    return yaml.safe_dump(mutated(random.Random(seed)), default_flow_style=None, sort_keys=False)
+
+
+def _work(seed: int, answers: Connection) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (until the process ends)
+    answers.send(judged(text_of(seed), ROOT / "specs"))
+
+
+def main() -> int:
+    seconds, seed = float(os.environ.get("FUZZ_SECONDS", "60")), int(os.environ.get("FUZZ_SEED", "0"))
+    folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
+    end, running, ends, faults = time.monotonic() + seconds, {}, Counter(), 0
+    while running or time.monotonic() < end:
+        while len(running) < (os.cpu_count() or 1) and time.monotonic() < end:
+            ours, theirs = _CONTEXT.Pipe(duplex=False)
+            worker = _CONTEXT.Process(target=_work, args=(seed, theirs))
+            worker.start()
+            theirs.close()
+            running[ours] = (worker, seed, time.monotonic())
+            seed += 1
+        ready = wait(list(running), timeout=1.0)
+        for answers, (worker, number, started) in list(running.items()):
+            late = time.monotonic() - started > _HANGS
+            if answers not in ready and not late:
+                continue
+            try:
+                end_of, found = ("hangs", "hangs") if late else answers.recv()
+            except EOFError:
+                worker.join()
+                end_of, found = "killed", f"the process ended with {worker.exitcode}"
+            worker.kill()
+            worker.join()
+            del running[answers]
+            ends[end_of] += 1
+            if found:
+                faults += 1
+                path = folder / f"{number}.yaml"
+                path.write_text(text_of(number), encoding="utf-8")
+                print(f"seed {number}, {path}:\n{found}\n", flush=True)
+    print(", ".join(f"{count} {name}" for name, count in ends.most_common()))
+    print(f"{ends.total()} specs, {faults} faults")
+    if not faults:
+        folder.rmdir()
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
