@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,10 +13,11 @@ from inputdesign_cli.cli.completion import spec_keys
 from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput, one_of
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
-from inputdesign_cli.sweep.verbs import Verb
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
+
+VERBS = ("solve", "analyse", "simulate")
 
 
 def sweep(
@@ -36,7 +37,9 @@ def sweep(
     ] = False,
     confine: Confine = None,
     output: SweepOutput = None,
-    verb: Annotated[str, one_of(get_args(Verb), "The command to run at every point")] = "solve",
+    verb: Annotated[
+        str, one_of(("solve", "analyse", "simulate"), "The command to run at every point")
+    ] = "solve",
     jobs: Jobs = 1,
     cluster: ClusterAddress = None,
     worker_timeout: WorkerTimeout = None,
