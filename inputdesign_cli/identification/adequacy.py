@@ -20,7 +20,7 @@ from inputdesign_cli.identification.records import Records, shifted
 from inputdesign_cli.plant.polynomial import Array
 
 # A right model fails some test with at most this probability.
-LEVEL = 0.03
+LEVEL = 0.02
 _LAGS = 25
 _FEW = 4
 _GROWTH = 1.35

@@ -28,12 +28,13 @@ _STAND_IN: dict[str, dict[str, Plain]] = {"plant": {"B": [0, 1]}, "noise": {"var
 _MOST_ROUNDS = 50
 
 
-def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Spec:
+def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = (), *, design: bool = True) -> Spec:
     """Read a spec file.
 
     Args:
         path: The YAML file.
         overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
+        design: Whether it must ask for a design, or for an analysis, that can be answered.
 
     Returns:
         The checked spec, with defaults filled in.
@@ -41,11 +42,18 @@ def load_spec(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Sp
     Raises:
         SpecError: With one diagnostic for everything that is wrong, in the order of the file.
     """
-    return parse_spec(read_text(path), os.fspath(path), overrides, folder=FilePath(path).parent)
+    return parse_spec(
+        read_text(path), os.fspath(path), overrides, folder=FilePath(path).parent, design=design
+    )
 
 
 def parse_spec(
-    text: str, file: str = "<spec>", overrides: Sequence[str] = (), *, folder: FilePath | None = None
+    text: str,
+    file: str = "<spec>",
+    overrides: Sequence[str] = (),
+    *,
+    folder: FilePath | None = None,
+    design: bool = True,
 ) -> Spec:
     """Read a spec from its text, as `load_spec` does from a file.
 
@@ -54,13 +62,14 @@ def parse_spec(
         file: The name in diagnostics.
         overrides: As for `load_spec`.
         folder: What the paths in the spec are relative to (default: the current folder).
+        design: As for `load_spec`.
 
     Raises:
         SpecError: As `load_spec`.
     """
     folder = folder or FilePath()
     tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder)
-    spec, found = _validate(tree)
+    spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
         raise SpecError(_sorted(diagnostics, tree.places))
@@ -90,7 +99,7 @@ def read_tree(text: str, file: str, overrides: Sequence[str], folder: FilePath) 
     return tree
 
 
-def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
+def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:
     """Validate, take out what is wrong, and validate again, until the rest is a spec that can be checked.
 
     So a wrong number in `plant` does not hide a contradiction in `accuracy`. What is wrong with a part
@@ -118,7 +127,7 @@ def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
                 broken.add(one.path)
                 _prune(data, one.path)
             continue
-        checked = [shorten(one, tree.data) for one in run_checks(spec, broken)]
+        checked = [shorten(one, tree.data) for one in run_checks(spec, broken, design=design)]
         return spec, told + [one for one in checked if not related(one.path, broken)]
     return None, told
 
