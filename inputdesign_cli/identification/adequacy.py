@@ -75,12 +75,12 @@ def score_tests(
     root = np.linalg.inv(np.linalg.cholesky(point.errors.T @ point.errors / n))
     residuals = (point.errors @ root.T).ravel()
     psi = (point.psi @ root.T).reshape(len(point.psi), -1).T
-    taken = _orthonormal(np.column_stack([point.near.directions, psi]))
+    taken = _orthonormal(_scaled(np.column_stack([point.near.directions, psi])))
     tests = []
     for signals in _tried(records, point, recent, int(feedback)):
-        regressors = np.einsum("pnm,qp->nqpm", signals.columns, root).reshape(n * p, -1)
+        regressors = _scaled(np.einsum("pnm,qp->nqpm", signals.columns, root).reshape(n * p, -1))
         regressors = regressors - taken @ (taken.T @ regressors)
-        scores = regressors.T @ residuals / np.maximum(np.linalg.norm(regressors, axis=0), 1e-300)
+        scores = regressors.T @ residuals / np.maximum(np.linalg.norm(regressors, axis=0), _DEPENDENT)
         directions = _orthonormal(regressors)
         statistic, freedom = float(np.sum((directions.T @ residuals) ** 2)), directions.shape[1]
         if not freedom:
@@ -151,8 +151,12 @@ def _summed(
     return np.concatenate(parts, axis=2), tuple(begin for begin, _ in bins for _ in range(x.shape[2]))
 
 
+def _scaled(columns: Array) -> Array:
+    """Columns (n, m) of norm one, or zero."""
+    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+
+
 def _orthonormal(columns: Array) -> Array:
-    """An orthonormal basis of what columns (n, m) span; columns may have any units."""
-    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    left, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(left[:, singular > _DEPENDENT * np.max(singular, initial=1e-300)])
+    """An orthonormal basis of what columns (n, m) span that were of norm one before others were taken off."""
+    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, singular > _DEPENDENT])

@@ -53,6 +53,17 @@ class PolynomialRecord:
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
         )
 
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those of C, D and F."""
+        found = [
+            place[block.columns]
+            for row, place in zip(self.structure.rows, self.structure.places, strict=True)
+            for letter in "cdf"
+            for block in row.by_letter[letter]
+        ]
+        return np.unique(np.concatenate(found))
+
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): nothing; no instruments are used."""
         return np.zeros((self.size, *errors.shape))

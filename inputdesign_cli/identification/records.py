@@ -44,6 +44,10 @@ class Record(Protocol):
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): what m unknowns, its level and its past, add to its prediction errors."""
 
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """The parameters on which the free responses depend."""
+
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): what measured outputs in place of the model's add to psi."""
 
@@ -120,7 +124,8 @@ class Records:
         coefficients, root, directions = self._fitted(starts, errors)
         begun = np.tensordot(coefficients, starts, 1)
         scale = np.maximum(np.abs(theta), 1e-3) * _STEP
-        for k, step in enumerate(np.diag(scale)):
+        for k in self.parts[0].in_starts:
+            step = scale[k] * np.eye(self.size)[k]
             moved = [np.tensordot(coefficients, self.starts(theta + s * step), 1) for s in (1.0, -1.0)]
             psi[k] += (moved[0] - moved[1]) / (2.0 * scale[k])
         flat = (psi @ root.T).reshape(len(psi), -1)

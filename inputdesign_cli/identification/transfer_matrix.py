@@ -64,16 +64,20 @@ def identify_transfer_matrix(
     check_varying(model.names, inputs, outputs)
     parts = split(inputs, outputs, lengths)
 
+    def records_of(signals: Sequence[tuple[Array, Array]]) -> tuple[TransferRecord, ...]:
+        return tuple(TransferRecord(model, *part, between) for part in signals)
+
     def searched(records: Records, known: Array | None) -> Search:
+        # Instruments from rest, on deviations from the means, begin near enough to what unknown starts allow.
+        singles = records_of(centred(parts) if records.free else parts)
+        about = Records(singles)
         made = [
-            refine(records, evaluate(records, theta))
-            for part in (centred(parts) if records.free else parts)
-            for theta in starting_points(TransferRecord(model, *part, between))
+            refine(about, evaluate(about, theta)) for single in singles for theta in starting_points(single)
         ]
         refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
         for given in (start, known):
             if given is not None:
-                refined.append(refine(records, evaluate(records, records.stabilised(np.array(given)))))
+                refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))
         return search(
             records,
             np.array([point.theta for point, _ in refined]),
@@ -81,8 +85,7 @@ def identify_transfer_matrix(
             before=np.array([steps for _, steps in refined]),
         )
 
-    together = Records(tuple(TransferRecord(model, *part, between) for part in parts))
-    best = from_rest_or_free(together, rest, searched)
+    best = from_rest_or_free(Records(records_of(parts)), rest, searched)
     return concluded(
         model.names,
         best,

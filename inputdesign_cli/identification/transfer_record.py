@@ -64,6 +64,11 @@ class TransferRecord:
             found[i].append(scipy.signal.lfilter([1.0], poles, np.eye(entry.order, samples)))
         return tuple(np.concatenate(parts) for parts in found)
 
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those of the denominators."""
+        return np.flatnonzero([parameter.letter == "a" for parameter in self.structure.parameters])
+
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """(p, N, m): the signals (N, m) as they are, for the noise is white."""
         return np.repeat(signals[None], self.structure.outputs, axis=0)

@@ -66,7 +66,7 @@ def test_an_unknown_start_explains_what_was_cut_off(name):
     assert np.abs(Records((record,)).at(model.theta).errors).max() > 1e-2
 
 
-@pytest.mark.parametrize("name", ["arx", "bj"])
+@pytest.mark.parametrize("name", ["arx", pytest.param("bj", marks=pytest.mark.slow)])
 def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(name):
     """The mean square of the error in units of its covariance is k, over 15 pairs of records."""
     model, rng = SYSTEMS[name], np.random.default_rng(6)
