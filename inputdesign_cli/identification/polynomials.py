@@ -18,7 +18,7 @@ from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minim
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.polynomial_record import PolynomialRecord
 from inputdesign_cli.identification.problem import PredictionErrors, inverses
-from inputdesign_cli.identification.records import Records, centred, split
+from inputdesign_cli.identification.records import Records, centred, longest, split
 from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
@@ -71,7 +71,7 @@ def identify_polynomials(
     def searched(records: Records, known: Array | None) -> Search:
         found = [
             _starts(structure, structure.problem(*(x[None] for x in part)), given)
-            for part in (centred(parts) if records.free else parts)
+            for part in (centred(longest(parts)) if records.free else longest(parts))
         ]
         points = np.concatenate([*(p for p, _ in found), *([] if known is None else [known[None]])])
         return search(records, points, starts=max(tried for _, tried in found))

@@ -21,6 +21,7 @@ from inputdesign_cli.plant.polynomial import Array
 _DEPENDENT = 1e-7
 _MOST_ROUNDS = 30
 _STEP = 1e-6
+_MOST_STARTED = 3
 
 
 class Record(Protocol):
@@ -206,6 +207,12 @@ def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[tuple[Array
     """The signals of each record; None: of the only one."""
     at = np.cumsum(lengths or [len(y)])[:-1]
     return list(zip(np.split(u, at), np.split(y, at), strict=True))
+
+
+def longest(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+    """The longest records, of which starting points are made: at most three, none much shorter than others."""
+    ranked = sorted(parts, key=lambda part: -len(part[1]))[:_MOST_STARTED]
+    return [part for part in ranked if 2 * len(part[1]) >= len(ranked[0][1])]
 
 
 def centred(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:

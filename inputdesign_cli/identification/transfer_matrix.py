@@ -17,7 +17,7 @@ from inputdesign_cli.identification.estimate import (
 )
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records, centred, split
+from inputdesign_cli.identification.records import Records, centred, longest, split
 from inputdesign_cli.identification.refined_iv import refine
 from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.transfer_record import TransferRecord
@@ -69,7 +69,8 @@ def identify_transfer_matrix(
 
     def searched(records: Records, known: Array | None) -> Search:
         # Instruments from rest, on deviations from the means, begin near enough to what unknown starts allow.
-        singles = records_of(centred(parts) if records.free else parts)
+        chosen = longest(parts)
+        singles = records_of(centred(chosen) if records.free else chosen)
         about = Records(singles)
         made = [
             refine(about, evaluate(about, theta)) for single in singles for theta in starting_points(single)
