@@ -31,8 +31,8 @@ class Estimate:
         fit: output by output, per cent of the rms of y (its mean taken off) that the model's simulation
             explains; None where the model is unstable and cannot be simulated.
         simulated: (samples, p), what the inputs and the start of each record cause in the model.
-        free: whether unknown starts and levels were estimated along with theta; then `begun` (samples, p) is
-            what they add to the one-step prediction.
+        free: whether unknown starts and levels were estimated along with theta.
+        first: (records, p), the first residuals if each record began at rest about zero.
         lengths: the samples of each of the records, which follow each other.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
@@ -51,7 +51,7 @@ class Estimate:
     fit: tuple[float | None, ...]
     simulated: Array
     free: bool
-    begun: Array
+    first: Array
     lengths: tuple[int, ...]
     whiteness: ResidualTest
     independence: ResidualTest
@@ -85,6 +85,7 @@ class BatchEstimate:
 def concluded(
     names: tuple[str, ...],
     found: Search,
+    y: Array,
     simulated: Array,
     stable: Sequence[bool],
     *,
@@ -99,6 +100,7 @@ def concluded(
     Args:
         names: (k,).
         found: where the search ended.
+        y: (samples, p), the outputs as measured.
         simulated: (samples, p), see `Estimate`; `stable` tells which of the outputs can be simulated.
         own: (p,) how many parameters each output has; shared ones count in parts.
         in_noise: number of parameters that make residuals look whiter: those of A, C and D.
@@ -128,12 +130,12 @@ def concluded(
         steps=found.steps,
         starts=found.starts,
         fit=tuple(
-            fit_percent(y, x) if runs else None
-            for y, x, runs in zip(records.y.T, simulated.T, stable, strict=True)
+            fit_percent(measured, explained) if runs else None
+            for measured, explained, runs in zip(y.T, simulated.T, stable, strict=True)
         ),
         simulated=simulated,
         free=records.free,
-        begun=point.near.begun,
+        first=found.first,
         lengths=lengths,
         whiteness=whiteness(point.errors, fitted=in_noise, lengths=lengths),
         independence=cross_correlations(

@@ -76,17 +76,20 @@ def identify_polynomials(
         points = np.concatenate([*(p for p, _ in found), *([] if known is None else [known[None]])])
         return search(records, points, starts=max(tried for _, tried in found))
 
-    together = Records(tuple(PolynomialRecord(structure, *part) for part in parts), weights=weights)
-    best = from_rest_or_free(together, rest, searched)
+    def records_of(signals: Sequence[tuple[Array, Array]]) -> Records:
+        return Records(tuple(PolynomialRecord(structure, *part) for part in signals), weights=weights)
+
+    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched)
     fitted = model.at(best.point.theta)
-    simulated = [
-        sum(fitted.simulate(u_part, begun, 1.0))
-        for (u_part, _), (begun, _) in zip(parts, split(best.point.near.begun, outputs, lengths), strict=True)
-    ]
+    records, begun = best.records, best.point.near.begun
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
+    simulated = np.concatenate(caused) + outputs - records.y
     return concluded(
         structure.names,
         best,
-        np.concatenate(simulated),
+        outputs,
+        simulated,
         fitted.stable_outputs,
         own=structure.own(),
         in_noise=structure.in_noise,

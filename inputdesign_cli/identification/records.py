@@ -210,7 +210,7 @@ def split(u: Array, y: Array, lengths: Sequence[int] | None) -> list[tuple[Array
 
 
 def longest(parts: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
-    """The longest records, of which starting points are made: at most three, none much shorter than others."""
+    """The longest records, of which starting points are made: at most three, of similar lengths."""
     ranked = sorted(parts, key=lambda part: -len(part[1]))[:_MOST_STARTED]
     return [part for part in ranked if 2 * len(part[1]) >= len(ranked[0][1])]
 

@@ -21,13 +21,18 @@ _UNLIKELY = 0.2
 
 @dataclass(frozen=True)
 class Search:
-    """Where the search from the best of `starts` points ended."""
+    """Where the search from the best of `starts` points ended.
+
+    Attributes:
+        first: (parts, p), the first residuals if each record began at rest about zero.
+    """
 
     records: Records
     point: Point
     converged: bool
     steps: int
     starts: int
+    first: Array
 
 
 def search(records: Records, points: Array, *, starts: int, before: Array | int = 0) -> Search:
@@ -40,11 +45,16 @@ def search(records: Records, points: Array, *, starts: int, before: Array | int 
     found = minimise(RecordProblem((records,) * len(points)), points)
     best = best_run(found)
     steps = int(found.steps[best] + np.broadcast_to(before, len(points))[best])
-    return Search(records, evaluate(records, found.theta[best]), bool(found.converged[best]), steps, starts)
+    point = evaluate(records, found.theta[best])
+    first = point.errors[np.cumsum((0, *records.lengths[:-1]))]
+    return Search(records, point, bool(found.converged[best]), steps, starts, first)
 
 
 def from_rest_or_free(
-    records: Records, rest: bool | None, searched: Callable[[Records, Array | None], Search]
+    records: Records,
+    deviations: Records,
+    rest: bool | None,
+    searched: Callable[[Records, Array | None], Search],
 ) -> Search:
     """The search from rest, unless unknown starts explain what it leaves better than chance.
 
@@ -53,12 +63,19 @@ def from_rest_or_free(
 
     Args:
         records: from rest.
+        deviations: the same from their means, which an unknown level makes up for.
         rest: whether the records begin at rest about zero; None: as the data say.
         searched: what searches from its own starts and, if given, from the parameters (k,).
     """
-    free = replace(records, free=True)
+    free = replace(deviations, free=True)
+
+    def begun_free(known: Array | None) -> Search:
+        found = searched(free, known)
+        errors = records.at(found.point.theta).errors
+        return replace(found, first=errors[np.cumsum((0, *records.lengths[:-1]))])
+
     if rest is False:
-        return searched(free, None)
+        return begun_free(None)
     at_rest = searched(records, None)
     if rest or at_rest.point.cost <= 0.0:
         return at_rest
@@ -75,5 +92,5 @@ def from_rest_or_free(
     step = np.linalg.lstsq(near.hessian, near.slope, rcond=1e-12)[0]
     if probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
         return at_rest
-    begun = searched(free, at_rest.point.theta)
+    begun = begun_free(at_rest.point.theta)
     return begun if probability(begun.point.cost) < _MISTAKEN else at_rest

@@ -86,10 +86,12 @@ def identify_transfer_matrix(
             before=np.array([steps for _, steps in refined]),
         )
 
-    best = from_rest_or_free(Records(records_of(parts)), rest, searched)
+    together, deviations = Records(records_of(parts)), Records(records_of(centred(parts)))
+    best = from_rest_or_free(together, deviations, rest, searched)
     return concluded(
         model.names,
         best,
+        outputs,
         outputs - best.point.errors,
         (True,) * model.outputs,
         own=_own(model),

@@ -71,14 +71,13 @@ def _lag(test: ScoreTest) -> dict[str, Json]:
 
 
 def _free_start(estimate: Estimate) -> list[str]:
-    """Where the levels and starts of the records were estimated: what they add to the first predictions."""
+    """Where the levels and starts of the records were estimated: the largest first residual otherwise."""
     if not estimate.free:
         return []
-    starts = np.cumsum([0, *estimate.lengths[:-1]])
-    ratio = np.abs(estimate.begun[starts]) / np.sqrt(np.diag(estimate.noise))
+    ratio = np.abs(estimate.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
-    first, noise = estimate.begun[starts[which], output], np.sqrt(estimate.noise[output, output])
-    records = "the record does" if len(starts) == 1 else "the records do"
+    first, noise = estimate.first[which, output], np.sqrt(estimate.noise[output, output])
+    records = "the record does" if len(estimate.first) == 1 else "the records do"
     return [
         f"{records} not begin at rest about zero (a first residual of {first:.3g} where the noise has "
         f"{noise:.3g}): the level of every output and the state at the start were estimated along"
