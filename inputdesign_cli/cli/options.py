@@ -40,8 +40,20 @@ Confine = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Refuse a spec that names files outside DIR (links followed)."),
 ]
-DataFile = Annotated[
-    Path, typer.Argument(metavar="DATA", help="The record of an experiment: a CSV file with columns u and y.")
+DataFiles = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="DATA...", help="Records of experiments, CSV files with columns u and y, estimated jointly."
+    ),
+]
+OperatingPoint = Annotated[
+    str,
+    typer.Option(
+        "--operating-point",
+        metavar="u1=..,y1=..",
+        help="What channels vary about, such as u1=40,y1=52.3; it is subtracted. For inputs the default is "
+        "signal.offset.",
+    ),
 ]
 Means = Annotated[
     bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")

@@ -13,8 +13,13 @@ if TYPE_CHECKING:
     from inputdesign_cli.specification import Spec
 
 
-def read_spec(file: Path, overrides: Sequence[str] | None, confine: Path | None) -> Spec:
+def read_spec(
+    file: Path, overrides: Sequence[str] | None, confine: Path | None, *, design: bool = True
+) -> Spec:
     """The spec in a file; `-` is standard input, whose names of files are relative to the current folder.
+
+    Args:
+        design: whether it must ask for a design, see `load_spec`.
 
     Raises:
         SpecError: as `load_spec`.
@@ -23,13 +28,15 @@ def read_spec(file: Path, overrides: Sequence[str] | None, confine: Path | None)
     from inputdesign_cli.specification.yaml.files import MAX_BYTES, decode
 
     if str(file) != STANDARD_INPUT:
-        return specification.load_spec(file, overrides or (), confine=confine)
+        return specification.load_spec(file, overrides or (), confine=confine, design=design)
     if sys.stdin is None:
         raise bad_spec("file-unreadable", "standard input is closed", hint="name a file")
     raw = sys.stdin.buffer.read(MAX_BYTES + 1)
     if len(raw) > MAX_BYTES:
         raise bad_spec("file-too-large", f"the spec is larger than {MAX_BYTES // 2**20} MiB")
-    return specification.parse_spec(decode(raw, "<stdin>"), "<stdin>", overrides or (), confine=confine)
+    return specification.parse_spec(
+        decode(raw, "<stdin>"), "<stdin>", overrides or (), confine=confine, design=design
+    )
 
 
 def name_of(file: Path) -> str:

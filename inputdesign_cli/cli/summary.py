@@ -11,6 +11,7 @@ from inputdesign_cli.report.evidence import (
     estimate_table,
     requirement_table,
     simulation_table,
+    verdict,
 )
 from inputdesign_cli.report.facts import GIVEN, facts, proofs
 from inputdesign_cli.report.numbers import BREAK, Rows
@@ -46,14 +47,11 @@ def _data(result: Result, time_unit: str) -> Iterator[Line]:
         yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread in estimate.rows)
     yield from ((name, text) for name, text, _ in estimate_facts(result))
     verdicts = []
-    for name, ratio, frequency, verdict in (requirement_table(result, time_unit) or _NONE).rows:
+    for name, ratio, frequency, found in (requirement_table(result, time_unit) or _NONE).rows:
         where = f" at {frequency} rad/{time_unit}" if frequency else ""
-        verdicts.append(
-            f"{name} {verdict}: the error that these data give is {ratio} of the admissible{where}"
-        )
+        verdicts.append(f"{name} {found}: the error that these data give is {ratio} of the admissible{where}")
     yield from _named("assessed", verdicts)
-    if "top_up_status" in result.get("assessment", {}):
-        yield "top-up", "the experiment below makes up for it, after these data"
+    yield from _named("verdict", verdict(result))
 
 
 def _asked(result: Result) -> Iterator[Line]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from typing import Protocol
@@ -12,12 +13,17 @@ from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices
 from inputdesign_cli.plant import ContinuousModel, Intersample, Model, PolynomialModel, SampledModel
 from inputdesign_cli.plant.polynomial import Array
 
+# Of records that follow each other; None for one.
+Lengths = Sequence[int] | None
+
 
 class Estimator(Protocol):
     """Estimates the structure of one model."""
 
-    def identify(self, u: Array, y: Array, start: Array | None, *, feedback: bool) -> Estimate:
-        """From one record; see the function of this name."""
+    def identify(
+        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
+    ) -> Estimate:
+        """From one or several records; see the function of this name."""
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         """From many records; see the function of this name."""
@@ -27,8 +33,12 @@ class Estimator(Protocol):
 class _Polynomials:
     model: PolynomialModel
 
-    def identify(self, u: Array, y: Array, start: Array | None, *, feedback: bool) -> Estimate:
-        return identify_polynomials(self.model, u, y, start=start, feedback=feedback)
+    def identify(
+        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
+    ) -> Estimate:
+        return identify_polynomials(
+            self.model, u, y, start=start, feedback=feedback, lengths=lengths, rest=rest
+        )
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         return fit_polynomials(self.model, u, y, start=start)
@@ -39,8 +49,12 @@ class _TransferMatrix:
     model: ContinuousModel
     between: Intersample
 
-    def identify(self, u: Array, y: Array, start: Array | None, *, feedback: bool) -> Estimate:
-        return identify_transfer_matrix(self.model, u, y, self.between, start=start, feedback=feedback)
+    def identify(
+        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
+    ) -> Estimate:
+        return identify_transfer_matrix(
+            self.model, u, y, self.between, start=start, feedback=feedback, lengths=lengths, rest=rest
+        )
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         return fit_transfer_matrices(self.model, u, y, self.between, start=start)
@@ -72,9 +86,17 @@ def _(model: SampledModel, step: float) -> Estimator:
 
 
 def identify(
-    model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array | None = None, feedback: bool = False
+    model: Model,
+    u: Array,
+    y: Array,
+    step: float = 1.0,
+    *,
+    start: Array | None = None,
+    feedback: bool = False,
+    lengths: Lengths = None,
+    rest: bool | None = None,
 ) -> Estimate:
-    """The structure of `model` estimated from one record.
+    """The structure of `model` estimated from one record, or jointly from several.
 
     Args:
         model: its orders and delays, zero entries and common polynomials are those of the estimate; its
@@ -82,13 +104,16 @@ def identify(
         u, y: (samples, r), (samples, p).
         step: time between samples of a plant in continuous time.
         start: (k,), tried besides starts that are made from the data.
-        feedback: whether u(t) answers y(t), which a test of the residuals heeds.
+        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        lengths: of the records that follow each other in u and y; None for one.
+        rest: whether each begins at rest about zero; otherwise its start and its level are unknown and
+            estimated along. None: as the data say.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
             `not-exciting`.
     """
-    return estimator(model, step).identify(u, y, start, feedback=feedback)
+    return estimator(model, step).identify(u, y, start, feedback=feedback, lengths=lengths, rest=rest)
 
 
 def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:

@@ -7,21 +7,19 @@ covariance, so that each residual is weighed by what the others tell of it ([lju
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.checks import (
-    check_apart,
-    check_length,
-    check_noisy,
-    check_varying,
-    fit_percent,
-)
+from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, concluded
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
 from inputdesign_cli.identification.orders import OutputOrders
-from inputdesign_cli.identification.predictor import prediction_errors
+from inputdesign_cli.identification.polynomial_record import PolynomialRecord
 from inputdesign_cli.identification.problem import PredictionErrors, inverses
+from inputdesign_cli.identification.records import Records, centred, longest, split
+from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant import PolynomialModel
@@ -39,6 +37,8 @@ def identify_polynomials(
     start: ArrayLike | None = None,
     noise: ArrayLike | None = None,
     feedback: bool = False,
+    lengths: Sequence[int] | None = None,
+    rest: bool | None = None,
 ) -> Estimate:
     """Prediction-error estimate from one record; in closed loop the direct method.
 
@@ -52,7 +52,9 @@ def identify_polynomials(
         u, y: (samples, r), (samples, p).
         start: (k,).
         noise: the covariance of e (p, p) if it is known; it is then not estimated.
-        feedback: whether u(t) answers y(t), which a test of the residuals heeds.
+        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        lengths: of the records that follow each other in u and y; None for one.
+        rest: whether each begins at rest about zero; None: as the data say.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -62,39 +64,38 @@ def identify_polynomials(
     inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
     check_length(len(outputs), structure.size, structure.memory, outputs=len(structure.rows))
     check_varying(structure.names, inputs, outputs)
-    known = None if noise is None else np.asarray(noise, dtype=float)
-    record = structure.problem(inputs[None], outputs[None], known)
-    points, tried = _starts(structure, record, None if start is None else np.asarray(start, dtype=float))
-    found = minimise(record.repeated(len(points)), points)
-    best = best_run(found)
-    theta = found.theta[best]
-    errors = np.stack(
-        [
-            prediction_errors(row, theta[None, place], record.u, y_i)[:, 0]
-            for row, place, y_i in zip(structure.rows, structure.places, record.y, strict=True)
-        ],
-        axis=1,
-    )
-    covariance = _covariances(structure, (errors.T @ errors)[None], len(errors))[0]
-    check_noisy(np.diag(covariance), outputs)
-    check_apart(covariance)
-    if known is not None:
-        covariance = known
-    information, _ = record.gathered(record.sums(theta[None]), np.linalg.inv(covariance)[None])
+    weights = None if noise is None else np.linalg.inv(np.asarray(noise, dtype=float))
+    given = None if start is None else np.asarray(start, dtype=float)
+    parts = split(inputs, outputs, lengths)
+
+    def searched(records: Records, known: Array | None) -> Search:
+        found = [
+            _starts(structure, structure.problem(*(x[None] for x in part)), given)
+            for part in (centred(longest(parts)) if records.free else longest(parts))
+        ]
+        points = np.concatenate([*(p for p, _ in found), *([] if known is None else [known[None]])])
+        return search(records, points, starts=max(tried for _, tried in found))
+
+    def records_of(signals: Sequence[tuple[Array, Array]]) -> Records:
+        return Records(tuple(PolynomialRecord(structure, *part) for part in signals), weights=weights)
+
+    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched)
+    fitted = model.at(best.point.theta)
+    records, begun = best.records, best.point.near.begun
+    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+        caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
+    simulated = np.concatenate(caused) + outputs - records.y
     return concluded(
         structure.names,
-        theta,
-        information[0],
-        covariance,
-        errors,
-        inputs,
-        feedback=feedback,
+        best,
+        outputs,
+        simulated,
+        fitted.stable_outputs,
+        own=structure.own(),
         in_noise=structure.in_noise,
         in_plant=structure.in_plant,
-        fit=_fits(model.at(theta), inputs, outputs),
-        converged=bool(found.converged[best]),
-        steps=int(found.steps[best]),
-        starts=tried,
+        recent=structure.memory,
+        feedback=feedback,
     )
 
 
@@ -180,12 +181,3 @@ def _covariances(structure: Structure, squares: NDArray[np.float64], samples: in
     """The covariance of e (runs, p, p) from sums of epsilon epsilon^T; every output's parameters count."""
     left = np.sqrt(np.maximum(samples - structure.own(), 1.0))
     return squares / np.outer(left, left)
-
-
-def _fits(model: PolynomialModel, u: Array, y: Array) -> tuple[float | None, ...]:
-    """Per cent of the rms of each output that the simulation explains; None where it is unstable."""
-    simulated, _ = model.simulate(u, np.zeros(y.shape), 1.0)
-    return tuple(
-        fit_percent(y[:, i], simulated[:, i]) if stable else None
-        for i, stable in enumerate(model.stable_outputs)
-    )

@@ -12,7 +12,7 @@ output. All entries are updated in one weighted regression,
     theta+ = theta + (sum psi S^-1 phi^T)^-1 sum psi S^-1 e,    S = (1/N) sum e e^T .
 
 It stands still where sum psi S^-1 e = 0, and nowhere else: these are the stationary points of det S, to which
-the likelihood of the output-error model comes down (`transfer_problem.py`), and where Gauss and Newton's
+the likelihood of the output-error model comes down (`record_problem.py`), and where Gauss and Newton's
 steps end, too. An estimate there is efficient for Gaussian noise of any covariance. The regressors phi
 differ from psi by noise that is uncorrelated with psi, so that a step is asymptotically one of Gauss and
 Newton. From poor starts it reaches further, because it solves equations that are linear in theta instead of
@@ -23,8 +23,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.identification.transfer_problem import Point, evaluate
-from inputdesign_cli.identification.transfer_record import TransferRecord
+from inputdesign_cli.identification.record_problem import Point, evaluate
+from inputdesign_cli.identification.records import Records
 
 _MOST_ITERATIONS = 20
 _PATIENCE = 4
@@ -32,15 +32,15 @@ _PATIENCE = 4
 _SETTLED = 1e-2
 
 
-def refine(record: TransferRecord, start: Point) -> tuple[Point, int]:
+def refine(records: Records, start: Point) -> tuple[Point, int]:
     """The likeliest point of the iteration from `start`, and how many steps were made."""
     best, point, since, steps = start, start, 0, 0
     while steps < _MOST_ITERATIONS and np.isfinite(point.cost):
-        regressors = point.psi - record.noise_in_regressors(point.theta, point.errors)
+        regressors = point.psi - records.noise_in_regressors(point.theta, point.errors)
         scale = np.sqrt(np.maximum(np.diag(point.hessian), 1e-300))
         matrix = point.against(regressors) / np.outer(scale, scale)
         step = np.linalg.lstsq(matrix, point.slope / scale, rcond=1e-12)[0] / scale
-        point = evaluate(record, record.stabilised(point.theta + step))
+        point = evaluate(records, records.stabilised(point.theta + step))
         best, since = (point, 0) if point.cost < best.cost else (best, since + 1)
         steps += 1
         if since == _PATIENCE or step @ point.hessian @ step * point.errors.size < _SETTLED * point.cost:

@@ -5,12 +5,14 @@ Of several outputs all channels are tested at once, in units of the residuals' o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.plant.polynomial import Array
 
 # Two-sided 99 % of the normal distribution: the band of a single correlation.
@@ -38,7 +40,9 @@ class ResidualTest:
     probability: float
 
 
-def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest:
+def whiteness(
+    errors: Array, *, lags: int = 25, fitted: int = 0, lengths: Sequence[int] | None = None
+) -> ResidualTest:
     """Correlations of the residuals (samples, p) among all outputs at the lags 1 .. `lags`.
 
     The portmanteau statistic of [hosking-1980], with the weights of [ljung-box-1978], to which it reduces for
@@ -48,10 +52,11 @@ def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest
         errors: (samples, p).
         lags: how many.
         fitted: number of estimated parameters of the noise model, which make residuals look whiter.
+        lengths: of the records that follow each other; None for one.
     """
     n, p = errors.shape
     at = np.arange(1, _most_lags(n, p * p, lags, fitted) + 1)
-    products = np.array([errors[tau:].T @ errors[:-tau] for tau in at])
+    products = np.array([errors.T @ shifted(errors, int(tau), lengths or (n,)) for tau in at])
     power = errors.T @ errors
     whitener = np.linalg.inv(np.linalg.cholesky(power))
     squares = np.sum((whitener @ products @ whitener.T) ** 2, axis=(1, 2))
@@ -61,7 +66,13 @@ def whiteness(errors: Array, *, lags: int = 25, fitted: int = 0) -> ResidualTest
 
 
 def cross_correlations(
-    errors: Array, u: Array, *, lags: int = 25, fitted: int = 0, feedback: bool = False
+    errors: Array,
+    u: Array,
+    *,
+    lags: int = 25,
+    fitted: int = 0,
+    feedback: bool = False,
+    lengths: Sequence[int] | None = None,
 ) -> ResidualTest:
     """Do the past inputs u(t), u(t - 1), .. explain residuals? A score test of a regression on them.
 
@@ -70,11 +81,12 @@ def cross_correlations(
         lags: how far back the inputs are looked at.
         fitted: number of estimated parameters of the plant, which take as many directions away.
         feedback: whether u(t) answers y(t), hence e(t); then the past begins with u(t - 1).
+        lengths: see `whiteness`.
     """
     n, p = errors.shape
     r = u.shape[1]
     at = np.arange(_most_lags(n, r, lags, fitted)) + int(feedback)
-    past = np.stack([np.concatenate([np.zeros((tau, r)), u[: n - tau]]) for tau in at], axis=1)
+    past = np.stack([shifted(u, int(tau), lengths or (n,)) for tau in at], axis=1)
     regressors = past.reshape(n, -1)
     left, singular, _ = np.linalg.svd(regressors, full_matrices=False)
     left = left[:, singular > 1e-9 * singular[0]]

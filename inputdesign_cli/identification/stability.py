@@ -30,7 +30,7 @@ def reflected(monic: Array) -> Array:
     """A polynomial (m + 1,) with its roots outside the unit circle mirrored at it."""
     roots = np.roots(monic)
     modulus = np.abs(roots)
-    roots = np.where(modulus >= 1.0, roots / np.maximum(modulus, 1e-300) ** 2, roots)
+    roots = np.where(modulus >= 1.0, roots / np.maximum(modulus, 1.0) ** 2, roots)
     modulus = np.maximum(np.abs(roots), 1e-300)
     roots = roots * np.minimum(1.0, (1.0 - _MARGIN) / modulus) ** (modulus > 1.0 - 1e-9)
     return np.atleast_1d(np.asarray(np.poly(roots).real, dtype=float))

@@ -29,8 +29,21 @@ def starting_points(row: OutputOrders, u: Sequence[Array], y: Array) -> Array:
     second = _output_error(row, inputs, y, responses, coloured=True)
     left = y - sum(responses, np.zeros_like(y))
     third = _output_error(row, inputs, y, [left + x for x in responses], coloured=False)
-    points = np.array([first, second, third])
+    points = np.array([first, second, third, *_nearly_cancelling(row, second)])
     return points[np.all(np.isfinite(points), axis=1)]
+
+
+def _nearly_cancelling(row: OutputOrders, theta: Array) -> list[Array]:
+    """The same with C and D that nearly cancel, at low or at high frequency: often minima of their own."""
+    C, D = (row.by_letter[letter][0] for letter in "cd")
+    points = []
+    for sign in (1.0, -1.0) if row.c and row.d else ():
+        point = theta.copy()
+        for block, root in ((C, 0.85), (D, 0.95)):
+            point[block.columns] = 0.0
+            point[block.columns.start] = -sign * root
+        points.append(point)
+    return points
 
 
 def regress(y: Array, regressors: list[tuple[Array, range]]) -> tuple[list[Array], Array]:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.identification.checks import (
-    check_apart,
-    check_length,
-    check_noisy,
-    check_varying,
-    fit_percent,
+from inputdesign_cli.identification.checks import check_length, check_varying
+from inputdesign_cli.identification.estimate import (
+    BatchEstimate,
+    Estimate,
+    concluded,
+    information_of,
+    noise_of,
 )
-from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, concluded
-from inputdesign_cli.identification.gauss_newton import best_run, minimise
-from inputdesign_cli.identification.problem import inverses
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
+from inputdesign_cli.identification.records import Records, centred, longest, split
 from inputdesign_cli.identification.refined_iv import refine
-from inputdesign_cli.identification.transfer_problem import Point, TransferProblem, evaluate, rounding
+from inputdesign_cli.identification.search import Search, from_rest_or_free, search
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
 from inputdesign_cli.plant import ContinuousModel, Intersample
@@ -36,6 +37,8 @@ def identify_transfer_matrix(
     *,
     start: ArrayLike | None = None,
     feedback: bool = False,
+    lengths: Sequence[int] | None = None,
+    rest: bool | None = None,
 ) -> Estimate:
     """Maximum-likelihood estimate of a transfer matrix in s from one record, white noise on the outputs.
 
@@ -48,7 +51,9 @@ def identify_transfer_matrix(
         u, y: (N, r), (N, p).
         between: the time between samples, and whether u is held there.
         start: (k,), tried besides starts made from the data.
-        feedback: whether u(t) answers y(t), which a test of the residuals heeds.
+        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        lengths: of the records that follow each other in u and y; None for one.
+        rest: whether each begins at rest about zero; None: as the data say.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -57,34 +62,43 @@ def identify_transfer_matrix(
     inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
     check_length(len(outputs), len(model.names), 0, outputs=model.outputs)
     check_varying(model.names, inputs, outputs)
-    record = TransferRecord(model, inputs, outputs, between)
-    made = [refine(record, evaluate(record, theta)) for theta in starting_points(record)]
-    refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
-    if start is not None:
-        given = record.stabilised(np.asarray(start, dtype=float))
-        refined.append(refine(record, evaluate(record, given)))
-    found = minimise(
-        TransferProblem((record,) * len(refined)), np.array([point.theta for point, _ in refined])
-    )
-    best = best_run(found)
-    point = evaluate(record, found.theta[best])
-    noise, information = _noise_and_information(record, point)
-    check_noisy(np.diag(noise), outputs)
-    check_apart(noise)
+    parts = split(inputs, outputs, lengths)
+
+    def records_of(signals: Sequence[tuple[Array, Array]]) -> tuple[TransferRecord, ...]:
+        return tuple(TransferRecord(model, *part, between) for part in signals)
+
+    def searched(records: Records, known: Array | None) -> Search:
+        # Instruments from rest, on deviations from the means, begin near enough to what unknown starts allow.
+        chosen = longest(parts)
+        singles = records_of(centred(chosen) if records.free else chosen)
+        about = Records(singles)
+        made = [
+            refine(about, evaluate(about, theta)) for single in singles for theta in starting_points(single)
+        ]
+        refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
+        for given in (start, known):
+            if given is not None:
+                refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))
+        return search(
+            records,
+            np.array([point.theta for point, _ in refined]),
+            starts=len(made) + (start is not None),
+            before=np.array([steps for _, steps in refined]),
+        )
+
+    together, deviations = Records(records_of(parts)), Records(records_of(centred(parts)))
+    best = from_rest_or_free(together, deviations, rest, searched)
     return concluded(
         model.names,
-        point.theta,
-        information,
-        noise,
-        point.errors,
-        inputs,
-        feedback=feedback,
+        best,
+        outputs,
+        outputs - best.point.errors,
+        (True,) * model.outputs,
+        own=_own(model),
         in_noise=0,
         in_plant=len(model.names),
-        fit=tuple(fit_percent(y_i, y_i - e_i) for y_i, e_i in zip(outputs.T, point.errors.T, strict=True)),
-        converged=bool(found.converged[best]),
-        steps=refined[best][1] + int(found.steps[best]),
-        starts=len(made) + (start is not None),
+        recent=0,
+        feedback=feedback,
     )
 
 
@@ -102,35 +116,30 @@ def fit_transfer_matrices(
     outputs = np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(model.names)))
-    records = tuple(TransferRecord(model, inputs[run], outputs[run], between) for run in range(len(outputs)))
+    records = tuple(
+        Records((TransferRecord(model, *run, between),)) for run in zip(inputs, outputs, strict=True)
+    )
     theta, refined = [], []
     for record, row in zip(records, begin, strict=True):
         point, steps = refine(record, evaluate(record, record.stabilised(row)))
         theta.append(point.theta)
         refined.append(steps)
-    found = minimise(TransferProblem(records), np.array(theta))
-    described = [
-        _noise_and_information(record, evaluate(record, theta))
-        for record, theta in zip(records, found.theta, strict=True)
-    ]
+    found = minimise(RecordProblem(records), np.array(theta))
+    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
+    noise = np.array([noise_of(point, _own(model)) for point in points])
     return BatchEstimate(
         theta=found.theta,
-        noise=np.array([noise for noise, _ in described]),
-        information=np.array([information for _, information in described]),
+        noise=noise,
+        information=np.array([information_of(*each) for each in zip(records, points, noise, strict=True)]),
         converged=found.converged,
         steps=found.steps + np.array(refined),
     )
 
 
-def _noise_and_information(record: TransferRecord, point: Point) -> tuple[Array, Array]:
-    """(p, p) covariance of the noise, and (k, k) sum over the samples of psi noise^-1 psi^T.
-
-    Every output's parameters count; those that several share count by their share.
-    """
-    taken = np.zeros(record.structure.outputs)
-    for parameter in record.structure.parameters:
+def _own(model: ContinuousModel) -> Array:
+    """(p,): how many parameters each output has; those that several share count by their share."""
+    taken = np.zeros(model.outputs)
+    for parameter in model.parameters:
         rows = sorted({i for i, _ in parameter.places})
         taken[rows] += 1.0 / len(rows)
-    freedom = np.sqrt(record.samples - taken)
-    noise = point.errors.T @ point.errors / np.outer(freedom, freedom)
-    return noise, replace(point, weights=inverses((noise + rounding(record))[None])[0][0]).hessian
+    return taken

@@ -1,4 +1,4 @@
-"""A transfer matrix in s against one sampled record: output errors, gradients, regressors, stability."""
+"""A transfer matrix in s against one sampled record: output errors, gradients, regressors, free responses."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant import ContinuousModel, Intersample
@@ -50,6 +51,27 @@ class TransferRecord:
                     direct, row = entry.gradient(parameter.letter, parameter.power)
                     psi[index, :, i] += direct * u + states @ row
         return errors, psi
+
+    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): a level, and what the states of its entries do without an input."""
+        model, samples = self.structure.at(theta), self.samples
+        found = [[np.ones((1, samples))] for _ in range(model.outputs)]
+        for i, j in model.active:
+            entry = self._entry(model, i, j)
+            if not entry.order:
+                continue
+            poles = np.poly(entry.transition[: entry.order, : entry.order])
+            found[i].append(scipy.signal.lfilter([1.0], poles, np.eye(entry.order, samples)))
+        return tuple(np.concatenate(parts) for parts in found)
+
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those of the denominators."""
+        return np.flatnonzero([parameter.letter == "a" for parameter in self.structure.parameters])
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """(p, N, m): the signals (N, m) as they are, for the noise is white."""
+        return np.repeat(signals[None], self.structure.outputs, axis=0)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): s^k / a through the errors of the output, for the coefficient a_k of an entry.

@@ -66,7 +66,9 @@ def _again_where_lost(job: TrialJob, u: Array, y: Array, found: BatchEstimate) -
     feedback = job.true.loop is not None
     for run in np.flatnonzero(~converged):
         try:
-            other = identify(job.model, u[run], y[run], job.step, start=job.model.theta, feedback=feedback)
+            other = identify(
+                job.model, u[run], y[run], job.step, start=job.model.theta, feedback=feedback, rest=True
+            )
         except SpecError:  # the noise of this run leaves some parameter without an estimate
             continue
         theta[run], noise[run], information[run] = other.theta, other.noise, other.information

@@ -46,28 +46,50 @@ def estimate_answer(result: Result) -> str:
     assessment = result.get("assessment")
     if assessment is None:
         return f"The model was estimated from {result['samples']} samples."
+    return " ".join(f"{text[0].upper()}{text[1:]}." for text in verdict(result))
+
+
+def verdict(result: Result) -> Iterator[str]:
+    """What an assessment comes to, and what is left to do."""
+    assessment = result.get("assessment")
+    if assessment is None:
+        return
+    if "undecided" in assessment:
+        yield (
+            "undecided, neither met nor missed: the data contradict the model, or do not determine it; "
+            "the notes say what to change"
+        )
+        return
     worst = max(assessment["requirements"], key=lambda entry: entry["worst_ratio"])
     if assessment["met"]:
-        return f"These data meet the accuracy: {_reached(worst)} of what is admitted."
-    if "objective" not in result:
-        return f"These data miss the accuracy: {_reached(worst)} times what is admitted."
-    return (
-        f"These data miss the accuracy: {_reached(worst)} times what is admitted. "
-        "The experiment below makes up for it, after these data."
-    )
+        yield f"these data meet the accuracy: {_reached(worst)} of what is admitted"
+        return
+    yield f"these data miss the accuracy: {_reached(worst)} times what is admitted"
+    if "experiments" in assessment:
+        number = assessment["experiments"]
+        repeat = "" if number is None else f"apply it {number} times, "
+        yield (
+            "the experiment below is the best within the limits, and after it the error is still "
+            f"{assessment['left']:.4g} times what is admitted: {repeat}widen the limits, or loosen the target"
+        )
+    elif "left" in assessment:
+        yield "the experiment below makes up for it, after these data"
+    elif "no_top_up" in assessment:
+        yield f"no experiment is designed: {assessment['no_top_up']}"
 
 
 def requirement_table(result: Result, time_unit: str) -> Rows | None:
     """Each requirement with what the data give."""
     assessment = result.get("assessment")
-    if assessment is None:
+    if assessment is None or not assessment["requirements"]:
         return None
+    unclear = "undecided" if "undecided" in assessment else ""
     rows = tuple(
         (
             _named(entry),
             f"{entry['worst_ratio']:.4g}",
             f"{entry['frequency']:.4g}" if entry.get("frequency") is not None else "",
-            "met" if entry["worst_ratio"] <= 1.0 + 1e-9 else "missed",
+            unclear or ("met" if entry["worst_ratio"] <= 1.0 + 1e-9 else "missed"),
         )
         for entry in assessment["requirements"]
     )

@@ -47,7 +47,7 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
     Raises:
         SpecError: `text` is no spec of this version.
     """
-    spec = parse_spec(text, file)
+    spec = parse_spec(text, file, design=verb != "identify")
     error = spec.accuracy.model_error
     sentences = [_system(spec), _experiment(spec), *_accuracy(spec), *_limits(spec), _goal(spec, verb)]
     return Question(

@@ -30,7 +30,11 @@ _MOST_ROUNDS = 50
 
 
 def load_spec(
-    path: str | os.PathLike[str], overrides: Sequence[str] = (), *, confine: FilePath | None = None
+    path: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    *,
+    confine: FilePath | None = None,
+    design: bool = True,
 ) -> Spec:
     """Read a spec file.
 
@@ -38,6 +42,7 @@ def load_spec(
         path: The YAML file.
         overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
         confine: The folder outside of which the spec may name no files.
+        design: Whether it must ask for a design, or for an analysis, that can be answered.
 
     Returns:
         The checked spec, with defaults filled in.
@@ -46,7 +51,9 @@ def load_spec(
         SpecError: With one diagnostic for everything that is wrong, in the order of the file.
     """
     folder = FilePath(path).parent
-    return parse_spec(read_text(path), os.fspath(path), overrides, folder=folder, confine=confine)
+    return parse_spec(
+        read_text(path), os.fspath(path), overrides, folder=folder, confine=confine, design=design
+    )
 
 
 def parse_spec(
@@ -56,6 +63,7 @@ def parse_spec(
     *,
     folder: FilePath | None = None,
     confine: FilePath | None = None,
+    design: bool = True,
 ) -> Spec:
     """Read a spec from its text, as `load_spec` does from a file.
 
@@ -65,13 +73,14 @@ def parse_spec(
         overrides: As for `load_spec`.
         folder: What the paths in the spec are relative to (default: the current folder).
         confine: As for `load_spec`.
+        design: As for `load_spec`.
 
     Raises:
         SpecError: As `load_spec`.
     """
     folder = folder or FilePath()
     tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine)
-    spec, found = _validate(tree)
+    spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
         raise SpecError(_sorted(diagnostics, tree.places))
@@ -105,7 +114,7 @@ def read_tree(
     return tree
 
 
-def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
+def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagnostic]]:
     """Validate, take out what is wrong, and validate again, until the rest is a spec that can be checked.
 
     So a wrong number in `plant` does not hide a contradiction in `accuracy`. What is wrong with a part
@@ -133,7 +142,7 @@ def _validate(tree: Tree) -> tuple[Spec | None, list[PathDiagnostic]]:
                 broken.add(one.path)
                 _prune(data, one.path)
             continue
-        checked = [shorten(one, tree.data) for one in run_checks(spec, broken)]
+        checked = [shorten(one, tree.data) for one in run_checks(spec, broken, design=design)]
         return spec, told + [one for one in checked if not related(one.path, broken)]
     return None, told
 

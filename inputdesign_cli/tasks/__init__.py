@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,11 +12,14 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
-from inputdesign_cli.tasks.assessment import Assessment, assess as assess_record
+from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
+from inputdesign_cli.tasks.build.data import Deviations
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.task import build_task
-from inputdesign_cli.tasks.identification import identify as identify_record
+from inputdesign_cli.tasks.identification import identify as identify_records
+
+Files = str | Path | Sequence[str | Path]
 
 
 def solve(spec: Spec) -> Results:
@@ -61,28 +64,47 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
         return finite(build_task(spec).simulate(executor), most_extreme(spec.content))
 
 
-def identify(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Results:
-    """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
+def identify(
+    spec: Spec, data: Files, *, remove_means: bool = False, operating_point: Mapping[str, float] | None = None
+) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
+
+    Args:
+        spec: its plant and noise; it need not ask for a design (`load_spec(.., design=False)`).
+        data: a CSV file, or several, which are estimated jointly.
+        remove_means: whether to take the means of u and y away, file by file.
+        operating_point: what to take away from a channel, by name: {"u1": 40, "y1": 52.3}.
 
     Raises:
         SpecError: the plant is not supported.
         DataError: the file cannot be used, or the data do not determine the parameters.
     """
     with _placed(spec):
-        found = identify_record(build_identification(spec), Path(data), remove_means=remove_means)
+        deviations = Deviations(operating_point or {}, remove_means)
+        found = identify_records(build_identification(spec), _paths(data), deviations)
         return finite(found, most_extreme(spec.content))
 
 
-def assess(spec: Spec, data: str | Path, *, remove_means: bool = False) -> Assessment:
-    """Identify the model from a real experiment, compare what the data buy with what is asked, and top up.
+def assess(
+    spec: Spec, data: Files, *, remove_means: bool = False, operating_point: Mapping[str, float] | None = None
+) -> Assessment:
+    """Identify the model from real experiments, compare what the data buy with what is asked, and top up.
+
+    Args:
+        spec: what is asked.
+        data, remove_means, operating_point: see `identify`.
 
     Raises:
-        SpecError: nothing is asked that data could meet; see `identify` and `solve`.
-        DataError: the file cannot be used.
-        InfeasibleError, InaccurateError: of the top-up.
+        SpecError: nothing is asked that data could meet; see `identify`.
+        DataError: a file cannot be used.
     """
     with _placed(spec):
-        return assess_record(build_identification(spec), Path(data), remove_means=remove_means)
+        deviations = Deviations(operating_point or {}, remove_means)
+        return assess_records(build_identification(spec), _paths(data), deviations)
+
+
+def _paths(data: Files) -> list[Path]:
+    return [Path(data)] if isinstance(data, str | Path) else [Path(one) for one in data]
 
 
 @contextmanager

@@ -1,20 +1,21 @@
-"""A record -> an estimate of `plant` and `noise`, ready to paste, and what the data buy."""
+"""Records -> an estimate of `plant` and `noise`, ready to paste, and what the data buy."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from inputdesign_cli.accuracy import ModelError, Requirement
+from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Estimate, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
-from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
+from inputdesign_cli.tasks.build.data import Data, Deviations, blaming_columns, read_data
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
 from inputdesign_cli.tasks.result.estimates import estimate_result, identification_notes, model_text
 
@@ -46,6 +47,8 @@ class Identification:
     Attributes:
         nominal: the structure; its parameters are one of the starts.
         assessable: whether any accuracy is asked for that data could meet or miss.
+        operating_point: by channel, what the spec says that signals vary about.
+        has_prior: whether it states prior information.
         at: the question of the spec at another model with the given number of samples; the text names the
             source of that model in diagnostics.
     """
@@ -53,34 +56,52 @@ class Identification:
     header: Header
     nominal: Model
     assessable: bool
+    operating_point: Mapping[str, float]
+    has_prior: bool
     at: Callable[[Model, int, str], ModelQuestion]
 
 
 @dataclass(frozen=True)
 class Identified:
-    """An estimate, its data, and what is asked of it."""
+    """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate."""
 
     estimate: Estimate
     model: Model
     data: Data
-    question: ModelQuestion
+    question: ModelQuestion | None
+    unasked: str = ""
 
 
-def identified(task: Identification, path: Path, *, remove_means: bool = False) -> Identified:
-    """The estimate from the data in `path`; the nominal parameters are one of the starts.
+def identified(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Identified:
+    """The estimate from the data in `paths`, jointly; the nominal parameters are one of the starts.
 
     Raises:
-        DataError: the file cannot be used, or the data do not determine the parameters.
-        SpecError: the loop is unstable with the estimate.
+        DataError: a file cannot be used, or the data do not determine the parameters.
     """
     units, nominal = task.header.units, task.nominal
-    data = read_data(path, units, remove_means=remove_means)
-    with blaming_columns(path):
+    known = {**task.operating_point, **deviations.operating_point}
+    data = read_data(paths, units, replace(deviations, operating_point=known))
+    with blaming_columns(paths[0]):
         estimate = estimate_model(
-            nominal, data.u, data.y, units.step, start=nominal.theta, feedback=units.closed_loop
+            nominal,
+            data.u,
+            data.y,
+            units.step,
+            start=nominal.theta,
+            feedback=units.closed_loop,
+            lengths=data.lengths,
         )
     model = nominal.at(estimate.theta, estimate.noise)
-    return Identified(estimate, model, data, task.at(model, len(data.y), f"{path.name} (estimate)"))
+    try:
+        question = task.at(model, len(data.y), f"{paths[0].name} (estimate)")
+    except IdesignError as error:
+        return Identified(estimate, model, data, None, told(error))
+    return Identified(estimate, model, data, question)
+
+
+def told(error: IdesignError) -> str:
+    """What is wrong and how to mend it, as a sentence."""
+    return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
 
 def identification_results(task: Identification, found: Identified, started: float) -> Results:
@@ -91,12 +112,15 @@ def identification_results(task: Identification, found: Identified, started: flo
     """
     header, question, estimate = task.header, found.question, found.estimate
     result = estimate_result(header.title, estimate)
-    tables, curves = data_curves(header.units, found.data.u, found.data.y, found.model, estimate)
-    tables["bound"], curves["bound"], worst = bound_of_data(
-        header.units, question.requirements, question.entries, estimate.information
-    )
-    result["model_error"] = {"alpha": question.alpha, **worst}
+    tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
+    if question is None:
+        notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
+    else:
+        tables["bound"], curves["bound"], worst = bound_of_data(
+            header.units, question.requirements, question.entries, estimate.information
+        )
+        result["model_error"] = {"alpha": question.alpha, **worst}
     if notes:
         result["notes"] = notes
     result["timing_s"] = {"identification": time.perf_counter() - started}
@@ -104,11 +128,11 @@ def identification_results(task: Identification, found: Identified, started: flo
     return Results(result, header.resolved_spec, header.units.time_unit, tables, curves, files)
 
 
-def identify(task: Identification, path: Path, *, remove_means: bool = False) -> Results:
-    """Estimate the model whose structure `plant` and `noise` give from a recorded experiment.
+def identify(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Results:
+    """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
 
     Raises:
-        DataError, SpecError: see `identified`.
+        DataError: see `identified`.
     """
     started = time.perf_counter()
-    return identification_results(task, identified(task, path, remove_means=remove_means), started)
+    return identification_results(task, identified(task, paths, deviations), started)

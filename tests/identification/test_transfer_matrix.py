@@ -9,9 +9,10 @@ import scipy.signal
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification.record_problem import evaluate
+from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.refined_iv import refine
 from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices, identify_transfer_matrix
-from inputdesign_cli.identification.transfer_problem import evaluate
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
@@ -134,7 +135,7 @@ def test_the_slope_of_the_likelihood_is_a_difference_quotient():
     rng = np.random.default_rng(4)
     u = excitation(150, 2, rng)
     y, _ = noisy(actual(), u, rng, hold=False, level=0.5, covariance=[[1, 0.8], [0.8, 1]])
-    record = TransferRecord(model, u, y, Intersample(STEP, hold=False))
+    record = Records((TransferRecord(model, u, y, Intersample(STEP, hold=False)),))
 
     point = evaluate(record, model.theta)
     for index in range(model.theta.size):
@@ -213,7 +214,7 @@ def test_instruments_alone_come_within_a_fraction_of_a_standard_deviation():
     rng = np.random.default_rng(9)
     u = excitation(800, 2, rng)
     y, _ = noisy(actual(), u, rng, hold=False, level=0.2)
-    record = TransferRecord(two_by_two(), u, y, Intersample(STEP, hold=False))
+    record = Records((TransferRecord(two_by_two(), u, y, Intersample(STEP, hold=False)),))
 
     likeliest = identify_transfer_matrix(two_by_two(), u, y, Intersample(STEP, hold=False))
     far = evaluate(record, np.exp(0.3 * rng.normal(size=12)) * two_by_two().theta)

@@ -1,4 +1,5 @@
 import json
+import re
 
 import numpy as np
 import pytest
@@ -85,13 +86,38 @@ def test_offsets_and_outliers_are_told(write):
     columns = record(np.random.default_rng(3).standard_normal(500))
     columns["y1"] = columns["y1"] + 100.0
     columns["u1"][40] = 60.0
-    path = write(columns)
-    outcome = identify(load_spec(SPEC), path)
+    outcome = identify(load_spec(SPEC), write(columns))
     notes = " ".join(outcome.result["notes"])
     assert "row 42" in notes
-    assert "--remove-means" in notes
-    centred = identify(load_spec(SPEC), path, remove_means=True)
-    assert "--remove-means" not in " ".join(centred.result["notes"])
+    first = re.search(r"does not begin at rest about zero \(a first residual of (\S+) where", notes)
+    assert float(first[1]) == pytest.approx(columns["y1"][0], rel=1e-2)
+    known = identify(load_spec(SPEC), write(columns), operating_point={"y1": 100.0})
+    assert not known.result["identification"]["free_start"]
+
+
+def test_an_operating_point_does_not_move_the_estimate(write):
+    """Known, unknown, or its means removed: the same model, within a standard deviation."""
+    columns = record(np.random.default_rng(3).standard_normal(500))
+    plain = identify(load_spec(SPEC), write(columns)).result["identification"]
+    gain = 3.6 / 0.3
+    moved = {**columns, "u1": columns["u1"] + 40.0, "y1": columns["y1"] + 52.3}
+    spec = load_spec(SPEC, ["signal.offset=40"])
+    ways = [
+        identify(spec, write(moved), operating_point={"y1": 52.3}),
+        identify(load_spec(SPEC), write(moved)),
+        identify(load_spec(SPEC), write(moved), remove_means=True),
+        identify(spec, write({**moved, "y1": moved["y1"] + 40.0 * gain})),
+    ]
+    for n, found in enumerate(way.result["identification"] for way in ways):
+        for name, value in plain["theta"].items():
+            assert abs(found["theta"][name] - value) < plain["standard_deviation"][name], (n, name)
+    assert ways[0].result["identification"]["theta"] == pytest.approx(plain["theta"], rel=1e-6)
+
+
+def test_an_unknown_channel_is_refused(data):
+    with pytest.raises(SpecError) as caught:
+        identify(load_spec(SPEC), data, operating_point={"u2": 1.0})
+    assert caught.value.diagnostics[0].code == "unknown-channel"
 
 
 @pytest.mark.parametrize("names", [("u", "y"), ("U_volt", "y1_bar"), ("u1_V", "y")])

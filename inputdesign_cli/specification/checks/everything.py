@@ -33,22 +33,26 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (goal.lengths_agree, ("experiment.samples", "limits.samples", "objective")),
 )
 
+# What is of no concern to who only wants to estimate a model.
+OF_DESIGNS = (goal.something_asked, goal.limits_present)
+
 
 def related(path: Path, broken: Iterable[Path]) -> bool:
     """Whether the path is one of the broken ones, contains one, or lies inside one."""
     return any(path[: len(b)] == b or b[: len(path)] == path for b in broken)
 
 
-def run_checks(spec: Spec, broken: set[Path]) -> list[PathDiagnostic]:
+def run_checks(spec: Spec, broken: set[Path], *, design: bool) -> list[PathDiagnostic]:
     """What all checks find whose inputs could be read.
 
     Args:
         spec: The spec, which is valid section by section.
         broken: The paths of what could not be read.
+        design: Whether the question of a design must be complete.
     """
     return [
         found
         for check, reads in CHECKS
-        if not any(related(parse_key(key), broken) for key in reads)
+        if (design or check not in OF_DESIGNS) and not any(related(parse_key(key), broken) for key in reads)
         for found in check(spec)
     ]

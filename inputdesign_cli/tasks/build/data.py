@@ -1,15 +1,15 @@
-"""A recorded experiment: u and y from a CSV file, its columns, units and times checked, outliers named."""
+"""Recorded experiments: u and y from CSV files, their columns, units and times checked, outliers named."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError
+from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.tables import read_columns, read_header
@@ -23,23 +23,56 @@ _SHOWN = 5
 
 
 @dataclass(frozen=True)
+class Deviations:
+    """What is taken away from signals: a known `operating_point` by channel (`u1`, `y1`), or the means."""
+
+    operating_point: Mapping[str, float] = field(default_factory=dict)
+    remove_means: bool = False
+
+
+@dataclass(frozen=True)
 class Data:
-    """u (samples, r) and y (samples, p) of one experiment, and what a user should know of them."""
+    """u (samples, r) and y (samples, p) of experiments one after the other, and what to know of them.
+
+    Attributes:
+        lengths: the samples of each experiment.
+    """
 
     u: Array
     y: Array
-    notes: tuple[str, ...] = field(default=())
+    lengths: tuple[int, ...]
+    notes: tuple[str, ...]
 
 
-def read_data(path: Path, units: Units, *, remove_means: bool = False) -> Data:
+def read_data(paths: Sequence[Path], units: Units, deviations: Deviations) -> Data:
     """The columns u1, u2, .., y1, y2, .. of all channels of the plant and, if there is one, time.
 
     The only input may be called u, the only output y.
 
     Raises:
-        DataError: the file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
+        SpecError: `unknown-channel`, the operating point is that of a channel that the plant does not have.
+        DataError: a file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
             the spec says.
     """
+    channels = [f"u{i + 1}" for i in range(units.inputs)] + [f"y{i + 1}" for i in range(units.outputs)]
+    for name in deviations.operating_point:
+        if name not in channels:
+            raise bad_spec(
+                "unknown-channel",
+                f"the operating point names {name}, but the plant has no such channel",
+                hint=f"its channels are {', '.join(channels)}: write --operating-point {channels[0]}=1.5",
+            )
+    parts = [_read(path, units, deviations, named=len(paths) > 1) for path in paths]
+    return Data(
+        np.concatenate([u for u, _, _ in parts]),
+        np.concatenate([y for _, y, _ in parts]),
+        tuple(len(y) for _, y, _ in parts),
+        tuple(note for _, _, notes in parts for note in notes),
+    )
+
+
+def _read(path: Path, units: Units, deviations: Deviations, *, named: bool) -> tuple[Array, Array, list[str]]:
+    """u, y and notes of one file, which the notes name if asked to."""
     header = read_header(path, key="")
     channels = {"u": _names("u", units.inputs, header), "y": _names("y", units.outputs, header)}
     wanted = {name: column for names in channels.values() for name, column in names.items()}
@@ -54,15 +87,10 @@ def read_data(path: Path, units: Units, *, remove_means: bool = False) -> Data:
     for name in (name for name in wanted if name != "time"):
         x = columns[name]
         notes += _outliers(name, x)
-        if remove_means:
-            columns[name] = x - x.mean()
-        elif abs(x.mean()) > x.std() > 0:
-            notes.append(
-                f"{name} varies by {x.std():.3g} about {x.mean():.3g}: models describe deviations from an "
-                "operating point; --remove-means takes the means away"
-            )
+        level = deviations.operating_point.get(name if name[1:] else f"{name}1", 0.0)
+        columns[name] = x - (x.mean() if deviations.remove_means else level)
     u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
-    return Data(u, y, tuple(notes))
+    return u, y, [f"{path.name}: {note}" for note in notes] if named else notes
 
 
 @contextmanager

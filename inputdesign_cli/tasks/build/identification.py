@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
+
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -37,8 +39,18 @@ def build_identification(spec: Spec) -> Identification:
         header=build_header(spec),
         nominal=build_model(spec),
         assessable=bool(spec.accuracy.requirements),
+        operating_point=_operating_point(spec),
+        has_prior=spec.experiment.prior is not None,
         at=lambda model, samples, source: _question(_restated(spec, model, source), samples),
     )
+
+
+def _operating_point(spec: Spec) -> dict[str, float]:
+    """`signal.offset`, about which u varies; in closed loop r does, and nothing is known of u."""
+    if spec.closed_loop or spec.signal.offset is None:
+        return {}
+    levels = np.broadcast_to(np.asarray(spec.signal.offset, dtype=float), (spec.plant.inputs,))
+    return {f"u{j + 1}": float(level) for j, level in enumerate(levels)}
 
 
 def _restated(spec: Spec, model: Model, source: str) -> Spec:
@@ -48,6 +60,7 @@ def _restated(spec: Spec, model: Model, source: str) -> Spec:
         file=source,
         overrides=[f"{key}={json.dumps(block)}" for key, block in blocks_of(model).items()],
         folder=spec.resolve_path("."),
+        design=False,
     )
 
 

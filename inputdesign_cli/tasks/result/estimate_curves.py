@@ -8,7 +8,6 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.identification import Estimate
-from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, Json, ResidualCurves, Table
 from inputdesign_cli.runs.units import Units
@@ -16,23 +15,23 @@ from inputdesign_cli.tasks.result.bound import bound_curves
 
 
 def data_curves(
-    units: Units, u: Array, y: Array, model: Model, estimate: Estimate
+    units: Units, u: Array, y: Array, estimate: Estimate
 ) -> tuple[dict[str, Table], dict[str, Curves]]:
     """fit.csv and residuals.csv with their figures.
 
     Args:
-        u, y: the record, (samples, r) and (samples, p).
-        model: the estimate as a model.
+        u, y: the records, (samples, r) and (samples, p).
     """
     instants = units.sample_time * np.arange(len(y), dtype=np.float64)
     predicted = y - estimate.errors
-    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-        simulated, _ = model.simulate(u, np.zeros(y.shape), units.step)
-    columns = {units.time_header: instants, **_columns(units, "u", u), **_columns(units, "y", y)}
+    columns = {units.time_header: instants}
+    if len(estimate.lengths) > 1:
+        columns["record"] = np.repeat(np.arange(1.0, len(estimate.lengths) + 1), estimate.lengths)
+    columns |= {**_columns(units, "u", u), **_columns(units, "y", y)}
     columns |= _columns(units, "y", predicted, "_predicted")
     panels = []
     for i, fit in enumerate(estimate.fit):
-        curve = None if fit is None else simulated[:, i]
+        curve = None if fit is None else estimate.simulated[:, i]
         if curve is not None:
             columns[f"y{_number(units, i)}_simulated"] = curve
         panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i))

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification import Estimate, ResidualTest
+from inputdesign_cli.identification import Estimate, ResidualTest, ScoreTest
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
-
-# A residual test below this probability speaks against the model.
-_REFUTED = 0.01
+from inputdesign_cli.tasks.result.refutations import refutations, unsettled
 
 
 def identification_entry(estimate: Estimate) -> dict[str, Json]:
@@ -29,7 +27,12 @@ def identification_entry(estimate: Estimate) -> dict[str, Json]:
         "starts": estimate.starts,
         "whiteness": _test(estimate.whiteness),
         "independence": _test(estimate.independence),
+        "tests": {test.name: _test(test) | _lag(test) for test in estimate.tests},
+        "failed": [test.name for test in estimate.failed],
+        "free_start": estimate.free,
     }
+    if len(estimate.lengths) > 1:
+        entry["records"] = list(estimate.lengths)
     if not single:
         entry["fit_percent"] = list(estimate.fit)
     elif estimate.fit[0] is not None:
@@ -59,8 +62,26 @@ def _deviations(estimate: Estimate) -> dict[str, float]:
     return dict(zip(estimate.names, deviations.tolist(), strict=True))
 
 
-def _test(test: ResidualTest) -> dict[str, Json]:
+def _test(test: ResidualTest | ScoreTest) -> dict[str, Json]:
     return {"statistic": test.statistic, "degrees_of_freedom": test.freedom, "probability": test.probability}
+
+
+def _lag(test: ScoreTest) -> dict[str, Json]:
+    return {} if test.lag is None else {"lag": test.lag}
+
+
+def _free_start(estimate: Estimate) -> list[str]:
+    """Where the levels and starts of the records were estimated: the largest first residual otherwise."""
+    if not estimate.free:
+        return []
+    ratio = np.abs(estimate.first) / np.sqrt(np.diag(estimate.noise))
+    which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
+    first, noise = estimate.first[which, output], np.sqrt(estimate.noise[output, output])
+    records = "the record does" if len(estimate.first) == 1 else "the records do"
+    return [
+        f"{records} not begin at rest about zero (a first residual of {first:.3g} where the noise has "
+        f"{noise:.3g}): the level of every output and the state at the start were estimated along"
+    ]
 
 
 def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Estimate) -> list[str]:
@@ -70,11 +91,7 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
         model: the estimate as a model.
     """
     notes, samples, predictor = list(of_the_data), len(estimate.errors), predictor_of(model)
-    if not estimate.converged:
-        notes.append(
-            f"the search did not settle after {estimate.steps} steps from the best of {estimate.starts} "
-            "starts: the estimate may be far from the minimum; the orders may be too high for these data"
-        )
+    notes += [*unsettled(estimate), *_free_start(estimate)]
     at_the_edge = [
         letter
         for letter, polynomials in predictor.items()
@@ -86,23 +103,12 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
             "samples can tell: the covariance is not to be trusted there, and a design on this model would "
             "count on noise that vanishes or never fades; take more data, or a lower order"
         )
-    if estimate.whiteness.probability < _REFUTED:
-        remedy = "raise the orders of C and D (or A)" if predictor else "a model in q^-1 can describe it"
-        notes.append(
-            f"the residuals are not white (probability {estimate.whiteness.probability:.1e}): the noise has "
-            f"more structure than the model, and the covariance is not to be trusted; {remedy}"
-        )
-    if estimate.independence.probability < _REFUTED:
-        remedy = ", or another delay; raise the orders of B and F (or A)" if predictor else ""
-        notes.append(
-            f"past inputs explain residuals (probability {estimate.independence.probability:.1e}): the plant "
-            f"has more structure than the model{remedy}"
-        )
+    notes += refutations(model, estimate)
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
     if vague:
         notes.append(f"zero lies within a standard deviation of {', '.join(vague)}: an order may be too high")
-    if model.continuous and min(estimate.whiteness.probability, estimate.independence.probability) < _REFUTED:
+    if model.continuous and estimate.failed:
         notes.append(
             "the input was taken for the band-limited interpolation of its samples; where it is held "
             "between them, write plant.sample: zoh"

@@ -1,19 +1,19 @@
-"""Output errors of transfer matrices in s, weighed by their own covariance: what is minimised, run by run.
+"""Prediction errors of records, weighed by their own covariance: what is minimised, run by run.
 
 With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), as in `problem.py`. It falls with the likelihood of
 Gaussian noise of unknown covariance; minus half its gradient is sum psi(t) W e(t), half its Hessian sum
-psi W psi^T up to what vanishes at the minimum, with W = cost / (p N) S^-1.
+psi W psi^T up to what vanishes at the minimum, with W = cost / (p N) S^-1. Known weights are kept.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.problem import inverses
-from inputdesign_cli.identification.transfer_record import TransferRecord
+from inputdesign_cli.identification.records import Linearised, Records
 from inputdesign_cli.plant.polynomial import Array
 
 # Errors of this power relative to the output are rounding. It is added to S, so that an output without
@@ -23,13 +23,22 @@ _EXACT = 1e-20
 
 @dataclass(frozen=True)
 class Point:
-    """One record at theta (k,): errors (N, p), the gradient psi (k, N, p) of the output, W (p, p), cost."""
+    """Records at theta (k,): their errors and gradient, W (p, p), cost."""
 
     theta: Array
-    errors: Array
-    psi: NDArray[np.float64]
+    near: Linearised
     weights: Array
     cost: float
+
+    @property
+    def errors(self) -> Array:
+        """(N, p)."""
+        return self.near.errors
+
+    @property
+    def psi(self) -> NDArray[np.float64]:
+        """(k, N, p)."""
+        return self.near.psi
 
     @property
     def slope(self) -> Array:
@@ -51,32 +60,34 @@ class Point:
         return np.asarray(self.psi @ self.weights)
 
 
-def rounding(record: TransferRecord) -> Array:
+def rounding(records: Records) -> Array:
     """(p, p): a covariance of errors so small that they are rounding."""
-    return _EXACT * np.diag(np.mean(record.y**2, axis=0))
+    return _EXACT * np.diag(np.mean(records.y**2, axis=0))
 
 
-def evaluate(record: TransferRecord, theta: Array) -> Point:
-    """The cost of one record; infinite where it overflows, zero where all errors are rounding."""
+def evaluate(records: Records, theta: Array) -> Point:
+    """The cost of records; infinite where it overflows, zero where all errors are rounding."""
     with np.errstate(over="ignore", invalid="ignore"):
-        errors, psi = record.errors_and_gradient(theta)
-        S = errors.T @ errors / record.samples
-    usable = bool(np.all(np.isfinite(S)) and np.all(np.isfinite(psi)))
-    if not usable:
-        errors, psi, S = np.zeros(errors.shape), np.zeros(psi.shape), np.eye(len(S))
-    floor = rounding(record)
+        near = records.at(theta)
+        S = near.errors.T @ near.errors / records.samples
+    if not (np.all(np.isfinite(S)) and np.all(np.isfinite(near.psi))):
+        nothing = replace(near, errors=np.zeros(near.errors.shape), psi=np.zeros(near.psi.shape))
+        return Point(theta, nothing, np.eye(len(S)), np.inf)
+    floor = rounding(records)
+    if np.all(np.diag(S) <= np.diag(floor)):
+        return Point(theta, near, np.eye(len(S)), 0.0)
+    if records.weights is not None:
+        return Point(theta, near, records.weights, records.samples * float(np.sum(records.weights * S)))
     inverse, logarithm = inverses((S + floor)[None])
     root = float(np.exp(logarithm[0] / len(S)))
-    exact = np.all(np.diag(S) <= np.diag(floor))
-    cost = np.inf if not usable else 0.0 if exact else record.samples * root
-    return Point(theta, errors, psi, root / len(S) * inverse[0], cost)
+    return Point(theta, near, root / len(S) * inverse[0], records.samples * root)
 
 
 @dataclass(frozen=True)
-class TransferProblem:
+class RecordProblem:
     """The problem of fitting records of one structure, one a run; see `gauss_newton.Problem`."""
 
-    records: tuple[TransferRecord, ...]
+    records: tuple[Records, ...]
 
     @property
     def errors(self) -> int:
@@ -94,6 +105,6 @@ class TransferProblem:
         """theta (runs, k) with stable poles."""
         return np.array([self.records[0].stabilised(row) for row in theta]).reshape(theta.shape)
 
-    def kept(self, runs: NDArray[np.bool_]) -> TransferProblem:
+    def kept(self, runs: NDArray[np.bool_]) -> RecordProblem:
         """The same problem with some of its runs only."""
-        return TransferProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))
+        return RecordProblem(tuple(r for r, kept in zip(self.records, runs, strict=True) if kept))

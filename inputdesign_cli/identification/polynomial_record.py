@@ -1,0 +1,91 @@
+"""Polynomials in q^-1 against one record: prediction errors, gradients, and what an unknown start adds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.orders import OutputOrders
+from inputdesign_cli.identification.predictor import errors_and_gradient
+from inputdesign_cli.identification.problem import PredictionErrors
+from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class PolynomialRecord:
+    """Samples u (N, r), y (N, p), and the `structure` that is to explain them; see `Record`."""
+
+    structure: Structure
+    u: Array
+    y: Array
+
+    @property
+    def size(self) -> int:
+        """Number of parameters k."""
+        return self.structure.size
+
+    @cached_property
+    def problem(self) -> PredictionErrors:
+        """The same as a problem of one run, from rest."""
+        return self.structure.problem(self.u[None], self.y[None])
+
+    def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Prediction errors (N, p) from rest, and psi (k, N, p)."""
+        errors, psi = np.empty(self.y.shape), np.zeros((self.size, *self.y.shape))
+        for i, (row, place) in enumerate(zip(self.structure.rows, self.structure.places, strict=True)):
+            e, own = errors_and_gradient(row, theta[None, place], self.problem.u, self.problem.y[i])
+            errors[:, i], psi[place, :, i] = e[:, 0], own[:, :, 0]
+        return errors, psi
+
+    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): a level, and as many impulses as the filters remember samples.
+
+        (D/C)(A y - sum_j (B_j/F_j) u_j) is off by impulses through 1/C where y, u and the noise before the
+        record are missing, and by impulses through D/(C F_j) where the state of an entry is.
+        """
+        return tuple(
+            _responses(row, theta[place], len(self.y))
+            for row, place in zip(self.structure.rows, self.structure.places, strict=True)
+        )
+
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those of C, D and F."""
+        found = [
+            place[block.columns]
+            for row, place in zip(self.structure.rows, self.structure.places, strict=True)
+            for letter in "cdf"
+            for block in row.by_letter[letter]
+        ]
+        return np.unique(np.concatenate(found))
+
+    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
+        """(k, N, p): nothing; no instruments are used."""
+        return np.zeros((self.size, *errors.shape))
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """(p, N, m): signals (N, m) through D/C of each output."""
+        found = []
+        for row, place in zip(self.structure.rows, self.structure.places, strict=True):
+            p = row.polynomials(theta[None, place])
+            found.append(scipy.signal.lfilter(p.D[0], p.C[0], signals, axis=0))
+        return np.array(found)
+
+    def stabilised(self, theta: Array) -> Array:
+        """theta with the roots of C, D and F in the unit circle."""
+        return self.problem.stabilised(theta[None])[0]
+
+
+def _responses(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.float64]:
+    p = row.polynomials(theta[None])
+    older = max([row.a, *(entry.b - entry.f for entry in row.entries)])
+    impulses = np.eye(max([older + row.d, *(entry.f for entry in row.entries)], default=0), samples)
+    through = [(p.D[0], p.C[0], np.ones((1, samples))), (np.ones(1), p.C[0], impulses[: older + row.d])]
+    for entry, F in zip(row.entries, p.F, strict=True):
+        through.append((p.D[0], np.convolve(p.C[0], F[0]), impulses[: entry.f]))
+    return np.concatenate([scipy.signal.lfilter(b, a, x) for b, a, x in through if len(x)])

@@ -1,0 +1,48 @@
+"""What speaks against an estimate, and what to do about it, in sentences."""
+
+from __future__ import annotations
+
+from inputdesign_cli.identification import Estimate, ScoreTest
+from inputdesign_cli.plant import Model
+
+_FOUND = {
+    "plant": "past inputs explain residuals (probability {p:.1e}), most at lag {lag}: the plant has more "
+    "structure than the model; {remedy}, or compare with an FIR model (B: [0, 1, 1, ..]) that is long enough",
+    "noise": "the residuals are not white (probability {p:.1e}), most at lag {lag}: the noise has more "
+    "structure than the model, and the covariance is not to be trusted; {remedy}",
+    "drift": "the residuals drift slowly (probability {p:.1e}): remove the trend from the record, use a part "
+    "of it without drift, or {remedy}",
+}
+_IN_Q = {
+    "plant": "raise the orders of B and F (or A), or change the delay",
+    "noise": "raise the orders of C and D (or A)",
+    "drift": "raise the order of D",
+}
+_IN_S = {
+    "plant": "raise the orders of numerator and denominator",
+    "noise": "a model in q^-1 can describe it",
+    "drift": "describe it by a model in q^-1",
+}
+
+
+def unsettled(estimate: Estimate) -> list[str]:
+    """What to say of a search that did not settle."""
+    if estimate.converged:
+        return []
+    return [
+        f"the search did not settle after {estimate.steps} steps from the best of {estimate.starts} "
+        "starts: the estimate may be far from the minimum; the orders may be too high for these data"
+    ]
+
+
+def refutations(model: Model, estimate: Estimate) -> list[str]:
+    """For every kind of fault that tests found: what the strongest of them says, and what to do."""
+    strongest: dict[str, ScoreTest] = {}
+    for test in estimate.failed:
+        if test.fault not in strongest or test.probability < strongest[test.fault].probability:
+            strongest[test.fault] = test
+    remedies = _IN_S if model.continuous else _IN_Q
+    return [
+        _FOUND[fault].format(p=test.probability, lag=test.lag, remedy=remedies[fault])
+        for fault, test in strongest.items()
+    ]

@@ -1,0 +1,115 @@
+"""Tests of the structure: their level, their power, and the regression that they stand for."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.signal
+import scipy.stats
+
+from inputdesign_cli.identification import identify
+from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, failed
+from inputdesign_cli.plant import Intersample, SampledModel
+from tests.support.identification_systems import SYSTEMS, data, one_channel
+from tests.support.plants import arx, two_by_two
+from tests.support.records import shifted, simulated
+
+BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
+
+
+def by_name(found):
+    return {test.name: test for test in found.tests}
+
+
+def test_of_arx_it_is_the_auxiliary_regression():
+    """N times the share of the residuals' squares that a regression with the further lags explains."""
+    u, y = (x[0, :, 0] for x in data("arx", 300, np.random.default_rng(1)))
+    found = identify(SYSTEMS["arx"], u[:, None], y[:, None], rest=True)
+    own = [shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)]
+
+    def squares(columns):
+        matrix = np.stack(columns, axis=1)
+        left = y - matrix @ np.linalg.lstsq(matrix, y, rcond=None)[0]
+        return left, left @ left
+
+    residual, least = squares(own)
+    for name, further in (
+        ("recent_inputs", [np.append(np.zeros(lag), u[: 300 - lag]) for lag in (0, 3, 4, 5, 6)]),
+        ("recent_residuals", [shifted(residual, lag) for lag in (1, 2, 3, 4)]),
+    ):
+        _, less = squares([*own, *further])
+        test = by_name(found)[name]
+        assert test.statistic == pytest.approx(300 * (least - less) / least, rel=1e-6)
+        assert test.freedom == len(further)
+        assert test.probability == pytest.approx(scipy.stats.chi2.sf(test.statistic, test.freedom))
+
+
+def test_the_level_is_shared_by_all_tests():
+    five = [ScoreTest(str(i), "plant", 1.0, 1, p, 1) for i, p in enumerate((0.21, 0.19, 1.0, 0.5, 0.3))]
+    assert failed(five) == ()
+    one = ScoreTest("x", "noise", 1.0, 1, 0.19 * LEVEL, 1)
+    assert failed([*five[1:], one]) == (one,)
+
+
+def test_probabilities_of_right_models_are_uniform():
+    """Kolmogorov and Smirnov over 20 records each of one output and of two."""
+    rng = np.random.default_rng(2)
+    u, y = data("bj", 400, rng, runs=20)
+    found = [identify(SYSTEMS["bj"], u[i], y[i], start=SYSTEMS["bj"].theta) for i in range(20)]
+    for name in by_name(found[0]):
+        assert scipy.stats.kstest([by_name(f)[name].probability for f in found], "uniform").pvalue > 1e-3
+    u, y = simulated(arx(), 400, rng, 20)
+    found = [identify(arx(), u[i], y[i], start=arx().theta) for i in range(20)]
+    for name in by_name(found[0]):
+        assert scipy.stats.kstest([by_name(f)[name].probability for f in found], "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("model", "fault", "name"),
+    [
+        (one_channel([0, 1.0, 0.5], F=[1, -0.7], C=[1, 0.6], D=[1, -0.8]), "plant", "recent_inputs"),
+        (one_channel([0, 0, 1.0, 0.5], C=[1, 0.6], D=[1, -0.8], F=[1, -1.5, 0.7]), "plant", "recent_inputs"),
+        (one_channel([0, 1.0, 0.5], F=[1, -1.5, 0.7]), "noise", "recent_residuals"),
+    ],
+    ids=["order", "delay", "noise"],
+)
+def test_what_is_missing_is_found(model, fault, name):
+    u, y = data("bj", 1000, np.random.default_rng(3))
+    found = identify(model, u[0], y[0])
+    assert {test.fault for test in found.failed} >= {fault}
+    assert by_name(found)[name].probability < 1e-6
+
+
+def test_the_lag_is_where_the_missing_coefficient_stands():
+    rng = np.random.default_rng(4)
+    u = rng.standard_normal((800, 1))
+    y = scipy.signal.lfilter([0, 1.0, 0, 0, 0.3], [1.0], u, axis=0) + rng.standard_normal((800, 1))
+    found = identify(one_channel([0, 1.0]), u, y)
+    assert by_name(found)["recent_inputs"].lag == 4
+
+
+def test_a_drift_is_found():
+    u, y = data("oe", 600, np.random.default_rng(5))
+    found = identify(SYSTEMS["oe"], u[0], y[0] + np.linspace(0.0, 1.5, 600)[:, None])
+    assert [test.fault for test in found.failed][-1] == "drift"
+
+
+def test_a_drift_of_one_output_is_found_in_s():
+    rng = np.random.default_rng(5)
+    model, u = two_by_two(), rng.standard_normal((400, 2))
+    y = model.driven(u, Intersample(0.4, True)) + rng.standard_normal((400, 2))
+    y[:, 1] += np.linspace(-1.0, 1.0, 400)
+    found = identify(SampledModel(model, 0.4), u, y, start=model.theta)
+    assert "trend" in {test.name for test in found.failed}
+
+
+@pytest.mark.slow
+def test_right_models_are_seldom_undecided_and_wrong_ones_seldom_met():
+    """100 of each; the limits are those of 5 % and 1 %, with three standard deviations of chance."""
+    run = runpy.run_path(str(BENCHMARK))
+    right = run["study"](None, range(100))
+    assert right["undecided"] <= 5 + 3 * np.sqrt(5)
+    wrong = [run["study"](fault, range(25)) for fault in run["FAULTS"]]
+    assert sum(counts["met though beyond"] for counts in wrong) <= 1 + 3
+    assert sum(counts["beyond"] for counts in wrong) >= 20

@@ -1,0 +1,117 @@
+"""Several records, and records that do not begin at rest."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.identification import identify
+from inputdesign_cli.identification.polynomial_record import PolynomialRecord
+from inputdesign_cli.identification.record_problem import evaluate
+from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.identification.transfer_record import TransferRecord
+from inputdesign_cli.plant import Intersample
+from tests.support.identification_systems import SYSTEMS, data
+from tests.support.plants import box_jenkins, two_by_two
+from tests.support.records import simulated
+
+CUT = 60
+
+
+def record_of(name):
+    """Two records of a structure, neither of them at rest, and a theta near the truth."""
+    rng = np.random.default_rng(3)
+    if name == "in s":
+        model = two_by_two()
+        u = rng.standard_normal((260, 2))
+        y = model.driven(u, Intersample(0.4, True)) + rng.standard_normal((260, 2)) @ [[1, 0.8], [0, 0.6]]
+        make = lambda u, y: TransferRecord(model, u, y, Intersample(0.4, True))  # noqa: E731
+    else:
+        model = box_jenkins() if name == "two outputs" else SYSTEMS[name]
+        u, y = simulated(model, 260, rng) if name == "two outputs" else data(name, 260, rng)
+        u, y = u[0], y[0]
+        structure = Structure.of(model)
+        make = lambda u, y: PolynomialRecord(structure, u, y)  # noqa: E731
+    parts = tuple(make(u[part] + 2.0, y[part] + 5.0) for part in (slice(CUT, 150), slice(150, 260)))
+    return Records(parts, free=True), model.theta * (1 + 0.03 * rng.standard_normal(model.theta.size))
+
+
+@pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
+def test_the_slope_with_unknown_starts_is_a_difference_quotient(name):
+    records, theta = record_of(name)
+    point = evaluate(records, theta)
+    for k, size in enumerate(np.maximum(np.abs(theta), 1e-2) * 1e-5):
+        step = size * np.eye(theta.size)[k]
+        ahead, behind = (evaluate(records, theta + sign * step).cost for sign in (1, -1))
+        scale = np.sqrt(point.hessian[k, k] * point.cost)
+        assert point.slope[k] / scale == pytest.approx(-(ahead - behind) / (4 * size) / scale, abs=2e-6)
+
+
+@pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
+def test_an_unknown_start_explains_what_was_cut_off(name):
+    """Without noise, the later part of a record about any level leaves no error at the true parameters."""
+    rng = np.random.default_rng(5)
+    if name == "in s":
+        model = two_by_two()
+        u = rng.standard_normal((300, 2))
+        y = model.driven(u, Intersample(0.4, True))
+        record = TransferRecord(model, u[CUT:], y[CUT:] + 7.0, Intersample(0.4, True))
+    else:
+        model = box_jenkins() if name == "two outputs" else SYSTEMS[name]
+        u = rng.standard_normal((300, model.inputs))
+        y, _ = model.simulate(u, np.zeros((300, model.outputs)), 1.0)
+        record = PolynomialRecord(Structure.of(model), u[CUT:], y[CUT:] + 7.0)
+    left = Records((record,), free=True).at(model.theta).errors
+    np.testing.assert_allclose(left, 0.0, atol=1e-6 * np.abs(y).max())
+    assert np.abs(Records((record,)).at(model.theta).errors).max() > 1e-2
+
+
+@pytest.mark.parametrize("name", ["arx", pytest.param("bj", marks=pytest.mark.slow)])
+def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(name):
+    """The mean square of the error in units of its covariance is k, over 15 pairs of records."""
+    model, rng = SYSTEMS[name], np.random.default_rng(6)
+    squares = []
+    for _ in range(15):
+        u, y = (x[0] for x in data(name, 700, rng))
+        u, y = u[100:], y[100:] + np.repeat([[3.0], [-8.0]], 300, axis=0)
+        found = identify(model, u, y, lengths=(300, 300))
+        assert found.converged
+        assert found.free
+        off = found.theta - model.theta
+        squares.append(off @ found.information @ off)
+    k = model.theta.size
+    assert np.mean(squares) == pytest.approx(k, abs=5 * np.sqrt(2 * k / 15))
+
+
+def test_records_at_rest_are_taken_for_such():
+    u, y = data("bj", 400, np.random.default_rng(7), runs=30)
+    free = [identify(SYSTEMS["bj"], u[i], y[i]).free for i in range(30)]
+    assert np.mean(free) < 0.1
+    told = identify(SYSTEMS["bj"], u[0], y[0], rest=True)
+    np.testing.assert_allclose(told.theta, identify(SYSTEMS["bj"], u[0], y[0]).theta, atol=1e-9)
+
+
+def test_arx_from_rest_over_two_records_is_stacked_least_squares():
+    u, y = (x[..., 0] for x in data("arx", 200, np.random.default_rng(8), runs=2))
+    phi = np.concatenate(
+        [
+            np.stack([np.concatenate([np.zeros(lag), x[:-lag]]) for x in (-b, a) for lag in (1, 2)], axis=1)
+            for a, b in zip(u, y, strict=True)
+        ]
+    )
+    expected = np.linalg.lstsq(phi, y.ravel(), rcond=None)[0]
+    found = identify(SYSTEMS["arx"], u.reshape(-1, 1), y.reshape(-1, 1), lengths=(200, 200), rest=True)
+    np.testing.assert_allclose(found.theta, expected, atol=1e-9)
+    np.testing.assert_allclose(found.errors[:, 0], y.ravel() - phi @ expected, atol=1e-8)
+
+
+def test_the_simulation_begins_where_the_record_does():
+    """A plant that swings out while the record begins: level and state are in the simulated output."""
+    rng = np.random.default_rng(9)
+    u = rng.standard_normal((400, 1))
+    y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u, axis=0)
+    swing = scipy.signal.lfilter([1.0], [1, -1.5, 0.7], np.eye(1, 400)[0])[:, None]
+    y = y + 50.0 + 20.0 * swing + 0.1 * rng.standard_normal((400, 1))
+    found = identify(SYSTEMS["oe"], u, y)
+    assert found.free
+    assert found.fit[0] > 95

@@ -1,0 +1,203 @@
+"""Met, missed or undecided: what `assess` says of records, right models and wrong ones."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.signal
+import yaml
+from typer.testing import CliRunner
+
+from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
+from inputdesign_cli.cli import app
+from inputdesign_cli.cli.summary import summary
+
+STRUCTURE = """
+sample_time: 5
+plant: {B: [0, 0, 0, 0, 0, 0, 0.03, 0.02], F: [1, -0.97]}
+noise: {C: [1, -0.2], D: [1, -0.8], variance: 0.001}
+"""
+HEATER = (
+    STRUCTURE
+    + """
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.3, band: [0, 0.02]}}
+spectrum: {type: fir, order: 6}
+"""
+)
+# exp(-5/205), exp(-5/8): a gain of 2.35 behind a time constant of 205 s and a lag of 8 s.
+SLOW, LAG = 0.97590, 0.53526
+
+
+def heater(samples, seed, *, lag=False, drift=0.0, level=(0.0, 0.0), warm=0.0, power=9.0):
+    """A heater, sampled every 5 s: dead time of 5.6 samples, coloured noise, drift in degrees an hour."""
+    rng = np.random.default_rng(seed)
+    u = np.sqrt(power) * np.repeat(rng.choice([-1.0, 1.0], samples // 8 + 1), 8)[:samples]
+    B, F = np.array([0, 0, 0, 0, 0, 0, 0.4, 0.6]) * 2.35 * (1 - SLOW), [1, -SLOW]
+    if lag:
+        B, F = B * (1 - LAG), np.convolve(F, [1, -LAG])
+    y = scipy.signal.lfilter(B, F, u) + warm * SLOW ** np.arange(samples)
+    y += scipy.signal.lfilter([1, -0.2], [1, -0.8], 0.03 * rng.standard_normal(samples))
+    time = 5.0 * np.arange(samples)
+    return {"time_s": time, "u": u + level[0], "y": y + level[1] + drift * time / 3600}
+
+
+@pytest.fixture
+def record(tmp_path):
+    """Writes a record of the heater."""
+
+    def written(name, *args, **kwargs):
+        columns, path = heater(*args, **kwargs), tmp_path / name
+        rows = zip(*columns.values(), strict=True)
+        text = "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+        path.write_text(",".join(columns) + "\n" + text)
+        return path
+
+    return written
+
+
+def said(results):
+    """The summary in the terminal."""
+    return summary(results.result, results.time_unit, [Path("run/result.json")])
+
+
+def test_a_right_model_is_met(record):
+    found = assess(parse_spec(HEATER), record("a.csv", 720, 1))
+    assert (found.verdict, found.results.result["status"]) == ("met", "met")
+    assert found.results.result["identification"]["failed"] == []
+
+
+@pytest.mark.parametrize("drift", [0.0, 1.0])
+def test_a_missing_lag_leaves_the_verdict_undecided(drift, record):
+    found = assess(parse_spec(HEATER), record("a.csv", 720, 1, lag=True, drift=drift))
+    result = found.results.result
+    assert (found.verdict, result["status"]) == ("undecided", "undecided")
+    assert "recent_inputs" in result["identification"]["failed"]
+    # b6, b7 stand for the delay; what the lag adds comes after them.
+    assert result["identification"]["tests"]["recent_inputs"]["lag"] in (7, 8, 9)
+    assert "raise the orders of B and F" in " ".join(result["notes"])
+    assert "signal" not in found.results.tables
+    assert "undecided, neither met nor missed" in said(found.results)
+
+
+def test_a_drift_is_told_from_noise(record):
+    spec = parse_spec(HEATER, overrides=["noise={C: [1], D: [1, -0.5], variance: 0.001}"])
+    found = assess(spec, record("a.csv", 720, 1, drift=2.0)).results.result
+    assert "trend" in found["identification"]["failed"]
+    assert "remove the trend" in " ".join(found["notes"])
+
+
+def test_undecided_has_its_own_exit_code(record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", record("a.csv", 720, 1, lag=True)
+    spec.write_text(HEATER)
+    run = CliRunner().invoke(
+        app, ["assess", str(spec), str(path), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
+    )
+    assert run.exit_code == 5
+    result = json.loads(run.stdout)
+    assert result["status"] == "undecided"
+    assert {"fit.csv", "residuals.csv", "bound.csv", "model.yaml"} < set(result["files"])
+
+
+def test_records_are_judged_together_by_the_number_that_is_printed(record):
+    """Information of two records adds up, and the top-up counts the first as the joint verdict does."""
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"])
+    first = record("a.csv", 300, 1, power=0.02, level=(40.0, 52.3), warm=1.0)
+    second = record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
+    alone, both = assess(spec, first), assess(spec, [first, second])
+    assert (alone.verdict, both.verdict) == ("missed", "met")
+    result = both.results.result
+    assert result["identification"]["records"] == [300, 700]
+    assert result["samples"] == 1000
+    (listed,) = result["assessment"]["requirements"]
+    assert listed["worst_ratio"] == pytest.approx(result["model_error"]["worst_ratio"])
+    apart = np.linalg.inv(assess(spec, second).results.result["information"]["covariance"])
+    ratio = np.diag(result["information"]["matrix"]) / np.diag(apart)
+    assert np.all(ratio > 0.9)
+    assert np.array_equal(np.unique(both.results.tables["fit"].columns["record"]), [1, 2])
+
+
+def test_a_prior_without_its_estimate_does_not_count(record):
+    path = record("a.csv", 300, 1, power=0.02)
+    spec = parse_spec(HEATER)
+    plain = assess(spec, path).results.result
+    prior = yaml.safe_dump({"information": (1e9 * np.eye(5)).tolist()}, default_flow_style=True)
+    with_prior = assess(parse_spec(HEATER, overrides=[f"experiment.prior={prior}"]), path).results.result
+    assert with_prior["assessment"]["requirements"] == plain["assessment"]["requirements"]
+    assert "experiment.prior does not count" in " ".join(with_prior["notes"])
+
+
+def test_what_a_top_up_within_limits_leaves_is_told(record):
+    path = record("a.csv", 300, 1, power=0.02)
+    limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
+    found = assess(parse_spec(HEATER, overrides=limits), path)
+    result = found.results.result
+    left, times = result["assessment"]["left"], result["assessment"]["experiments"]
+    assert left > 1.5
+    assert f"still {left:.4g} times" in said(found.results)
+    assert "makes up for it" not in said(found.results)
+    # So many of them, one after the other, are enough, and one fewer is not.
+    one = np.asarray(result["information"]["matrix"])
+    data = np.asarray(identify(parse_spec(HEATER), path).result["information"]["matrix"])
+    theta = list(result["identification"]["theta"].values())
+    w = np.linspace(1e-6, 0.02 * 5, 400)
+    z = np.exp(-1j * w)[:, None]
+    B, F = theta[0] * z**6 + theta[1] * z**7, 1 + theta[4] * z
+    gradient = np.concatenate([z**6 / F, z**7 / F, 0 * z, 0 * z, -B * z / F**2], axis=1)
+    T = np.stack([gradient.real, gradient.imag], axis=1)
+
+    def ratio(n):
+        P = np.linalg.inv(data + n * (one - data))
+        r_u = result["model_error"]["alpha"] * np.sqrt(np.linalg.eigvalsh(T @ P @ T.swapaxes(1, 2))[:, -1])
+        return np.max(r_u / (0.05 * np.abs(B / F)[:, 0]))
+
+    assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "verdict", "why"),
+    [
+        (["limits.input_power=0.0001"], "missed", "cannot be met within the limits"),
+        (["experiment.controller={numerator: [9], denominator: [1]}"], "undecided", "unstable"),
+    ],
+)
+def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, record):
+    path = record("a.csv", 300, 1, power=0.02)
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.05", *overrides])
+    found = assess(spec, path)
+    assert found.verdict == verdict
+    assert why in json.dumps(found.results.result["assessment"])
+    plain = identify(parse_spec(STRUCTURE, design=False), path)
+    assert found.results.result["identification"]["theta"] == pytest.approx(
+        plain.result["identification"]["theta"]
+    )
+    assert {"fit", "residuals"} <= set(found.results.tables)
+    assert "model.yaml" in found.results.files
+    assert ("no experiment is designed" in said(found.results)) == (verdict == "missed")
+
+
+def test_a_spec_without_a_question_is_enough_to_identify(record, tmp_path):
+    spec, path = tmp_path / "structure.yaml", record("a.csv", 300, 1)
+    spec.write_text(STRUCTURE)
+    out = tmp_path / "run"
+    run = CliRunner().invoke(
+        app, ["identify", str(path), "--spec", str(spec), "-o", str(out), "--no-figures"]
+    )
+    assert run.exit_code == 0, run.output
+    run = CliRunner().invoke(app, ["report", str(out)])
+    assert run.exit_code == 0, run.output
+    assert identify(load_spec(spec, design=False), path).result["status"] == "identified"
+    with pytest.raises(Exception, match="nothing is asked"):
+        solve(load_spec(spec))
+
+
+def test_the_operating_point_of_the_command_line(record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", record("a.csv", 300, 2, level=(40.0, 52.3))
+    spec.write_text(STRUCTURE)
+    call = ["identify", str(path), "--spec", str(spec), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
+    known = CliRunner().invoke(app, [*call, "--operating-point", "u1=40,y=52.3"])
+    assert not json.loads(known.stdout)["identification"]["free_start"]
+    unknown = CliRunner().invoke(app, call)
+    assert json.loads(unknown.stdout)["identification"]["free_start"]
+    assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
