@@ -29,7 +29,7 @@ from inputdesign_cli.tasks.result.signal import other_files, signal_curves, sign
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
-_TOO_FAINT = 1e-13
+_TOO_FAINT = 1e-12
 _ROUNDING = 1e-9
 
 

@@ -26,6 +26,9 @@ from inputdesign_cli.signal import (
 from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.shortest_record import shortest_record
 
+# Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
+# those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
+_UNTOLD = 1e-12
 _NO_RECORD = (
     "there is no record: it would have {} samples, and at most {} are computed for this model; "
     "signal.samples sets a shorter one"
@@ -173,9 +176,15 @@ def least_period(inputs: int) -> int:
 
 
 def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
-    """The largest ratio of several requirements as a function of the information matrix; 0 for none."""
+    """The largest ratio of several requirements as a function of the information of a record; 0 for none.
+
+    It raises `LinAlgError` where rounding would decide: the record tells parameters apart by less than that.
+    """
 
     def ratio(information: Array) -> float:
+        eigenvalues = np.linalg.eigvalsh(information)
+        if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
+            raise np.linalg.LinAlgError
         return max((v.ratio for r in requirements for v in r.violations(information)), default=0.0)
 
     return ratio
@@ -187,7 +196,12 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
         too_long = request.length(experiment) > request.longest
         return [_NO_RECORD.format(request.length(experiment), request.longest)] if too_long else []
     notes = []
-    if not record.met:
+    if not record.met and not np.isfinite(record.worst_ratio):
+        notes.append(
+            "the record does not tell all parameters apart to working precision, so that nothing can be said "
+            "of the accuracy that it reaches: take more samples (signal.samples), or a model of lower order"
+        )
+    elif not record.met:
         notes.append(
             f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.4g}; the limits on the "
             "powers, the level asked for or its length leave no room: a little more power or a few more "

@@ -30,6 +30,7 @@ _ROUNDING, _FAINT = 1e-12, 1e-9
 _FAR_BELOW = 1e-12
 _UNEXCITED = 1e-13
 _PLENTY = 1e9
+_UNSUITED = 1e8  # a condition beyond which coordinates do not suit
 
 
 @dataclass(frozen=True)
@@ -79,15 +80,18 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     power = white_power(question)
     powers = balanced_powers(question, power or 1.0)
     question = replace(question, basis=question.basis.in_units(np.sqrt(powers)))
-    problem = whitened_problem(question, powers)
+    start = question.basis.spread(powers)
+    whitened = whitened_problem(question, powers)
+    problem = _suited(whitened, question, start)
     flat = problem.on(flat_basis(problem.experiment))
     white = _white(question, flat, power)
     white_level = float(white.z[0] / white.s)
-    anywhere = _anywhere(question, problem, powers)
+    anywhere = _anywhere(question, whitened, powers)
     if power == 0.0 and not problem.has_floors:
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
     within = excess(flat, white) <= _KEEPS
-    result = _without_faint_lines(problem, _solve(problem, problem.basis.spread(powers), tolerance))
+    _check_excites(problem, start)
+    result = _without_faint_lines(problem, _solve(problem, start, tolerance))
     if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
     loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
@@ -126,12 +130,34 @@ def balanced_powers(question: Question, power: float) -> Array:
 
 def whitened_problem(question: Question, powers: Array) -> Problem:
     """The problem in coordinates where flat excitation of these powers gives M = I."""
-    coordinates = question.experiment.whitened(powers)
+    return _restated(_stated(question, question.experiment), question, question.experiment.whitened(powers))
+
+
+def _restated(problem: Problem, question: Question, coordinates: Experiment) -> Problem:
     return replace(
-        _stated(question, coordinates),
+        problem,
+        experiment=coordinates,
         requirements=tuple(make(coordinates) for make in question.requirements),
         side=tuple(make(coordinates) for make in question.side),
     )
+
+
+def _suited(problem: Problem, question: Question, start: Array) -> Problem:
+    """The problem in coordinates where `start` gives M = I, if flat excitation does not suit it.
+
+    A pole next to the unit circle may dominate what flat excitation tells: lines away from it then tell
+    little of all parameters, and yet tell them apart. Otherwise, the problem itself.
+    """
+    if np.linalg.cond(problem.information(start)) < _UNSUITED:
+        return problem
+    # Parameters in units of their own: of what the start tells, and only by their sizes.
+    raw = problem.experiment.to_raw(problem.information(start))
+    unit = np.diag(np.sqrt(np.maximum(np.diag(raw), _FAINT)))
+    scaled = replace(problem, experiment=replace(problem.experiment, factor=unit)).information(start)
+    if not np.linalg.cond(scaled) < _UNSUITED:
+        return problem
+    own = replace(problem.experiment, factor=unit @ np.linalg.cholesky(scaled))
+    return _restated(problem, question, own)
 
 
 def _stated(question: Question, experiment: Experiment) -> Problem:
@@ -156,7 +182,6 @@ def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
 
 
 def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
-    _check_excites(problem, start)
     floors = problem.has_floors
     limited = bool(problem.limits or problem.densities)
     if problem.goal == "cost" and limited and not floors:

@@ -1,0 +1,68 @@
+"""Parameters that are hard to tell apart: designed where arithmetic can, and no claims where it cannot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+
+
+def worst_ratio(B, F, variance, lines, samples, relative, alpha, band):
+    """Of an output-error model by sums over its lines, each parameter in a unit of its own."""
+    w, powers = np.asarray(lines["frequencies"]), np.asarray(lines["powers"])
+
+    def gradients(w):
+        z = np.exp(-1j * w)
+        b, f = np.polyval(B[::-1], z), np.polyval(F[::-1], z)
+        powers_of_b = [i for i, c in enumerate(B) if c]
+        rows = [z**i / f for i in powers_of_b] + [-(z**i) * b / f**2 for i in range(1, len(F))]
+        return b / f, np.array(rows)
+
+    psi = gradients(w)[1] * np.sqrt(samples * powers / variance)
+    stacked = np.concatenate([psi.real, psi.imag], axis=1).T
+    scale = np.linalg.norm(stacked, axis=0)
+    triangle = np.linalg.qr(stacked / scale, mode="r")
+    at = np.linspace(*band, 2000)
+    G, dG = gradients(at)
+    half = np.linalg.solve(triangle.T, dG / scale[:, None])
+    real = np.stack([half.real, half.imag])
+    largest = np.linalg.eigvalsh(np.einsum("ikn,jkn->nij", real, real))[:, -1]
+    return float(np.max(alpha * np.sqrt(largest) / (relative * np.abs(G))))
+
+
+@pytest.mark.parametrize("pole", [0.999, 0.9999998, 0.99999999])
+def test_lines_away_from_a_pole_next_to_the_circle_tell_the_parameters_apart(pole):
+    text = f"""
+plant: {{B: [0, 0.5, 0.2], F: [1, -{pole}]}}
+noise: {{variance: 0.1}}
+experiment: {{samples: 500}}
+accuracy: {{model_error: {{relative: 0.1, alpha: 2, band: [0.1, 3]}}}}
+spectrum: {{type: multisine, lines: 20}}
+"""
+    found = solve(parse_spec(text)).result
+    assert found["status"] == "optimal"
+    ratio = worst_ratio(
+        [0, 0.5, 0.2], [1, -pole], 0.1, found["spectrum"], 500, relative=0.1, alpha=2, band=(0.1, 3)
+    )
+    assert ratio == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("samples", "told"), [(20, False), (30, False), (100, True)])
+def test_a_record_claims_no_accuracy_that_rounding_decides(samples, told):
+    F = np.poly([0.900, 0.901, 0.902, 0.903, 0.904, 0.905])
+    text = f"""
+plant: {{B: [0, 1.0], F: {F.tolist()}}}
+noise: {{variance: 1}}
+experiment: {{samples: {samples}}}
+accuracy: {{model_error: {{relative: 0.1, alpha: 2}}}}
+spectrum: {{type: fir, order: 10}}
+signal: {{seed: 1}}
+"""
+    found = solve(parse_spec(text)).result
+    assert ("worst_ratio" in found["signal"]) == told
+    assert any("working precision" in note for note in found.get("notes", [])) != told
+    if told:  # by 60 digits: 0.999999990644
+        assert math.isclose(found["signal"]["worst_ratio"], 1.0, abs_tol=1e-6)
