@@ -33,6 +33,7 @@ _NODES_AT_ONCE = 1024
 # spectrum itself varies faster.
 _STEPS = 4
 _FAST = 200
+_KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 
 
@@ -154,12 +155,18 @@ class _Audit:
         lo, hi = self._experiment.band
         if "band" in entry:
             lo, hi = (edge * unit for edge in entry["band"])
-        grid = graded_grid(self._experiment.singularities, lo, hi)
-        steps = min(max(_FAST // max(entry.get("order", 0), 1), 1), _STEPS)
-        return [
-            (w, _root(_density(entry, w, (lo, hi), r) * weight[:, None, None]))
-            for w, weight in _rule(grid, steps)
-        ]
+        found, known = self.done.design.result, entry["type"] in _KNOWN
+        grid = graded_grid(self._experiment.singularities, lo, hi, knots=found.basis.knots)
+        steps = min(max(_FAST // max(entry.get("order", 0), 1), 1), _STEPS) if known else 1
+
+        def density(w: Array) -> ComplexArray:
+            if known:
+                return _density(entry, w, (lo, hi), r)
+            return (
+                found.basis.density(found.x, w).reshape(-1, r, r).astype(complex)
+            )  # a family from elsewhere
+
+        return [(w, _root(density(w) * weight[:, None, None])) for w, weight in _rule(grid, steps)]
 
 
 def _density(entry: Mapping[str, Json], w: Array, band: tuple[float, float], r: int) -> ComplexArray:
