@@ -98,9 +98,10 @@ class ConvexTask:
         result = design_result(done, how, self.tolerance)
         if self.columns is not None:
             result["spectrum"] |= {"factor_columns": self.columns.columns}
-        audit(done, result, on_grid=self.grid is not None)
         self._check_length(result)
         solved = time.perf_counter()
+        audit(done, result, on_grid=self.grid is not None)
+        checked = time.perf_counter()
         record = self._made(done)
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
@@ -111,7 +112,11 @@ class ConvexTask:
         if done.design.result.x.any():
             notes = record_notes(self.record, done.experiment.samples, record)
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
-        result["timing_s"] = {"design": solved - started, "signal": time.perf_counter() - solved}
+        result["timing_s"] = {
+            "design": solved - started,
+            "check": checked - solved,
+            "signal": time.perf_counter() - checked,
+        }
         units = self.header.units
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
