@@ -42,7 +42,7 @@ def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -
     except (DataError, OSError):
         return
     hint = "choose another directory with -o, or replace the run with --overwrite"
-    same = written == spec.encode()
+    same = written == spec.encode(errors="backslashreplace")
     if not same and hashlib.sha256(written).hexdigest() != result.get("spec_sha256"):
         message = f"{shown / SPEC} has been changed since its run was written, and would be lost"
         hint = "solve that file, choose another directory with -o, or give up the changes with --overwrite"

@@ -37,7 +37,9 @@ def finished_result(results: Results) -> dict[str, Json]:
     if not result.get("environment"):
         result["environment"] = environment()
     if not result.get("spec_sha256"):
-        result["spec_sha256"] = hashlib.sha256(results.resolved_spec.encode()).hexdigest()
+        result["spec_sha256"] = hashlib.sha256(
+            results.resolved_spec.encode(errors="backslashreplace")
+        ).hexdigest()
     return result
 
 
@@ -113,7 +115,7 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
     partial = path.with_name(f".{path.name}.partial-{os.getpid()}")
     with output_errors(path):
         try:
-            with partial.open("w", encoding="utf-8", newline="\n") as file:
+            with partial.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
                 file.writelines([text] if isinstance(text, str) else text)
                 file.flush()
                 os.fsync(file.fileno())
@@ -160,7 +162,7 @@ def _write_files(
 
 
 def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, *, shown: Path) -> None:

@@ -39,7 +39,9 @@ class Plan:
             except SpecError:
                 digest = json.dumps([self.draft.digest(self.draft.data), overrides])
             name = f"{__version__} {self.verb} {digest}"
-            self._keys.append(hashlib.sha256(name.encode()).hexdigest()[:_KEY_LENGTH])
+            self._keys.append(
+                hashlib.sha256(name.encode(errors="backslashreplace")).hexdigest()[:_KEY_LENGTH]
+            )
         return self._keys[index]
 
     def job(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointJob:

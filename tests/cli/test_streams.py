@@ -1,5 +1,6 @@
 """Streams that are closed, full or cut off, and signals: a clear line and an exit code, never a traceback."""
 
+import json
 import os
 import signal
 import subprocess
@@ -92,3 +93,13 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     # Before the handlers stand, a signal ends the process by itself; a shell shows the same code.
     assert codes <= {code, -number}
     assert not (tmp_path / "r").exists()
+
+
+def test_names_that_are_no_text_end_in_no_fault(tmp_path):
+    """A file name need not be UTF-8: what is written tells it with escapes."""
+    name = os.fsdecode(b"\xff\xfe.yaml")
+    (tmp_path / name).write_text((ROOT / "specs" / "first_order_given.yaml").read_text())
+    code, told = shell(f"{IDESIGN} analyse '{name}' -q --no-figures -o run", tmp_path)
+    assert (code, told) == (0, "")
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["made_from"] == [f"../{name}"]
+    assert shell(f"{IDESIGN} report '{name}' -q", tmp_path)[0] == 2
