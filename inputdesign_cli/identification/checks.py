@@ -128,6 +128,7 @@ def covariance_of(names: Sequence[str], information: Array) -> Array:
     return np.asarray((half @ half.T) / np.outer(scale, scale))
 
 
-def fit_percent(y: Array, simulated: Array) -> float:
-    """Per cent of the rms of y (samples,), its mean taken off, that a simulation explains."""
-    return float(100.0 * (1.0 - np.linalg.norm(y - simulated) / np.linalg.norm(y - y.mean())))
+def fit_percent(y: Array, simulated: Array, lengths: Sequence[int]) -> float:
+    """Per cent of the rms of y (samples,), the mean of each record taken off, that a simulation explains."""
+    varying = np.concatenate([part - part.mean() for part in np.split(y, np.cumsum(lengths)[:-1])])
+    return float(100.0 * (1.0 - np.linalg.norm(y - simulated) / np.linalg.norm(varying)))

@@ -130,7 +130,7 @@ def concluded(
         steps=found.steps,
         starts=found.starts,
         fit=tuple(
-            fit_percent(measured, explained) if runs else None
+            fit_percent(measured, explained, lengths) if runs else None
             for measured, explained, runs in zip(y.T, simulated.T, stable, strict=True)
         ),
         simulated=simulated,

@@ -34,10 +34,13 @@ _PREDICTION_ERROR = (
 def assumptions(question: Question, result: Result) -> list[str]:
     """What the numbers rest on, beyond the arithmetic."""
     rests = "The design is best" if "objective" in result else "The figures hold"
-    said = [
-        f"The plant and the noise are as the spec has them. {rests} for this nominal system; the accuracy "
-        "of a model of another system may differ."
-    ]
+    if "identification" in result:
+        said = ["Orders and delay are those of the spec; the numbers were estimated from the data."]
+    else:
+        said = [
+            f"The plant and the noise are as the spec has them. {rests} for this nominal system; the "
+            "accuracy of a model of another system may differ."
+        ]
     if "worst_ratio" in result.get("model_error", {}):
         first = " and of first order in the parameters" if question.linearised else ""
         said.append(

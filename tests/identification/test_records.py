@@ -5,6 +5,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli.identification import identify
+from inputdesign_cli.identification.checks import fit_percent
 from inputdesign_cli.identification.polynomial_record import PolynomialRecord
 from inputdesign_cli.identification.record_problem import evaluate
 from inputdesign_cli.identification.records import Records
@@ -115,3 +116,14 @@ def test_the_simulation_begins_where_the_record_does():
     found = identify(SYSTEMS["oe"], u, y)
     assert found.free
     assert found.fit[0] > 95
+
+
+def test_levels_of_records_do_not_count_as_explained():
+    """The fit of records about different levels is that of the same records about zero."""
+    rng = np.random.default_rng(3)
+    y = rng.standard_normal(200)
+    explained = 0.7 * y
+    levels = np.repeat([40.0, -5.0], 100)
+    apart = fit_percent(y + levels, explained + levels, (100, 100))
+    assert apart == pytest.approx(fit_percent(y, explained, (100, 100)))
+    assert apart == pytest.approx(70.0, abs=1.0)
