@@ -332,3 +332,18 @@ def test_an_input_that_a_trace_leaves_out_is_told():
     ).result
     assert found["power"]["input"] == pytest.approx([1.0, 0.0], abs=1e-9)
     assert [note for note in found["notes"] if note.startswith("input 2 gets no power")]
+
+
+@pytest.mark.parametrize("spectrum", ["fir, order: 4", "free", "white"])
+@pytest.mark.parametrize(("share", "needed"), [(1.05, False), (0.99, True)])
+def test_what_noise_alone_tells_of_some_parameters_needs_no_excitation(spectrum, share, needed):
+    """Without excitation N samples of an ARX system give var a1 = (1 - a1^2) / N, and nothing of b1."""
+    bound = share * np.sqrt((1 - 0.5**2) / 1000)
+    found = solve(
+        parse_spec(
+            "plant: {A: [1, -0.5], B: [0, 1]}\nnoise: {variance: 1}\nexperiment: {samples: 1000}\n"
+            f"accuracy: {{standard_deviation: {{a1: {bound}}}}}\nspectrum: {{type: {spectrum}}}\n"
+        )
+    ).result
+    assert (found["cost"] > 0) == needed
+    assert (found["status"] == "nothing_needed") != needed

@@ -44,10 +44,13 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
                 return 0.0
         lo = hi = np.log(power)
         hi = _enough(excess, hi)
-        while excess(lo) <= 0:
-            lo -= 2.0
-            if lo < _FAINT:
-                return 0.0  # nothing is asked
+        try:
+            while excess(lo) <= 0:
+                lo -= 2.0
+                if lo < _FAINT:
+                    return 0.0  # nothing is asked
+        except np.linalg.LinAlgError:
+            return 0.0  # the noise alone tells what is asked, and nothing of other parameters
         found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
         if abs(found - power) <= 1e-3 * power:
             return found
