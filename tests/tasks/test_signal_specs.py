@@ -177,3 +177,18 @@ def test_the_example():
     validate(spec)
     assert spec.limits.amplitude is not None
     assert spec.limits.amplitude.input == 0.75
+
+
+@pytest.mark.parametrize("offset", [0.3, 0.37, -0.1])
+def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(offset):
+    """Steps of 0.25: the record swings about the nearest value, within the limit from the offset."""
+    found = solve(
+        parse_spec(
+            BASE.replace("500", "900") + "limits: {amplitude: 0.75}\n"
+            f"signal: {{type: binary, candidates: 2, offset: {offset},"
+            " quantisation: {bits: 4, range: 2}}\n"
+        )
+    )
+    u = np.array(found.tables["signal"].columns["u1"])
+    np.testing.assert_allclose(u / 0.25, np.rint(u / 0.25), atol=1e-9)
+    assert np.abs(u - offset).max() <= 0.75 + 1e-12

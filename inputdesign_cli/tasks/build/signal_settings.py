@@ -81,16 +81,34 @@ def build_signal_settings(spec: Spec) -> SignalSettings:
     )
 
 
+def stated_peaks(spec: Spec) -> tuple[Array | None, Array | None]:
+    """The largest |u| (r,) and |y| (p,), counted from the offset."""
+    amplitude = spec.limits.amplitude
+    if amplitude is None:
+        return None, None
+    u, y = amplitude.input, amplitude.output
+    return (
+        None if u is None else per_channel(u, spec.plant.inputs),
+        None if y is None else per_channel(y, spec.plant.outputs),
+    )
+
+
 def build_bounds(spec: Spec) -> Bounds:
-    """What single samples of the record may not exceed, channel by channel."""
-    amplitude, rate = spec.limits.amplitude, spec.limits.rate
-    inputs, outputs = spec.plant.inputs, spec.plant.outputs
-    most = (None, None) if amplitude is None else (amplitude.input, amplitude.output)
+    """What single samples of the record may not exceed, channel by channel.
+
+    Records count from values of the converters; where the offset lies between two, peaks keep off by as much.
+    """
+    rate, inputs, quantisers = spec.limits.rate, spec.plant.inputs, _quantisers(spec)
+    amplitude, output = stated_peaks(spec)
+    if amplitude is not None and quantisers:
+        amplitude = amplitude - np.abs(
+            per_channel(spec.signal.offset or 0.0, inputs) - _operating_points(spec)
+        )
     return Bounds(
-        amplitude=None if most[0] is None else per_channel(most[0], inputs),
+        amplitude=amplitude,
         rate=None if rate is None else per_channel(rate, inputs),
-        output=None if most[1] is None else per_channel(most[1], outputs),
-        quantisers=_quantisers(spec),
+        output=output,
+        quantisers=quantisers,
     )
 
 
