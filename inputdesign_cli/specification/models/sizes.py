@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
 from inputdesign_cli.specification.models.path_diagnostic import fail
@@ -50,34 +50,22 @@ class Size:
         return {**inner, limit: self.most} if limit else inner
 
 
-@dataclass(frozen=True)
-class Magnitude:
-    """Numbers other than zero of this range: beyond, products of a few of them leave that of arithmetic."""
+def magnitude(least: float, most: float) -> AfterValidator:
+    """Zero, or numbers of this size: beyond, products of a few of them leave the range of arithmetic."""
 
-    least: float
-    most: float
-
-    def check(self, value: float) -> float:
-        """The value itself.
-
-        Raises:
-            PydanticCustomError: `out-of-range`.
-        """
-        if value and not self.least <= abs(value) <= self.most:
-            bound = f"at most {self.most:g}" if abs(value) > 1.0 else f"at least {self.least:g}"
+    def check(value: float) -> float:
+        if value and not least <= abs(value) <= most:
+            bound = f"at most {most:g}" if abs(value) > 1.0 else f"at least {least:g}"
             message = f"{{key}} is {show(value)}, and such a number is {bound} in size"
             raise fail("out-of-range", message, "choose another unit")
         return value
 
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        return core_schema.no_info_after_validator_function(self.check, handler(source))
+    return AfterValidator(check)
 
 
-QUANTITY = Magnitude(1e-40, 1e40)
+QUANTITY = magnitude(1e-40, 1e40)
 """Powers, variances, errors, times, frequencies."""
-COEFFICIENT = Magnitude(0.0, 1e100)
+COEFFICIENT = magnitude(0.0, 1e100)
 """Coefficients and entries of matrices: powers of s may be far apart, and rounding leaves small ones."""
 
 SIZES = {

@@ -1,0 +1,57 @@
+"""Commands in an empty folder, with stand-ins for what they compute."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import specification, tasks
+from inputdesign_cli.cli import main
+from inputdesign_cli.runs.results import Results, Table
+from tests.support.command_line import RESULT
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `idesign` in an empty folder: its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["idesign", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return call
+
+
+@pytest.fixture
+def verbs(monkeypatch):
+    """Stand-ins for the verbs of the package; `calls` keeps what they were called with."""
+    calls = []
+
+    def load_spec(path, overrides, **_):
+        calls.append((path, list(overrides)))
+        return path
+
+    def results(spec):
+        return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
+
+    monkeypatch.setattr(specification, "load_spec", load_spec)
+    monkeypatch.setattr("inputdesign_cli.sweep.verbs.load_spec", load_spec)
+    for verb in ("solve", "analyse"):
+        monkeypatch.setattr(tasks, verb, results)
+    monkeypatch.setattr(tasks, "validate", lambda spec: None)
+    return calls
+
+
+@pytest.fixture
+def failing(monkeypatch, verbs):
+    def install(error, verb="solve"):
+        def fail(spec):
+            raise error
+
+        monkeypatch.setattr(tasks, verb, fail)
+
+    return install

@@ -1,0 +1,203 @@
+"""Commands that design nothing: validate, check, examples, init, explain, schema."""
+
+import json
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import typer
+
+import inputdesign_cli
+from inputdesign_cli import tasks
+from inputdesign_cli.cli import app
+from inputdesign_cli.cli.init import KINDS
+from inputdesign_cli.errors import InfeasibleError, SpecError
+from tests.support.command_line import RESULT, diagnostic
+
+ROOT = Path(inputdesign_cli.__file__).parents[1]
+GROUP = typer.main.get_command(app)
+COMMANDS = dict(GROUP.commands)
+
+
+def test_validate_reports_all_files_at_once(run, verbs, monkeypatch):
+    def validate(spec):
+        if spec.stem != "good":
+            raise SpecError(diagnostic(spec.stem))
+
+    monkeypatch.setattr(tasks, "validate", validate)
+    code, out, err = run("validate", "bad.yaml", "good.yaml", "worse.yaml")
+    assert code == 2
+    assert out == "good.yaml: valid\n"
+    assert "bad" in err
+    assert "worse" in err
+    code, out, _ = run("validate", "bad.yaml", "good.yaml", "worse.yaml", "--json")
+    assert [error["code"] for error in json.loads(out)["errors"]] == ["bad", "worse"]
+    code, out, _ = run("validate", "good.yaml", "--json")
+    assert (code, json.loads(out)) == (0, {"valid": ["good.yaml"]})
+
+
+GOLDEN = """\
+runs:
+  - name: white
+    spec: a.yaml
+    quantities:
+      - {path: objective.value, label: power, expected: 0.2585, absolute: 1e-4, why: w, source: closed form}
+      - {path: cost, expected: %s, absolute: 1e-4, why: digits, source: "paper, Section 1"}
+"""
+
+
+def test_check_passes(run, verbs, tmp_path):
+    (tmp_path / "golden").mkdir()
+    (tmp_path / "golden" / "g.yaml").write_text(GOLDEN % "0.2585")
+    code, out, err = run("check")
+    assert (code, err) == (0, "")
+    assert "2 of 2 quantities agree" in out
+    assert "FAILS" not in out
+    for part in ("g: white", "power", "0.258498", "0.2585", "-2.0e-06", "1.0e-04", "paper, Section 1"):
+        assert part in out
+    assert verbs == [(Path("golden/a.yaml"), [])]
+
+
+def test_check_fails_with_1(run, verbs, tmp_path):
+    (tmp_path / "g.yaml").write_text(GOLDEN % "0.3")
+    code, out, _ = run("check", "g.yaml", "--junit", "report.xml")
+    assert code == 1
+    assert "1 of 2 quantities agree" in out
+    root = ElementTree.parse(tmp_path / "report.xml").getroot()
+    assert root.tag == "testsuites"
+    (suite,) = root
+    for counted in (root, suite):
+        assert [counted.get(name) for name in ("tests", "failures", "errors")] == ["2", "1", "0"]
+    times = [float(case.get("time")) for case in suite]
+    assert sum(times) == pytest.approx(float(root.get("time")), abs=2e-3)
+    failed = [case.get("name") for case in suite if case.find("failure") is not None]
+    assert failed == ["white: cost (paper, Section 1)"]
+    code, out, err = run("check", "g.yaml", "--json")
+    assert (code, err) == (1, "")
+    content = json.loads(out)
+    assert content["passed"] is False
+    assert [row["passed"] for row in content["rows"]] == [True, False]
+
+
+def test_check_of_an_infeasible_run_says_why(run, failing, tmp_path):
+    (tmp_path / "g.yaml").write_text(GOLDEN % "0.2585")
+    failing(InfeasibleError(diagnostic()))
+    code, out, _ = run("check", "g.yaml")
+    assert code == 1
+    assert out.count("the plant is unstable") == 2
+
+
+def test_check_without_golden_files(run, monkeypatch, tmp_path):
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "nowhere")
+    code, _, err = run("check", "--junit", "report.xml")
+    assert code == 2
+    assert "golden/*.yaml" in err
+    root = ElementTree.parse(tmp_path / "report.xml").getroot()
+    assert (root.tag, root.get("errors"), root.get("tests")) == ("testsuites", "1", "1")
+    assert root.find("testsuite/testcase/error").get("type") == "golden-missing"
+
+
+@pytest.mark.parametrize(
+    "text", ["runs: []\n", "runs:\n", "{}\n", "runs: [{name: a, spec: a.yaml, quantities: []}]\n"]
+)
+def test_a_golden_file_that_compares_nothing_fails(run, verbs, tmp_path, text):
+    (tmp_path / "g.yaml").write_text(text)
+    assert run("check", "g.yaml", "--junit", "report.xml")[0] == 2
+    assert ElementTree.parse(tmp_path / "report.xml").getroot().get("errors") == "1"
+
+
+def test_golden_files_come_with_the_package(run, verbs, monkeypatch, tmp_path):
+    (tmp_path / "shipped" / "golden").mkdir(parents=True)
+    (tmp_path / "shipped" / "golden" / "g.yaml").write_text(GOLDEN % "0.2585")
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "shipped")
+    code, out, _ = run("check")
+    assert code == 0
+    assert "2 of 2 quantities agree" in out
+
+
+def test_nothing_is_written_with_no_output(run, verbs, tmp_path):
+    code, out, err = run("solve", "a.yaml", "--json", "--no-output")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["objective"] == RESULT["objective"]
+    code, out, err = run("solve", "a.yaml", "--no-output")
+    assert "0.258498" in out
+    assert "files" not in out
+    assert run("solve", "a.yaml", "--no-output", "-o", "x")[0] == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_examples_are_listed_and_copied_once(run, tmp_path):
+    code, out, _ = run("examples")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == sorted(
+        p.stem for p in (ROOT / "specs").glob("*.yaml")
+    )
+    assert run("examples", "first_order", "-o", "mine") == (0, "mine/first_order.yaml\n", "")
+    copied = tmp_path / "mine" / "first_order.yaml"
+    assert copied.read_text() == (ROOT / "specs" / "first_order.yaml").read_text()
+    copied.write_text("mine")
+    assert run("examples", "first_order.yaml", "-o", "mine")[0] == 2
+    assert copied.read_text() == "mine"
+    code, _, err = run("examples", "frist_order")
+    assert code == 2
+    assert 'did you mean "first_order"' in err
+
+
+def test_init_writes_once(run, tmp_path):
+    assert run("init", "mine.yaml") == (0, "", "")
+    text = (tmp_path / "mine.yaml").read_text()
+    assert run("init") == (0, text, "")
+    assert text.startswith("# yaml-language-server: $schema=idesign.schema.json\n")
+    assert json.loads((tmp_path / "idesign.schema.json").read_text())["$id"].startswith("urn:")
+    (tmp_path / "idesign.schema.json").write_text("mine")
+    (tmp_path / "mine.yaml").write_text("changed")
+    code, _, err = run("init", "mine.yaml")
+    assert code == 2
+    assert "--force" in err
+    assert (tmp_path / "mine.yaml").read_text() == "changed"
+    assert run("init", "mine.yaml", "--force")[0] == 0
+    assert (tmp_path / "idesign.schema.json").read_text() == "mine"
+    assert (tmp_path / "mine.yaml").read_text() == text
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_starter_specs_are_valid_and_explained(run, tmp_path, kind):
+    assert run("init", "--kind", kind, "a.yaml")[0] == 0
+    spec = inputdesign_cli.load_spec(tmp_path / "a.yaml", [])
+    assert (spec.experiment.controller is not None) == (kind == "closed-loop")
+    assert (spec.sweep is not None) == (kind == "sweep")
+    assert (tmp_path / "a.yaml").read_text().count("#") > 8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "nearest"),
+    [(("init", "--kind", "closd-loop"), "closed-loop"), (("sweep", "a", "--verb", "slove"), "solve")],
+)
+def test_an_unknown_word_is_refused_in_plain_words(run, arguments, nearest):
+    code, _, err = run(*arguments)
+    assert code == 2
+    assert f'did you mean "{nearest}"?' in " ".join(err.split())
+    assert "Value error" not in err
+
+
+def test_explain(run):
+    code, out, _ = run("explain")
+    assert code == 0
+    for name in (line.split()[0] for line in out.splitlines()):
+        ended, text, _ = run("explain", name)
+        assert ended == 0
+        assert len(text) > 40
+    code, _, err = run("explain", "no-such-code")
+    assert code == 2
+    assert "no-such-code" in err
+
+
+def test_schema(run):
+    code, out, err = run("schema")
+    assert (code, err) == (0, "")
+    assert set(json.loads(out)["properties"]) >= {"plant", "experiment", "accuracy", "spectrum"}
+
+
+def test_version(run):
+    assert run("--version") == (0, f"idesign {inputdesign_cli.__version__}\n", "")

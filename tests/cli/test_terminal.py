@@ -1,0 +1,78 @@
+"""Colours, progress and columns: on terminals, and nowhere else."""
+
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+import inputdesign_cli
+from inputdesign_cli.cli import app
+from inputdesign_cli.cli.terminal import aligned, colourful, status
+
+ROOT = Path(inputdesign_cli.__file__).parents[1]
+GROUP = typer.main.get_command(app)
+COMMANDS = dict(GROUP.commands)
+
+
+class Terminal:
+    def __init__(self):
+        self.text = ""
+
+    def isatty(self):
+        return True
+
+    def write(self, text):
+        self.text += text
+
+    def flush(self):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("variables", "expected"),
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
+)
+def test_no_color(monkeypatch, variables, expected):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert colourful(Terminal()) is expected
+
+
+def test_no_colour_in_files(tmp_path):
+    with (tmp_path / "log").open("w") as file:
+        assert not colourful(file)
+
+
+def test_progress_goes_to_terminals_only(monkeypatch, capsys):
+    with status("working", quiet=False):
+        pass
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setenv("TERM", "xterm")
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with status("[working] on it", quiet=False):
+        pass
+    assert "[working] on it" in terminal.text
+    assert terminal.text.endswith("\x1b[2K"), "the line is cleared"
+    terminal.text = ""
+    with status("working", quiet=True):
+        pass
+    assert terminal.text == ""
+
+
+def test_columns_are_aligned():
+    assert aligned([("a", "1"), ("bcd", "22")], right=[1]) == ["a     1", "bcd  22"]
+    assert aligned([("漢", "[x]"), ("bcd", "y")]) == ["漢   [x]", "bcd  y"]
+
+
+def test_lines_break_on_a_terminal_and_nowhere_else(monkeypatch):
+    rows = [("note", "one two three " * 10)]
+    assert len(aligned(rows, wrap=True)) == 1
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "40")
+    lines = aligned(rows, wrap=True)
+    assert max(map(len, lines)) <= 40
+    assert all(line.startswith("      ") for line in lines[1:])
