@@ -22,23 +22,21 @@ import statistics
 import sys
 import tempfile
 import time
-import warnings
 from pathlib import Path
 
 from inputdesign_cli.compute.processes import ONE_THREAD, Processes
 
 os.environ.update(ONE_THREAD)
 
-import cvxpy as cp
 import numpy as np
-from inputdesign_cli.design.least_cost import whitened_problem
-from inputdesign_cli.tasks.least_cost import build_task
+from least_cost import textbook
 
 from inputdesign_cli import load_spec
 from inputdesign_cli.compute.executor import InProcess
-from inputdesign_cli.design.convex.white import least_white_power
+from inputdesign_cli.design.convex.designs import white_power, whitened_problem
 from inputdesign_cli.figures.sweep_table import read_sweep
 from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.tasks.build.task import build_task
 
 ROOT = Path(__file__).parent.parent
 SPEC = ROOT / "specs" / "first_order.yaml"
@@ -47,23 +45,10 @@ TARGET_TEXTBOOK, TARGET_TWO = 5.0, 1.6
 AGREEMENT = 1e-3
 
 
-def textbook(samples: int) -> float:
+def plain_program(samples: int) -> float:
     """The least cost on a grid of frequencies, from the spec to the optimum."""
     task = build_task(load_spec(SPEC, [f"experiment.samples={samples}"]))
-    power = least_white_power(task.experiment, task.factories)
-    problem = whitened_problem(task.experiment, task.basis, task.cost, task.factories, power)
-    maps, offset, m = problem.information_map, problem.baseline_information, problem.basis.size - 1
-    c = cp.Variable(m + 1)
-    gram = cp.Variable((m + 1, m + 1), PSD=True)
-    constraints = [cp.trace(gram) == c[0]]
-    constraints += [sum(gram[i, i + lag] for i in range(m + 1 - lag)) == c[lag] for lag in range(1, m + 1)]
-    information = offset + sum(c[i] * maps[i] for i in range(m + 1))
-    constraints += [information - V.T @ V >> 0 for V in problem.requirements[0].rows(GRID)]
-    program = cp.Problem(cp.Minimize(problem.price.vector @ c), constraints)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        program.solve(solver=cp.CLARABEL)
-    return float(program.value)
+    return textbook(whitened_problem(task.question, white_power(task.question)), GRID)
 
 
 def against_textbook(folder: Path, *, timed: int) -> dict[str, float]:
@@ -77,7 +62,7 @@ def against_textbook(folder: Path, *, timed: int) -> dict[str, float]:
         sweep(SPEC, [f"experiment.samples={','.join(map(str, part))}"], directory=out, executor=InProcess())
         ours += time.perf_counter() - started
         started = time.perf_counter()
-        on_grid = textbook(int(part[0]))
+        on_grid = plain_program(int(part[0]))
         plain.append(time.perf_counter() - started)
         costs = read_sweep(out).numbers("cost")
         assert costs is not None
@@ -115,7 +100,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="a tenth of the points, to see that it runs")
     parser.add_argument("--json", type=Path, default=ROOT / "benchmarks" / "sweep.json")
     arguments = parser.parse_args()
-    textbook(500)  # imports and first calls
+    plain_program(500)  # imports and first calls
     with tempfile.TemporaryDirectory() as folder:
         sweep(SPEC, ["experiment.samples=100,101"], directory=Path(folder) / "first")
         plain = against_textbook(Path(folder), timed=2 if arguments.quick else 10)

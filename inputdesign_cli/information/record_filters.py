@@ -37,7 +37,7 @@ class RecordFilters:
     def signals(self, of: PowerKind, record: Array) -> Array:
         """(n, 1): what the samples (n, 1) alone cause at the input or the output."""
         numerator, denominator = self._responses[of]
-        return scipy.signal.lfilter(numerator, denominator, record, axis=0)
+        return _filtered(numerator, denominator, record)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """(n, 1): the transpose of `signals`; a filter run backwards in time is its own."""
@@ -76,10 +76,17 @@ class RecordFilters:
         """
         m, letters = self.model, {p.letter for p in self.model.parameters}
         B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]
-        by_b = scipy.signal.lfilter(D, np.convolve(C, F), self.signals("input", record)[:, 0])
+        by_b = _filtered(D, np.convolve(C, F), self.signals("input", record)[:, 0])
         sources = {"b": by_b}
         if "a" in letters:
-            sources["a"] = scipy.signal.lfilter(-D, C, self.signals("output", record)[:, 0])
+            sources["a"] = _filtered(-D, C, self.signals("output", record)[:, 0])
         if "f" in letters:
-            sources["f"] = scipy.signal.lfilter(-B, F, by_b)
+            sources["f"] = _filtered(-B, F, by_b)
         return sources
+
+
+def _filtered(numerator: Array, denominator: Array, values: Array) -> Array:
+    """The values (n, ...) through numerator / denominator, from rest."""
+    if len(numerator) == len(denominator) == 1:
+        return values * (numerator[0] / denominator[0])
+    return scipy.signal.lfilter(numerator, denominator, values, axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import scipy.optimize
@@ -11,6 +12,7 @@ import scipy.optimize
 # the coarser one where limits and rounding make it depend on the level in another way.
 _EXACT = 1e-10
 _COARSE = 1e-3
+_WIDER = 1.5
 _GROWTH = 1.2
 _MOST_GROWTH = 40.0
 # A level that leaves more than this share of the figure gains nothing worth having; so many may.
@@ -22,26 +24,35 @@ _NOTHING, _PLENTY = 1e-9, 1e30
 def least_level(ratio: Callable[[float], float], start: float) -> float:
     """The level at which a `ratio` that falls continuously with the level is one, from above.
 
+    Information is affine in the square of the level, so 1 / ratio^2 is a concave function of that square
+    for every bound on a variance, and near a line: its root is looked for.
+
     Raises:
         LinAlgError: the ratio is not defined at any level, or at most one at none: some parameter is not
             excited.
     """
+    ratio = cache(ratio)
     level = start
-    for _ in range(3):  # exact at once when all that is known comes from the record
+    for _ in range(2):  # exact at once when all that is known comes from the record
         reached = ratio(level)
         if abs(reached - 1.0) <= 1e-12:
             return level
         level *= min(reached, _PLENTY)
     low = high = level
     while ratio(high) > 1.0:
-        low, high = high, high * 1.5
+        low, high = high, high * _WIDER
         if high > _PLENTY * start:
             raise np.linalg.LinAlgError
     while ratio(low) <= 1.0:
         if low <= _NOTHING * start:  # what is known without the record is enough
             return low
-        low, high = low / 1.5, low
-    high = float(scipy.optimize.brentq(lambda a: np.log(ratio(a)), low, high, xtol=_EXACT * low, rtol=1e-14))
+        low, high = low / _WIDER, low
+
+    def surplus(square: float) -> float:
+        return ratio(float(np.sqrt(square))) ** -2.0 - 1.0
+
+    square = scipy.optimize.brentq(surplus, low**2, high**2, xtol=_EXACT * low**2, rtol=1e-14)
+    high = float(np.sqrt(square))
     while ratio(high) > 1.0:
         high *= 1.0 + _EXACT
     return high

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 
 from inputdesign_cli.plant.polynomial import Array
 
@@ -28,7 +27,7 @@ class SpectralFactor:
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
         """(samples,): stationary Gaussian noise, white noise of variance one through the taps."""
         noise = rng.standard_normal(samples + self.taps.size - 1)
-        return scipy.signal.lfilter(self.taps, [1.0], noise)[self.taps.size - 1 :]
+        return np.convolve(noise, self.taps, "valid")
 
 
 def spectral_factor(autocovariances: Array) -> SpectralFactor:

@@ -47,7 +47,7 @@ def analyse(spec: Spec) -> Results:
 def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing."""
     with _placed(spec):
-        build_task(spec).check()
+        build_task(spec)
 
 
 def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:

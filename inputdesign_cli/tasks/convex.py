@@ -71,9 +71,6 @@ class ConvexTask:
     unstated: Sequence[ModelError]
     simulation: Simulation
 
-    def check(self) -> None:
-        """Nothing: building has checked all."""
-
     def solve(self) -> Results:
         """The design, its proof, its signal and its curves.
 

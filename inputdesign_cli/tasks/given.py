@@ -102,9 +102,6 @@ class GivenTask:
     ellipses: Pairs | None
     simulation: Simulation
 
-    def check(self) -> None:
-        """Nothing: building has checked all."""
-
     def solve(self) -> Results:
         """r_u, information, predicted standard deviations and powers of the excitation.
 

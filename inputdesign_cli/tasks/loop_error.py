@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.loop_error import LoopErrorDesign, LoopErrorProblem, design_loop_error
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.monte_carlo.loop_error import study_losses
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.tasks.loop_error_signal import (
@@ -19,6 +20,8 @@ from inputdesign_cli.tasks.loop_error_signal import (
 from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms, design_result, spectrum_results
 from inputdesign_cli.tasks.result.losses import loss_results
 from inputdesign_cli.tasks.result.plain_signal import signal_entry, signal_results
+
+KEY = "accuracy.closed_loop_error"
 
 
 @dataclass(frozen=True)
@@ -33,15 +36,12 @@ class LossTrial:
 
 @dataclass(frozen=True)
 class LoopErrorTask:
-    """A design for the closed-loop error; `trial` makes its study, or raises what speaks against one."""
+    """A design for the closed-loop error, and its study."""
 
     problem: LoopErrorProblem
     terms: LoopErrorTerms
     signal: LoopErrorSignalSettings
-    trial: Callable[[], LossTrial]
-
-    def check(self) -> None:
-        """Nothing: building has checked all."""
+    trial: LossTrial
 
     def solve(self) -> Results:
         """The design, its proof, its signal and its curves.
@@ -59,7 +59,8 @@ class LoopErrorTask:
             SpecError: `not-supported` for true systems that are not ARX, or minimum-variance control.
             InaccurateError: see `solve`.
         """
-        trial = self.trial()
+        trial = self.trial
+        _check_simulated(self.problem, trial.problem)
         design, results = self._solved()
         begun = time.perf_counter()
         samples = self.terms.samples
@@ -98,4 +99,21 @@ class LoopErrorTask:
             header.units.time_unit,
             {**tables, "signal": table},
             {**curves, "signal": record},
+        )
+
+
+def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
+    if true.law.target is None:
+        raise bad_spec(
+            "not-supported",
+            "this version simulates model-reference and internal-model control only",
+            hint="run idesign solve, which computes what theory expects",
+            key=f"{KEY}.control.minimum_variance",
+        )
+    if not is_arx(true.plant):
+        raise bad_spec(
+            "not-supported",
+            "this version identifies by least squares, so the true system must be of the form A y = B u + e",
+            hint="write A and B only, and simulation.noise: {variance: ..}",
+            key="plant" if true.plant is nominal.plant else "simulation",
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,7 +63,7 @@ class RegressionTrial:
 
 @dataclass(frozen=True)
 class RegressionTask:
-    """A design of moments; `trial` makes its study, or raises what speaks against one.
+    """A design of moments, and its study where the spec has the true parameters.
 
     `alternating` and `tolerance` (the relative gap to be proved) are for Toeplitz moments, `seed` for
     their starts.
@@ -75,10 +74,7 @@ class RegressionTask:
     tolerance: float
     seed: int
     signal: RegressorSettings
-    trial: Callable[[], RegressionTrial]
-
-    def check(self) -> None:
-        """Nothing: building has checked all."""
+    trial: RegressionTrial | None
 
     def solve(self) -> Results:
         """The design, its proof, its signal and its curves.
@@ -97,7 +93,14 @@ class RegressionTask:
             SpecError: there is no simulation, or the record is too short, or an input to compare with is
                 not available for regressions; and what `solve` raises, as it does.
         """
-        trial = self.trial()
+        trial = self.trial
+        if trial is None:
+            raise bad_spec(
+                "missing-key",
+                "a regression is simulated with its true parameters, and there are none",
+                hint="write simulation: {runs: 10000, plant: {parameters: [..]}}, the estimated ones first",
+                key="simulation",
+            )
         record, results = self._solved()
         if record is None:
             raise bad_spec(

@@ -69,11 +69,6 @@ class ExchangeResult:
     cuts: int
 
     @property
-    def cost(self) -> float:
-        """The objective of a least-cost design."""
-        return self.objective
-
-    @property
     def active_frequencies(self) -> Array:
         """Frequencies (rad/sample) of the requirements that bind."""
         return np.array([w for _, w in self.active if w is not None])

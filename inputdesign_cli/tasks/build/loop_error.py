@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from inputdesign_cli.design.loop_error import (
 )
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec, refuse
-from inputdesign_cli.identification.least_squares import is_arx
 from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import TruePlant
@@ -27,11 +25,10 @@ from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.system import held_plant, polynomial_model
 from inputdesign_cli.tasks.build.weights import held, rational
-from inputdesign_cli.tasks.loop_error import LoopErrorTask, LossTrial
+from inputdesign_cli.tasks.loop_error import KEY, LoopErrorTask, LossTrial
 from inputdesign_cli.tasks.loop_error_signal import LoopErrorSignalSettings
 from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms
 
-KEY = "accuracy.closed_loop_error"
 _GRID = 512
 _CANDIDATES = 20
 
@@ -75,7 +72,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         },
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
-    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), partial(_trial, spec, problem))
+    return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, problem))
 
 
 def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
@@ -184,24 +181,10 @@ def _trial(spec: Spec, problem: LoopErrorProblem) -> LossTrial:
                 hint="write compare: [white]",
                 key="simulation.compare",
             )
-    if problem.law.target is None:
-        raise bad_spec(
-            "not-supported",
-            "this version simulates model-reference and internal-model control only",
-            hint="run idesign solve, which computes what theory expects",
-            key=f"{KEY}.control.minimum_variance",
-        )
     true = problem.plant
     if simulation.plant is not None or simulation.noise is not None:
         true = _plant(
             spec, simulation.plant or spec.plant, simulation.noise or spec.noise, "simulation.plant"
-        )
-    if not is_arx(true):
-        raise bad_spec(
-            "not-supported",
-            "this version identifies by least squares, so the true system must be of the form A y = B u + e",
-            hint="write A and B only, and simulation.noise: {variance: ..}",
-            key="simulation.noise" if simulation.noise else "plant",
         )
     return LossTrial(
         replace(problem, plant=true), simulation.runs, simulation.seed, "white" in simulation.compare

@@ -14,14 +14,11 @@ from inputdesign_cli.tasks.build.regression import build_regression_task
 
 
 class Task(Protocol):
-    """A question, built from a spec once; it holds objects, and functions made from the spec, not the spec.
+    """A question, built from a spec once; what can be wrong before anything long is computed was told then.
 
     Errors of all verbs name the key of the spec that they concern (`errors.bad_spec` with `key`), not its
     place in a file: the dispatch adds that (`Spec.place`).
     """
-
-    def check(self) -> None:
-        """Whatever can be wrong before anything long is computed; building has checked the rest."""
 
     def solve(self) -> Results:
         """The answer: a design with its proof, or what a given excitation buys."""
