@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant import ContinuousModel, Intersample
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.polynomial import Array
 
@@ -61,7 +61,7 @@ class TransferRecord:
             if not entry.order:
                 continue
             poles = np.poly(entry.transition[: entry.order, : entry.order])
-            found[i].append(scipy.signal.lfilter([1.0], poles, np.eye(entry.order, samples)))
+            found[i].append(filtered([1.0], poles, np.eye(entry.order, samples)))
         return tuple(np.concatenate(parts) for parts in found)
 
     @property

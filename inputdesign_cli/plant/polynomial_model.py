@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label
 from inputdesign_cli.plant.polynomial import (
@@ -264,10 +264,10 @@ class PolynomialModel(Parametrised):
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
         y, v = np.zeros((*u.shape[:-1], self.outputs)), np.empty(e.shape)
         for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
-            v[..., i] = scipy.signal.lfilter(c, np.convolve(a, d), e[..., i])
+            v[..., i] = filtered(c, np.convolve(a, d), e[..., i])
             for j, (b, f) in enumerate(zip(self.B[i], self.F[i], strict=True)):
                 if np.any(b):
-                    y[..., i] += scipy.signal.lfilter(b, np.convolve(a, f), u[..., j])
+                    y[..., i] += filtered(b, np.convolve(a, f), u[..., j])
         return y, v
 
     @property

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.signal
 
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.plant.transfer import Rational
@@ -18,6 +17,8 @@ def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], pe
     """
     if len(denominator) == 1:
         return Rational(np.array([numerator[-1] / denominator[0]]))
+    import scipy.signal  # only now: see `plant.filtering`
+
     # scipy takes coefficients below 1e-14 for zeros, so it gets a numerator of order one.
     given = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
     gain = float(np.abs(given).max(initial=0.0))
