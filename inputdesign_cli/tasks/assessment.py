@@ -16,12 +16,17 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.tasks.build.data import Deviations
-from inputdesign_cli.tasks.identification import Identification, identification_results, identified, told
+from inputdesign_cli.tasks.identification import (
+    Identification,
+    ModelQuestion,
+    identification_results,
+    identified,
+    told,
+)
 from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.refutations import refutations, unsettled
 
@@ -74,7 +79,7 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     identification = identification_results(task, found, started)
     listed: list[dict[str, Json]] = []
     if found.question is not None:
-        information, units = found.estimate.information, task.header.units
+        units, information = task.header.units, found.question.information
         listed = [requirement_entry(units, r, information) for r in found.question.requirements]
     reasons = [*unsettled(found.estimate), *refutations(found.model, found.estimate)]
     reasons += [found.unasked] if found.unasked else []
@@ -89,10 +94,10 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
     try:
-        topped = found.question.top_up(information)
+        topped = found.question.top_up()
     except IdesignError as error:
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))
-    needed = partial(_experiments, found.question.requirements, information)
+    needed = partial(_experiments, found.question)
     return Assessment(verdict, _topped_up(judged, topped, needed))
 
 
@@ -107,12 +112,13 @@ def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Jso
     )
 
 
-def _experiments(requirements: Sequence[Requirement], data: Array, both: Array) -> int | None:
-    """How many experiments of information both - data (k, k) meet all after the data; None: too many."""
+def _experiments(question: ModelQuestion, both: Array) -> int | None:
+    """How many experiments meet all after the data, with whom one has information (k, k); None: too many."""
+    data = question.information
+    more = question.experiment.whiten_matrix(both) - data
 
     def enough(times: int) -> bool:
-        information = data + times * (both - data)
-        return all(r.worst(information).ratio <= 1.0 + _REACHED for r in requirements)
+        return all(r.worst(data + times * more).ratio <= 1.0 + _REACHED for r in question.requirements)
 
     most = 2
     while not enough(most):
