@@ -38,6 +38,8 @@ class Estimate:
         simulated: (samples, p), what the inputs and the start of each record cause in the model.
         free: whether unknown starts and levels were estimated along with theta.
         first: (records, p), the first residuals if each record began at rest about zero.
+        agreement: the probability that an earlier estimate differs as much as the one that counts along; None
+            where there is none.
         lengths: the samples of each of the records, which follow each other.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
@@ -56,6 +58,7 @@ class Estimate:
     simulated: Array
     free: bool
     first: Array
+    agreement: float | None
     lengths: tuple[int, ...]
     whiteness: ResidualTest
     independence: ResidualTest
@@ -132,11 +135,12 @@ def concluded(
     check_apart(noise)
     if records.weights is not None:
         noise = np.asarray(np.linalg.inv(records.weights), dtype=float)
-    lengths = records.lengths
+    lengths, earlier = records.lengths, records.earlier
+    factor = factor_of_data(names, *_gradients(records, point, noise))
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
-        factor=factor_of_data(names, *_gradients(records, point, noise)),
+        factor=factor,
         noise=noise,
         errors=point.errors,
         converged=found.converged,
@@ -149,6 +153,7 @@ def concluded(
         simulated=simulated,
         free=records.free,
         first=found.first,
+        agreement=None if earlier is None else earlier.agreement(point.theta, factor),
         lengths=lengths,
         whiteness=whiteness(point.errors, fitted=in_noise, lengths=lengths),
         independence=cross_correlations(
@@ -166,17 +171,24 @@ def noise_of(point: Point, own: Array) -> Array:
 
 
 def _gradients(records: Records, point: Point, noise: Array) -> tuple[Array, Array]:
-    """psi (N p, k) in units of the noise, and the same at parameters that differ in their last digits."""
+    """psi (N p, k) in units of the noise, and the same at parameters that differ in their last digits.
+
+    What is known besides the data counts as further rows.
+    """
     root = np.linalg.cholesky(_weights(records, noise)).T
     last = _LAST_DIGITS * np.resize([1.0, -1.0], point.theta.size)
     found = [point.psi, records.at(point.theta * (1.0 + last)).psi]
     rows, again = ((psi @ root.T).reshape(len(psi), -1).T for psi in found)
-    return rows, again
+    if records.earlier is None:
+        return rows, again
+    known = records.earlier.rows
+    return np.concatenate([rows, known]), np.concatenate([again, known])
 
 
 def information_of(records: Records, point: Point, noise: Array) -> Array:
     """(k, k): sum over the samples of psi noise^-1 psi^T."""
-    return replace(point, weights=_weights(records, noise)).hessian
+    at_noise = replace(point, weights=_weights(records, noise), known=np.zeros_like(point.known))
+    return at_noise.hessian
 
 
 def _weights(records: Records, noise: Array) -> Array:

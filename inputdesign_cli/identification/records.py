@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.plant.polynomial import Array
 
 # Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
@@ -85,11 +86,13 @@ class Records:
     Attributes:
         free: whether each begins in an unknown state about an unknown level, instead of at rest at zero.
         weights: W (p, p) of the errors; None to weigh by their own covariance.
+        earlier: what is known besides.
     """
 
     parts: tuple[Record, ...]
     free: bool = False
     weights: Array | None = None
+    earlier: Earlier | None = None
 
     @cached_property
     def u(self) -> Array:

@@ -1,7 +1,7 @@
 """Data -> does the real experiment meet the target, and if not, what is still to be done.
 
-A verdict holds for one estimate: that of the given records together, and the information of these records.
-Prior information without the estimate that it belongs to counts for designs only.
+A verdict holds for one estimate and its information: that of the given records together, and of the prior
+where the spec states the estimate that it belongs to. A prior without it counts for designs only.
 """
 
 from __future__ import annotations
@@ -28,16 +28,12 @@ from inputdesign_cli.tasks.identification import (
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
-from inputdesign_cli.tasks.result.refutations import refutations, unsettled
+from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
 _REACHED = 1e-6
 _MOST_EXPERIMENTS = 10**9
-_PRIOR = (
-    "experiment.prior does not count for this verdict: it is information without the estimate that it "
-    "belongs to; give the records of earlier experiments as further files"
-)
 Part = TypeVar("Part", Table, Curves)
 Verdict = Literal["met", "missed", "undecided"]
 
@@ -81,15 +77,17 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     if found.question is not None:
         units, information = task.header.units, found.question.information
         listed = [requirement_entry(units, r, information) for r in found.question.requirements]
-    reasons = [*unsettled(found.estimate), *refutations(found.model, found.estimate)]
+    reasons = [
+        *unsettled(found.estimate),
+        *refutations(found.model, found.estimate),
+        *contradictions(found.estimate),
+    ]
     reasons += [found.unasked] if found.unasked else []
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
     verdict: Verdict = "undecided" if reasons else "met" if met else "missed"
     assessment: dict[str, Json] = {"met": verdict == "met", "requirements": listed}
     if reasons:
         assessment["undecided"] = reasons
-    if task.has_prior:
-        identification = _with_note(identification, _PRIOR)
     judged = _judged(identification, verdict, assessment)
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
@@ -99,10 +97,6 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))
     needed = partial(_experiments, found.question)
     return Assessment(verdict, _topped_up(judged, topped, needed))
-
-
-def _with_note(results: Results, note: str) -> Results:
-    return replace(results, result={**results.result, "notes": [*results.result.get("notes", []), note]})
 
 
 def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Json]) -> Results:

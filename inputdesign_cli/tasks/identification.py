@@ -11,7 +11,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.identification import Estimate, identify as estimate_model
+from inputdesign_cli.identification import Earlier, Estimate, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -19,7 +19,12 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, Deviations, blaming_columns, read_data
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
-from inputdesign_cli.tasks.result.estimates import estimate_result, identification_notes, model_text
+from inputdesign_cli.tasks.result.estimates import (
+    estimate_result,
+    identification_notes,
+    model_text,
+    prior_notes,
+)
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,7 @@ class Identification:
         nominal: the structure; its parameters are one of the starts.
         assessable: whether any accuracy is asked for that data could meet or miss.
         operating_point: by channel, what the spec says that signals vary about.
+        earlier: the prior as an estimate, which counts along; None where it has no values.
         has_prior: whether it states prior information.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
@@ -64,6 +70,7 @@ class Identification:
     nominal: Model
     assessable: bool
     operating_point: Mapping[str, float]
+    earlier: Earlier | None
     has_prior: bool
     at: Callable[[Model, int, Array, str], ModelQuestion]
 
@@ -97,6 +104,7 @@ def identified(task: Identification, paths: Sequence[Path], deviations: Deviatio
             start=nominal.theta,
             feedback=units.closed_loop,
             lengths=data.lengths,
+            earlier=task.earlier,
         )
     model = nominal.at(estimate.theta, estimate.noise)
     try:
@@ -121,6 +129,7 @@ def identification_results(task: Identification, found: Identified, started: flo
     result = estimate_result(header.title, estimate)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
+    notes += prior_notes(estimate, stated=task.has_prior)
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
     else:

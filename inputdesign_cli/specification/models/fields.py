@@ -118,9 +118,10 @@ Harmonics = Annotated[
 _ROWS = nested(2, "a matrix", "write rows: [[1, 0], [0, 1]]")
 SymmetricMatrix = Annotated[Several[Several[Number]], _ROWS, AfterValidator(symmetric)]
 SemidefiniteMatrix = Annotated[SymmetricMatrix, AfterValidator(semidefinite)]
+CovarianceMatrix = Annotated[SymmetricMatrix, AfterValidator(positive_definite)]
 Variance = Annotated[
     Annotated[Positive, Wording("a number", "noise without power needs no experiment"), tag("one")]
-    | Annotated[SymmetricMatrix, AfterValidator(positive_definite), tag("list")],
+    | Annotated[CovarianceMatrix, tag("list")],
     _LIST_OR_NOT,
 ]
 """A variance, or a covariance matrix."""

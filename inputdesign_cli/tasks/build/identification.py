@@ -15,6 +15,7 @@ from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.prior import build_earlier
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
@@ -34,12 +35,14 @@ def build_identification(spec: Spec) -> Identification:
             hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
             key="plant",
         )
+    nominal = build_model(spec)
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(
         header=build_header(spec),
-        nominal=build_model(spec),
+        nominal=nominal,
         assessable=bool(spec.accuracy.requirements),
         operating_point=_operating_point(spec),
+        earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
         at=lambda model, samples, factor, source: _question(_restated(spec, model, source), samples, factor),
     )
