@@ -17,11 +17,14 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError, bad_spec
+from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import Deviations
 from inputdesign_cli.tasks.identification import (
     Identification,
+    Identified,
     ModelQuestion,
     identification_results,
     identified,
@@ -29,6 +32,7 @@ from inputdesign_cli.tasks.identification import (
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
+from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -89,6 +93,8 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     if reasons:
         assessment["undecided"] = reasons
     judged = _judged(identification, verdict, assessment)
+    if verdict == "undecided":
+        judged = _without_model(judged, task.header.units, found)
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
     try:
@@ -103,6 +109,27 @@ def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Jso
     """The results of the identification with the verdict."""
     return replace(
         identification, result={**identification.result, "status": verdict, "assessment": assessment}
+    )
+
+
+def _without_model(judged: Results, units: Units, found: Identified) -> Results:
+    """The results with the frequency response of the data alone beside the model, where it can be had."""
+    data = found.data
+    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths)
+    if response is None:
+        return judged
+    table, curves, told = response_of_data(units, found.model, response, by_reference=data.r is not None)
+    was = judged.result
+    result = {
+        **was,
+        "assessment": {**was["assessment"], "frequency_response": told},
+        "notes": [*was.get("notes", []), *response_note(told)],
+    }
+    return replace(
+        judged,
+        result=result,
+        tables={**judged.tables, "frequency_response": table},
+        curves={**judged.curves, "frequency_response": curves},
     )
 
 

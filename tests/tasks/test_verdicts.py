@@ -245,3 +245,33 @@ def test_the_operating_point_of_the_command_line(record, tmp_path):
     unknown = CliRunner().invoke(app, call)
     assert json.loads(unknown.stdout)["identification"]["free_start"]
     assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
+
+
+def test_beside_an_undecided_model_stands_what_the_data_say_without_one(record):
+    found = assess(parse_spec(HEATER), record("a.csv", 720, 1, lag=True))
+    table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
+    G = table["G_re"] + 1j * table["G_im"]
+    q = np.exp(-5j * table["frequency_rad_per_s"])
+    gain = 2.35 * (1 - SLOW) * (1 - LAG)
+    truth = gain * (0.4 * q**6 + 0.6 * q**7) / ((1 - SLOW * q) * (1 - LAG * q))
+    assert np.mean(np.abs(G - truth) < table["radius"]) > 0.85
+    assert told["frequency_response"]["model_outside"] > 0.2
+    assert "frequency_response" in found.results.curves
+    assert "frequency_response" not in assess(parse_spec(HEATER), record("b.csv", 720, 1)).results.tables
+
+
+def test_in_a_loop_the_reference_is_used_where_it_is_recorded(record, tmp_path):
+    loop = [
+        "experiment.controller={numerator: [0.01], denominator: [1]}",
+        "accuracy.model_error.relative=1.0",
+        "plant={B: [0, 0, 0.03, 0.02], F: [1, -0.97]}",
+    ]
+    columns = heater(720, 1)
+    for name, by in (("r", "r"), ("note", "u")):
+        named = columns | {name: columns["u"] + 0.01 * columns["y"]}
+        path = tmp_path / f"{name}.csv"
+        rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*named.values(), strict=True))
+        path.write_text(",".join(named) + "\n" + rows + "\n")
+        result = assess(parse_spec(HEATER, overrides=loop), path).results.result
+        assert result["assessment"]["frequency_response"]["excitation"] == by
+        assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")

@@ -35,11 +35,13 @@ class Data:
     """u (samples, r) and y (samples, p) of experiments one after the other, and what to know of them.
 
     Attributes:
+        r: (samples, r), the reference of a loop; None where some file does not have it.
         lengths: the samples of each experiment.
     """
 
     u: Array
     y: Array
+    r: Array | None
     lengths: tuple[int, ...]
     notes: tuple[str, ...]
 
@@ -63,16 +65,20 @@ def read_data(paths: Sequence[Path], units: Units, deviations: Deviations) -> Da
                 hint=f"its channels are {', '.join(channels)}: write --operating-point {channels[0]}=1.5",
             )
     parts = [_read(path, units, deviations, named=len(paths) > 1) for path in paths]
+    references = [r for _, _, r, _ in parts if r is not None]
     return Data(
-        np.concatenate([u for u, _, _ in parts]),
-        np.concatenate([y for _, y, _ in parts]),
-        tuple(len(y) for _, y, _ in parts),
-        tuple(note for _, _, notes in parts for note in notes),
+        np.concatenate([u for u, _, _, _ in parts]),
+        np.concatenate([y for _, y, _, _ in parts]),
+        np.concatenate(references) if len(references) == len(parts) else None,
+        tuple(len(y) for _, y, _, _ in parts),
+        tuple(note for _, _, _, notes in parts for note in notes),
     )
 
 
-def _read(path: Path, units: Units, deviations: Deviations, *, named: bool) -> tuple[Array, Array, list[str]]:
-    """u, y and notes of one file, which the notes name if asked to."""
+def _read(
+    path: Path, units: Units, deviations: Deviations, *, named: bool
+) -> tuple[Array, Array, Array | None, list[str]]:
+    """u, y, the reference of a loop and notes of one file, which the notes name if asked to."""
     header = read_header(path, key="")
     channels = {"u": _names("u", units.inputs, header), "y": _names("y", units.outputs, header)}
     wanted = {name: column for names in channels.values() for name, column in names.items()}
@@ -80,7 +86,8 @@ def _read(path: Path, units: Units, deviations: Deviations, *, named: bool) -> t
     if timed:
         wanted["time"] = timed[0]
         _check_unit(path, units, timed[0])
-    columns = read_columns(path, wanted, key="")
+    references = _references(units, header)
+    columns = read_columns(path, {**wanted, **{name: name for name in references}}, key="")
     if timed:
         _check_times(path, units, columns["time"])
     notes = []
@@ -90,7 +97,17 @@ def _read(path: Path, units: Units, deviations: Deviations, *, named: bool) -> t
         level = deviations.operating_point.get(name if name[1:] else f"{name}1", 0.0)
         columns[name] = x - (x.mean() if deviations.remove_means else level)
     u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
-    return u, y, [f"{path.name}: {note}" for note in notes] if named else notes
+    r = np.stack([columns[name] for name in references], axis=1) if references else None
+    return u, y, r, [f"{path.name}: {note}" for note in notes] if named else notes
+
+
+def _references(units: Units, header: Sequence[str]) -> Sequence[str]:
+    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
+    if not units.closed_loop:
+        return []
+    if units.inputs == 1:
+        return [name for name in ("r1", "r") if name in header][:1]
+    return list(units.excitations) if set(units.excitations) <= set(header) else []
 
 
 @contextmanager
