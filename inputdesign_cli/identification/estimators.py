@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
-from typing import Protocol
+from typing import Protocol, TypedDict
 
+from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.polynomials import fit_polynomials, identify_polynomials
 from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices, identify_transfer_matrix
@@ -17,12 +18,19 @@ from inputdesign_cli.plant.polynomial import Array
 Lengths = Sequence[int] | None
 
 
+class Conditions(TypedDict):
+    """What is known of the records; see `identify`."""
+
+    feedback: bool
+    lengths: Lengths
+    rest: bool | None
+    earlier: Earlier | None
+
+
 class Estimator(Protocol):
     """Estimates the structure of one model."""
 
-    def identify(
-        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
-    ) -> Estimate:
+    def identify(self, u: Array, y: Array, start: Array | None, how: Conditions) -> Estimate:
         """From one or several records; see the function of this name."""
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
@@ -33,12 +41,8 @@ class Estimator(Protocol):
 class _Polynomials:
     model: PolynomialModel
 
-    def identify(
-        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
-    ) -> Estimate:
-        return identify_polynomials(
-            self.model, u, y, start=start, feedback=feedback, lengths=lengths, rest=rest
-        )
+    def identify(self, u: Array, y: Array, start: Array | None, how: Conditions) -> Estimate:
+        return identify_polynomials(self.model, u, y, start=start, **how)
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         return fit_polynomials(self.model, u, y, start=start)
@@ -49,12 +53,8 @@ class _TransferMatrix:
     model: ContinuousModel
     between: Intersample
 
-    def identify(
-        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
-    ) -> Estimate:
-        return identify_transfer_matrix(
-            self.model, u, y, self.between, start=start, feedback=feedback, lengths=lengths, rest=rest
-        )
+    def identify(self, u: Array, y: Array, start: Array | None, how: Conditions) -> Estimate:
+        return identify_transfer_matrix(self.model, u, y, self.between, start=start, **how)
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         return fit_transfer_matrices(self.model, u, y, self.between, start=start)
@@ -95,6 +95,7 @@ def identify(
     feedback: bool = False,
     lengths: Lengths = None,
     rest: bool | None = None,
+    earlier: Earlier | None = None,
 ) -> Estimate:
     """The structure of `model` estimated from one record, or jointly from several.
 
@@ -108,12 +109,14 @@ def identify(
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; otherwise its start and its level are unknown and
             estimated along. None: as the data say.
+        earlier: an estimate from other data, which counts along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
             `not-exciting`.
     """
-    return estimator(model, step).identify(u, y, start, feedback=feedback, lengths=lengths, rest=rest)
+    how = Conditions(feedback=feedback, lengths=lengths, rest=rest, earlier=earlier)
+    return estimator(model, step).identify(u, y, start, how)
 
 
 def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:

@@ -15,6 +15,8 @@ from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
 
+_STEP = 1e-30
+
 
 @dataclass(frozen=True)
 class PolynomialRecord:
@@ -63,6 +65,12 @@ class PolynomialRecord:
             for block in row.by_letter[letter]
         ]
         return np.unique(np.concatenate(found))
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """By a step along the imaginary axis, which loses no digits to a difference ([squire-trapp-1998])."""
+        step = np.zeros(theta.size, dtype=complex)
+        step[index] = 1j * _STEP
+        return tuple(responses.imag / _STEP for responses in self.free_responses(theta + step))
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): nothing; no instruments are used."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.identification.checks import check_length, check_varying
+from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, concluded
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
 from inputdesign_cli.identification.orders import OutputOrders
@@ -39,6 +40,7 @@ def identify_polynomials(
     feedback: bool = False,
     lengths: Sequence[int] | None = None,
     rest: bool | None = None,
+    earlier: Earlier | None = None,
 ) -> Estimate:
     """Prediction-error estimate from one record; in closed loop the direct method.
 
@@ -55,6 +57,7 @@ def identify_polynomials(
         feedback: whether u(t) answers y(t), which the tests of the residuals heed.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
+        earlier: an estimate from other data, which counts along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -66,6 +69,7 @@ def identify_polynomials(
     check_varying(structure.names, inputs, outputs)
     weights = None if noise is None else np.linalg.inv(np.asarray(noise, dtype=float))
     given = None if start is None else np.asarray(start, dtype=float)
+    before = None if earlier is None else earlier.theta
     parts = split(inputs, outputs, lengths)
 
     def searched(records: Records, known: Array | None) -> Search:
@@ -73,11 +77,13 @@ def identify_polynomials(
             _starts(structure, structure.problem(*(x[None] for x in part)), given)
             for part in (centred(longest(parts)) if records.free else longest(parts))
         ]
-        points = np.concatenate([*(p for p, _ in found), *([] if known is None else [known[None]])])
-        return search(records, points, starts=max(tried for _, tried in found))
+        others = [theta[None] for theta in (known, before) if theta is not None]
+        points = np.concatenate([*(p for p, _ in found), *others])
+        return search(records, points, starts=max(tried for _, tried in found) + (before is not None))
 
     def records_of(signals: Sequence[tuple[Array, Array]]) -> Records:
-        return Records(tuple(PolynomialRecord(structure, *part) for part in signals), weights=weights)
+        made = tuple(PolynomialRecord(structure, *part) for part in signals)
+        return Records(made, weights=weights, earlier=earlier)
 
     best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched)
     fitted = model.at(best.point.theta)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.identification.checks import check_length, check_varying
+from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import (
     BatchEstimate,
     Estimate,
@@ -39,6 +41,7 @@ def identify_transfer_matrix(
     feedback: bool = False,
     lengths: Sequence[int] | None = None,
     rest: bool | None = None,
+    earlier: Earlier | None = None,
 ) -> Estimate:
     """Maximum-likelihood estimate of a transfer matrix in s from one record, white noise on the outputs.
 
@@ -54,6 +57,7 @@ def identify_transfer_matrix(
         feedback: whether u(t) answers y(t), which the tests of the residuals heed.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
+        earlier: an estimate from other data, which counts along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -63,6 +67,7 @@ def identify_transfer_matrix(
     check_length(len(outputs), len(model.names), 0, outputs=model.outputs)
     check_varying(model.names, inputs, outputs)
     parts = split(inputs, outputs, lengths)
+    before = None if earlier is None else earlier.theta
 
     def records_of(signals: Sequence[tuple[Array, Array]]) -> tuple[TransferRecord, ...]:
         return tuple(TransferRecord(model, *part, between) for part in signals)
@@ -76,17 +81,18 @@ def identify_transfer_matrix(
             refine(about, evaluate(about, theta)) for single in singles for theta in starting_points(single)
         ]
         refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
-        for given in (start, known):
+        for given in (start, known, before):
             if given is not None:
                 refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))
         return search(
             records,
             np.array([point.theta for point, _ in refined]),
-            starts=len(made) + (start is not None),
+            starts=len(made) + (start is not None) + (before is not None),
             before=np.array([steps for _, steps in refined]),
         )
 
-    together, deviations = Records(records_of(parts)), Records(records_of(centred(parts)))
+    together = Records(records_of(parts), earlier=earlier)
+    deviations = replace(together, parts=records_of(centred(parts)))
     best = from_rest_or_free(together, deviations, rest, searched)
     return concluded(
         model.names,

@@ -17,6 +17,7 @@ from inputdesign_cli.plant.polynomial import Array
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
+_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,17 @@ class TransferRecord:
     def in_starts(self) -> NDArray[np.int64]:
         """Those of the denominators."""
         return np.flatnonzero([parameter.letter == "a" for parameter in self.structure.parameters])
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """By central differences."""
+        parameter = self.structure.parameters[index]
+        i, j = parameter.places[0]
+        order = self.structure.denominator[i][j].size - 1
+        slowest = 1.0 / (self.samples * self.intersample.sample_time)
+        size = _STEP * max(abs(theta[index]), slowest ** (order - parameter.power))
+        step = size * np.eye(self.size)[index]
+        above, below = self.free_responses(theta + step), self.free_responses(theta - step)
+        return tuple((a - b) / (2.0 * size) for a, b in zip(above, below, strict=True))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """(p, N, m): the signals (N, m) as they are, for the noise is white."""

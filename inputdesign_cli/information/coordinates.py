@@ -104,18 +104,25 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
     Raises:
         SpecError: `not-identifiable`, with the names of parameters that cannot be told apart.
     """
-    scale = np.linalg.norm(rows, axis=0)
-    scale[scale == 0.0] = 1.0
-    triangle = np.asarray(np.linalg.qr(rows / scale, mode="r"))
-    _, singular, vectors = np.linalg.svd(triangle)
-    rank = int(np.sum(singular > _RANK_TOLERANCE * singular[0]))
-    if rank < len(names):
-        listed = taking_part(names, vectors[rank:].T)
+    factor, untold = triangular_factor(rows)
+    if untold.size:
         raise bad_spec(
             "not-identifiable",
-            f"no {excitation} can tell these parameters apart: {listed}",
+            f"no {excitation} can tell these parameters apart: {taking_part(names, untold)}",
             hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
             "order too high, and take it out",
             key="plant",
         )
-    return (triangle * scale).T
+    return factor
+
+
+def triangular_factor(rows: NDArray[np.float64]) -> tuple[Array, Array]:
+    """L (k, k), lower triangular, with rows^T rows = L L^T, and directions (k, m) that the rows do not tell.
+
+    Rank is judged with every column of the rows (number, k) at norm one, whatever its units.
+    """
+    scale = np.linalg.norm(rows, axis=0)
+    scale[scale == 0.0] = 1.0
+    triangle = np.asarray(np.linalg.qr(rows / scale, mode="r"))
+    _, singular, vectors = np.linalg.svd(triangle)
+    return (triangle * scale).T, vectors[singular <= _RANK_TOLERANCE * singular[0]].T

@@ -30,7 +30,7 @@ _SECTIONS = (
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),
 )
-_OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound")
+_OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound", "frequency_response")
 _OF_RUNS = ("errors_", "cloud_", "disturbance_")
 _NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "made_from"})
 _MOST_ENTRIES = 16

@@ -121,6 +121,8 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
     that was taken out, or with what contains it, is a consequence and is not reported.
     """
     data = copy.deepcopy(tree.data)
+    if not design:
+        _estimated_noise(data)
     told: list[PathDiagnostic] = []
     broken = set(tree.broken)
     for path in _empty(data, ()):
@@ -145,6 +147,13 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
         checked = [shorten(one, tree.data) for one in run_checks(spec, broken, design=design)]
         return spec, told + [one for one in checked if not related(one.path, broken)]
     return None, told
+
+
+def _estimated_noise(data: dict[str, Plain]) -> None:
+    """The variance of the noise may be left out where it is to be estimated."""
+    noise = data.setdefault("noise", {})
+    if isinstance(noise, dict):
+        noise.setdefault("variance", 1.0)
 
 
 def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
+from inputdesign_cli.errors import SpecError
 
 STRUCTURE = """
 sample_time: 5
@@ -128,6 +129,49 @@ def test_a_prior_without_its_estimate_does_not_count(record):
     assert "experiment.prior does not count" in " ".join(with_prior["notes"])
 
 
+def test_a_prior_with_its_estimate_counts_as_its_record_does(record, tmp_path):
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"], folder=tmp_path)
+    first = record("a.csv", 700, 1, power=0.5, level=(40.0, 52.3), warm=1.0)
+    second = record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
+    (tmp_path / "model.yaml").write_bytes(identify(spec, first).files["model.yaml"])
+    alone, both = assess(spec, second), assess(spec, [first, second])
+    named = ["accuracy.model_error.relative=0.1", "experiment.prior.information=model.yaml"]
+    known = assess(parse_spec(HEATER, overrides=named, folder=tmp_path), second)
+    ratio, joint, single = (
+        found.results.result["assessment"]["requirements"][0]["worst_ratio"] for found in (known, both, alone)
+    )
+    assert ratio == pytest.approx(joint, rel=0.1)
+    assert ratio < 0.9 * single
+    result = known.results.result
+    assert result["model_error"]["worst_ratio"] == pytest.approx(ratio)
+    assert "experiment.prior counts" in " ".join(result["notes"])
+    assert result["identification"]["prior"]["probability"] > 1e-3
+
+
+def test_a_prior_of_another_system_decides_nothing(record):
+    path = record("a.csv", 700, 1, power=0.5)
+    found = identify(parse_spec(HEATER), path).result
+    values = {name: 1.01 * value for name, value in found["identification"]["theta"].items()}
+    prior = json.dumps({"information": found["information"]["matrix"].tolist(), "parameters": values})
+    verdict = assess(parse_spec(HEATER, overrides=[f"experiment.prior={prior}"]), path)
+    assert verdict.verdict == "undecided"
+    assert "contradict each other" in " ".join(verdict.results.result["assessment"]["undecided"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "secret: [", "- 1", "plant: {B: [0, 1]}", "estimate: {parameters: {b1: 1}, covariance: [[1, 0]]}"],
+)
+def test_what_is_no_model_file_is_refused_and_not_shown(tmp_path, text):
+    (tmp_path / "model.yaml").write_text(text)
+    spec = parse_spec(HEATER, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
+    with pytest.raises(SpecError) as caught:
+        solve(spec)
+    (diagnostic,) = caught.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == ("bad-model-file", "experiment.prior.information")
+    assert "secret" not in str(caught.value)
+
+
 def test_what_a_top_up_within_limits_leaves_is_told(record):
     path = record("a.csv", 300, 1, power=0.02)
     limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
@@ -201,3 +245,33 @@ def test_the_operating_point_of_the_command_line(record, tmp_path):
     unknown = CliRunner().invoke(app, call)
     assert json.loads(unknown.stdout)["identification"]["free_start"]
     assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
+
+
+def test_beside_an_undecided_model_stands_what_the_data_say_without_one(record):
+    found = assess(parse_spec(HEATER), record("a.csv", 720, 1, lag=True))
+    table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
+    G = table["G_re"] + 1j * table["G_im"]
+    q = np.exp(-5j * table["frequency_rad_per_s"])
+    gain = 2.35 * (1 - SLOW) * (1 - LAG)
+    truth = gain * (0.4 * q**6 + 0.6 * q**7) / ((1 - SLOW * q) * (1 - LAG * q))
+    assert np.mean(np.abs(G - truth) < table["radius"]) > 0.85
+    assert told["frequency_response"]["model_outside"] > 0.2
+    assert "frequency_response" in found.results.curves
+    assert "frequency_response" not in assess(parse_spec(HEATER), record("b.csv", 720, 1)).results.tables
+
+
+def test_in_a_loop_the_reference_is_used_where_it_is_recorded(record, tmp_path):
+    loop = [
+        "experiment.controller={numerator: [0.01], denominator: [1]}",
+        "accuracy.model_error.relative=1.0",
+        "plant={B: [0, 0, 0.03, 0.02], F: [1, -0.97]}",
+    ]
+    columns = heater(720, 1)
+    for name, by in (("r", "r"), ("note", "u")):
+        named = columns | {name: columns["u"] + 0.01 * columns["y"]}
+        path = tmp_path / f"{name}.csv"
+        rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*named.values(), strict=True))
+        path.write_text(",".join(named) + "\n" + rows + "\n")
+        result = assess(parse_spec(HEATER, overrides=loop), path).results.result
+        assert result["assessment"]["frequency_response"]["excitation"] == by
+        assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")

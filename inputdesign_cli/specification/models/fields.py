@@ -118,9 +118,10 @@ Harmonics = Annotated[
 _ROWS = nested(2, "a matrix", "write rows: [[1, 0], [0, 1]]")
 SymmetricMatrix = Annotated[Several[Several[Number]], _ROWS, AfterValidator(symmetric)]
 SemidefiniteMatrix = Annotated[SymmetricMatrix, AfterValidator(semidefinite)]
+CovarianceMatrix = Annotated[SymmetricMatrix, AfterValidator(positive_definite)]
 Variance = Annotated[
     Annotated[Positive, Wording("a number", "noise without power needs no experiment"), tag("one")]
-    | Annotated[SymmetricMatrix, AfterValidator(positive_definite), tag("list")],
+    | Annotated[CovarianceMatrix, tag("list")],
     _LIST_OR_NOT,
 ]
 """A variance, or a covariance matrix."""
@@ -131,7 +132,8 @@ _PER_OUTPUT = Wording(f"{_ONE}, or a list of them, one per output")
 _FACTORS = Wording(f"{_ONE}, or a list of factors")
 _MATRIX = Wording(
     f"{_ONE}, or rows (outputs) of columns (inputs) of them",
-    "for several inputs or outputs write rows of columns of polynomials: [[[0, 1], [0, 2]]]",
+    "for one input and one output write a list of coefficients: [0, 1]; for several, rows of columns of "
+    "them: [[[0, 1], [0, 2]]]",
 )
 _CONTINUOUS = Wording(f"{_ONE}, or a list of factors, or rows (outputs) of columns (inputs) of coefficients")
 _Coefficients = Annotated[Several[Number], SIZES["coefficients of a numerator"], Wording(_ONE)]
@@ -152,7 +154,8 @@ StablePerOutput = Annotated[_OneOrList[_Stable], _PER_OUTPUT]
 StableMatrix = Annotated[_OneOrRows[_Stable], _MATRIX]
 GainMatrix = Annotated[_OneOrRows[_Coefficients], _MATRIX]
 RowsMatrix = Annotated[
-    _Rows[_Coefficients], nested(3, "rows (outputs) of columns (inputs) of coefficients", _MATRIX.hint)
+    _Rows[_Coefficients],
+    nested(3, "rows (outputs) of columns (inputs) of coefficients", "write [[[0, 1], [0, 2]]]"),
 ]
 """A matrix of polynomials, never a single one."""
 ContinuousDenominator = Annotated[

@@ -14,12 +14,13 @@ from inputdesign_cli.tasks.build.free_directions import check_every_direction_co
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
-from inputdesign_cli.tasks.build.system import build_cost, build_experiment, check_known
+from inputdesign_cli.tasks.build.system import build_cost, build_experiment
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
 from inputdesign_cli.tasks.factor_columns import FewColumns
 

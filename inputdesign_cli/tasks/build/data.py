@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -12,9 +13,11 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.build.tables import read_columns, read_header
+from inputdesign_cli.tasks.build.tables import read_columns, read_header, read_times
 
-_UNITS = ("s", "ms", "us", "min", "h", "d")
+_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
+# What a column of times is called, with or without a unit: time_s, t (ms), timestamp.
+_TIMES = re.compile(r"(time|t|timestamp)(?:[_ ]?[(\[]?([a-z]*)[)\]]?)?")
 # Times may jitter by this share of the sample time.
 _JITTER = 1e-3
 # Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
@@ -35,11 +38,13 @@ class Data:
     """u (samples, r) and y (samples, p) of experiments one after the other, and what to know of them.
 
     Attributes:
+        r: (samples, r), the reference of a loop; None where some file does not have it.
         lengths: the samples of each experiment.
     """
 
     u: Array
     y: Array
+    r: Array | None
     lengths: tuple[int, ...]
     notes: tuple[str, ...]
 
@@ -63,34 +68,48 @@ def read_data(paths: Sequence[Path], units: Units, deviations: Deviations) -> Da
                 hint=f"its channels are {', '.join(channels)}: write --operating-point {channels[0]}=1.5",
             )
     parts = [_read(path, units, deviations, named=len(paths) > 1) for path in paths]
+    references = [r for _, _, r, _ in parts if r is not None]
     return Data(
-        np.concatenate([u for u, _, _ in parts]),
-        np.concatenate([y for _, y, _ in parts]),
-        tuple(len(y) for _, y, _ in parts),
-        tuple(note for _, _, notes in parts for note in notes),
+        np.concatenate([u for u, _, _, _ in parts]),
+        np.concatenate([y for _, y, _, _ in parts]),
+        np.concatenate(references) if len(references) == len(parts) else None,
+        tuple(len(y) for _, y, _, _ in parts),
+        tuple(note for _, _, _, notes in parts for note in notes),
     )
 
 
-def _read(path: Path, units: Units, deviations: Deviations, *, named: bool) -> tuple[Array, Array, list[str]]:
-    """u, y and notes of one file, which the notes name if asked to."""
+def _read(
+    path: Path, units: Units, deviations: Deviations, *, named: bool
+) -> tuple[Array, Array, Array | None, list[str]]:
+    """u, y, the reference of a loop and notes of one file, which the notes name if asked to."""
     header = read_header(path, key="")
     channels = {"u": _names("u", units.inputs, header), "y": _names("y", units.outputs, header)}
     wanted = {name: column for names in channels.values() for name, column in names.items()}
-    timed = [name for name in header if name == "time" or name.startswith("time_")]
+    timed = _timed(header)
     if timed:
-        wanted["time"] = timed[0]
-        _check_unit(path, units, timed[0])
-    columns = read_columns(path, wanted, key="")
+        _check_unit(path, units, *timed)
+    references = _references(units, header)
+    columns = read_columns(path, {**wanted, **{name: name for name in references}}, key="")
     if timed:
-        _check_times(path, units, columns["time"])
+        _check_times(path, units, read_times(path, timed[0], _UNITS[units.time_unit]))
     notes = []
-    for name in (name for name in wanted if name != "time"):
+    for name in wanted:
         x = columns[name]
         notes += _outliers(name, x)
         level = deviations.operating_point.get(name if name[1:] else f"{name}1", 0.0)
         columns[name] = x - (x.mean() if deviations.remove_means else level)
     u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
-    return u, y, [f"{path.name}: {note}" for note in notes] if named else notes
+    r = np.stack([columns[name] for name in references], axis=1) if references else None
+    return u, y, r, [f"{path.name}: {note}" for note in notes] if named else notes
+
+
+def _references(units: Units, header: Sequence[str]) -> Sequence[str]:
+    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
+    if not units.closed_loop:
+        return []
+    if units.inputs == 1:
+        return [name for name in ("r1", "r") if name in header][:1]
+    return list(units.excitations) if set(units.excitations) <= set(header) else []
 
 
 @contextmanager
@@ -122,8 +141,15 @@ def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:
     return {f"{letter}{i + 1}": f"{letter}{i + 1}" for i in range(channels)}
 
 
-def _check_unit(path: Path, units: Units, name: str) -> None:
-    unit = name.removeprefix("time").removeprefix("_")
+def _timed(header: Sequence[str]) -> tuple[str, str] | None:
+    """The column of times and its unit, which may be empty; `time` before the other names."""
+    found = [(name, *match.groups()) for name in header if (match := _TIMES.fullmatch(name))]
+    named = [one for one in found if not one[2] or one[2] in _UNITS or one[1] == "time"]
+    named.sort(key=lambda one: ("time", "t", "timestamp").index(one[1]))
+    return (named[0][0], named[0][2] or "") if named else None
+
+
+def _check_unit(path: Path, units: Units, name: str, unit: str) -> None:
     if unit in _UNITS and unit != units.time_unit:
         raise DataError.because(
             "data-wrong-unit",

@@ -15,6 +15,7 @@ from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.prior import build_earlier
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
@@ -34,14 +35,16 @@ def build_identification(spec: Spec) -> Identification:
             hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
             key="plant",
         )
+    nominal = build_model(spec)
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(
         header=build_header(spec),
-        nominal=build_model(spec),
+        nominal=nominal,
         assessable=bool(spec.accuracy.requirements),
         operating_point=_operating_point(spec),
+        earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
-        at=lambda model, samples, source: _question(_restated(spec, model, source), samples),
+        at=lambda model, samples, factor, source: _question(_restated(spec, model, source), samples, factor),
     )
 
 
@@ -64,20 +67,17 @@ def _restated(spec: Spec, model: Model, source: str) -> Spec:
     )
 
 
-def _question(spec: Spec, samples: int) -> ModelQuestion:
-    """What a spec asks of an experiment of so many samples.
+def _question(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
+    """What a spec asks of an experiment of so many samples, of which the information has this factor (k, k).
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
     """
-    experiment = replace(build_experiment(spec), samples=samples)
-    requirements = [make(experiment) for make in build_requirements(spec, experiment)]
+    raw = replace(build_experiment(spec), samples=samples)
+    experiment = replace(raw, factor=factor)
 
-    def topped_up(information: Array) -> Results:
-        prior = {
-            "parameters": list(experiment.model.names),
-            "information": (0.5 * (information + information.T)).tolist(),
-        }
+    def topped_up() -> Results:
+        prior = {"parameters": list(raw.model.names), "information": (factor @ factor.T).tolist()}
         return build_convex(
             parse_spec(
                 spec.to_yaml(),
@@ -89,8 +89,8 @@ def _question(spec: Spec, samples: int) -> ModelQuestion:
 
     return ModelQuestion(
         experiment=experiment,
-        alpha=model_error_alpha(spec, experiment.model),
-        requirements=requirements,
-        entries=unstated_errors(spec, experiment),
+        alpha=model_error_alpha(spec, raw.model),
+        requirements=[make(experiment) for make in build_requirements(spec, raw)],
+        entries=[replace(error, experiment=experiment) for error in unstated_errors(spec, raw)],
         top_up=topped_up if spec.designs else None,
     )

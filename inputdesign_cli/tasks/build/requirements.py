@@ -20,7 +20,7 @@ from inputdesign_cli.tasks.build.model_error import (
     confidence_factor,
     required_band,
 )
-from inputdesign_cli.tasks.build.system import embedded
+from inputdesign_cli.tasks.build.parameters import embedded
 from inputdesign_cli.tasks.build.weights import build_weight
 
 _RELATIVE_ZERO = 1e-9

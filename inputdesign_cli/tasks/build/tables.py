@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 _MOST_BYTES = 100 * 2**20
+# How the files of .xlsx and .ods, and of .xls begin.
+_SHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,27 @@ def read_columns(path: Path, wanted: dict[str, str], *, key: str) -> dict[str, A
     }
 
 
+def read_times(path: Path, name: str, unit: float) -> Array:
+    """The column of exactly this name as times (n,): numbers, or dates and times as ISO 8601 writes them.
+
+    Args:
+        unit: how many seconds the unit of the numbers has; dates become such numbers, the first of them 0.
+
+    Raises:
+        DataError: `data-not-a-number`.
+    """
+    file = _read(path, "")
+    column = file.header.index(name)
+    cells = [row[column].strip() if column < len(row) else "" for _, row in file.rows[1:]]
+    try:
+        moments = [] if _is_number(cells[0]) else [datetime.fromisoformat(cell) for cell in cells]
+        if moments:
+            return np.array([(moment - moments[0]).total_seconds() / unit for moment in moments])
+    except (ValueError, TypeError):  # no dates, or some with and some without a time zone
+        pass
+    return np.array([_number(file, line, row, column, name) for line, row in file.rows[1:]])
+
+
 def read_header(path: Path, *, key: str) -> list[str]:
     """The names of the columns of a CSV file, in small letters.
 
@@ -106,7 +130,10 @@ def _unclear(file: _File, what: str, names: list[str]) -> Diagnostic:
     if len(header) == 1 and any(mark in header[0] for mark in ";\t|"):
         hint = "separate the columns with commas, and write numbers with a decimal point"
     message = f"{file.path.name} has {what} for {', '.join(names)}"
-    if file.shown:
+    if all(_is_number(name) for name in header):
+        message = f"{file.path.name} has no header line: its first line holds numbers"
+        hint = f"begin the file with a line that names its columns, such as {','.join(names)}"
+    elif file.shown:
         message += f" (its header is: {', '.join(header)})"
     return file.error("data-missing-column", message, hint, line, header)
 
@@ -126,6 +153,9 @@ def _read(path: Path, key: str) -> _File:
         raw = read_regular(path, _MOST_BYTES + 1)
         if len(raw) > _MOST_BYTES:
             raise _unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
+        if raw.startswith(_SHEETS):
+            hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
+            raise _unreadable(path, key, "is a spreadsheet, no CSV file", hint)
         reader = csv.reader(io.StringIO(raw.decode("utf-8-sig"), newline=""))
         rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except FileNotFoundError:
