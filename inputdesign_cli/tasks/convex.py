@@ -16,7 +16,7 @@ from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
-from inputdesign_cli.errors import InaccurateError, InfeasibleError
+from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
@@ -34,6 +34,7 @@ from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
+from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
@@ -54,7 +55,8 @@ class ConvexTask:
 
     `experiment` is of the length that the spec states (in `question` it has one sample where the length is
     sought). `alpha` sizes the confidence region of r_u, `most_samples` is the longest experiment allowed.
-    `unstated` are errors of the entries of G that have r_u where no requirement bounds it.
+    `unstated` are errors of the entries of G that have r_u where no requirement bounds it. `stated` are the
+    numbers of the spec that bound errors.
     """
 
     header: Header
@@ -69,6 +71,7 @@ class ConvexTask:
     columns: FewColumns | None
     record: RecordRequest
     unstated: Sequence[ModelError]
+    stated: Sequence[StatedBound]
     simulation: Simulation
 
     def check(self) -> None:
@@ -160,7 +163,7 @@ class ConvexTask:
         try:
             design = solve_design(self.question, tolerance=self.tolerance)
         except UnreachableError as unreachable:
-            raise explain(self.header.units, self.question, unreachable) from unreachable
+            raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
         found = design.result
         if found.gap > _ALMOST * self.tolerance:
             raise InaccurateError.because(
@@ -208,12 +211,19 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
-        raise InfeasibleError.because(
-            "too-long",
-            f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
-            f"no fewer than {least}), but limits.samples is {most}",
-            hint="allow more samples or more power, or ask for less accuracy",
-            key="limits.samples",
+        longest = replace(self.question, experiment=replace(self.experiment, samples=most), goal="factor")
+        best = solve_design(longest, tolerance=self.tolerance)
+        problem = best.problem.on(best.result.basis)
+        bought = Bought(self.header.units, self.stated, self.question.limits, problem, best.result)
+        raise InfeasibleError(
+            Diagnostic(
+                "too-long",
+                f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
+                f"no fewer than {least}), but limits.samples is {most}; with these {bought.sentence}",
+                "allow more samples or more power, or ask for less accuracy",
+                "limits.samples",
+                details=bought.details,
+            )
         )
 
     def _signal_entry(self, done: Designed, record: Record) -> dict[str, Json]:
