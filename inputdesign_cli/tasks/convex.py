@@ -26,8 +26,8 @@ from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.other_spectra import power_that_fits
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, make_record, record_notes, redrawn
+from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn
+from inputdesign_cli.tasks.record_search import Made, fitting_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
@@ -105,15 +105,16 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        record = self._made(done)
+        made = fitting_record(self.record, self.question, done.design, done.experiment)
+        record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
         if record is not None:
-            result["signal"] = self._signal_entry(done, record)
-            tables["signal"], curves["signal"] = signal_curves(self.record, self.header.units, record)
-            files = other_files(self.record, self.header.units, record)
+            result["signal"] = self._signal_entry(done, made, record)
+            tables["signal"], curves["signal"] = signal_curves(made.request, self.header.units, record)
+            files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
-            notes = record_notes(self.record, done.experiment.samples, record)
+            notes = [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,
@@ -124,25 +125,9 @@ class ConvexTask:
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None)
-        found = done.design.result
-        generator = redrawn(self.record, done.design, record)
+        found = made.design.result
+        generator = redrawn(made.request, made.design, record)
         return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
-
-    def _made(self, done: Designed) -> Record | None:
-        """The record; where none is found within the limits on samples, the error names what would do.
-
-        Raises:
-            InfeasibleError: `limits-too-tight`.
-        """
-        try:
-            return make_record(self.record, done.design, done.experiment)
-        except InfeasibleError as missed:
-            power = power_that_fits(self.record, self.question, done.design, done.experiment)
-            if power is None:
-                raise
-            told = missed.diagnostics[0]
-            hint = f"with limits.input_power: {power:.4g} a record of this length does; or {told.hint}"
-            raise InfeasibleError(replace(told, hint=hint)) from missed
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.
@@ -226,17 +211,18 @@ class ConvexTask:
             )
         )
 
-    def _signal_entry(self, done: Designed, record: Record) -> dict[str, Json]:
-        design = done.design
-        return signal_entry(
-            self.record,
+    def _signal_entry(self, done: Designed, made: Made, record: Record) -> dict[str, Json]:
+        design = made.design
+        entry = signal_entry(
+            made.request,
             self.header.units,
             done.experiment,
             record,
             design.problem.requirements,
             designed=design.result.information,
-            spectrum=designed_spectrum(self.record, design, done.experiment.inputs),
+            spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
+        return entry | made.entry
 
     def _illustrations(
         self, done: Designed, record: Record | None
