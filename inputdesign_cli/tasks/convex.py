@@ -219,7 +219,7 @@ class ConvexTask:
             done.experiment,
             record,
             design.problem.requirements,
-            designed=design.result.information,
+            designed=done.information if design is done.design else design.result.information,
             spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
         return entry | made.entry
@@ -246,7 +246,7 @@ class ConvexTask:
             tables["bound"], curves["bound"] = bound_curves(
                 units,
                 errors or unstated,
-                found.information,
+                done.information,
                 white=white,
                 record=self._known(done, record),
                 stated=bool(errors),
@@ -256,7 +256,7 @@ class ConvexTask:
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
         shown = white if problem.needs_definite else None
-        ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
+        ellipses = experiment_ellipses(done.experiment, done.information, shown, self.ellipses)
         if ellipses is not None:
             curves["ellipses"] = ellipses
         return tables, curves
