@@ -16,7 +16,7 @@ from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
-from inputdesign_cli.errors import InaccurateError, InfeasibleError
+from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
@@ -26,14 +26,15 @@ from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.other_spectra import power_that_fits
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, make_record, record_notes, redrawn
+from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn
+from inputdesign_cli.tasks.record_search import Made, fitting_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
+from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
@@ -54,7 +55,8 @@ class ConvexTask:
 
     `experiment` is of the length that the spec states (in `question` it has one sample where the length is
     sought). `alpha` sizes the confidence region of r_u, `most_samples` is the longest experiment allowed.
-    `unstated` are errors of the entries of G that have r_u where no requirement bounds it.
+    `unstated` are errors of the entries of G that have r_u where no requirement bounds it. `stated` are the
+    numbers of the spec that bound errors.
     """
 
     header: Header
@@ -69,6 +71,7 @@ class ConvexTask:
     columns: FewColumns | None
     record: RecordRequest
     unstated: Sequence[ModelError]
+    stated: Sequence[StatedBound]
     simulation: Simulation
 
     def solve(self) -> Results:
@@ -99,15 +102,16 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        record = self._made(done)
+        made = fitting_record(self.record, self.question, done.design, done.experiment)
+        record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
         if record is not None:
-            result["signal"] = self._signal_entry(done, record)
-            tables["signal"], curves["signal"] = signal_curves(self.record, self.header.units, record)
-            files = other_files(self.record, self.header.units, record)
+            result["signal"] = self._signal_entry(done, made, record)
+            tables["signal"], curves["signal"] = signal_curves(made.request, self.header.units, record)
+            files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
-            notes = record_notes(self.record, done.experiment.samples, record)
+            notes = [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,
@@ -118,25 +122,9 @@ class ConvexTask:
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None)
-        found = done.design.result
-        generator = redrawn(self.record, done.design, record)
+        found = made.design.result
+        generator = redrawn(made.request, made.design, record)
         return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
-
-    def _made(self, done: Designed) -> Record | None:
-        """The record; where none is found within the limits on samples, the error names what would do.
-
-        Raises:
-            InfeasibleError: `limits-too-tight`.
-        """
-        try:
-            return make_record(self.record, done.design, done.experiment)
-        except InfeasibleError as missed:
-            power = power_that_fits(self.record, self.question, done.design, done.experiment)
-            if power is None:
-                raise
-            told = missed.diagnostics[0]
-            hint = f"with limits.input_power: {power:.4g} a record of this length does; or {told.hint}"
-            raise InfeasibleError(replace(told, hint=hint)) from missed
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.
@@ -157,7 +145,7 @@ class ConvexTask:
         try:
             design = solve_design(self.question, tolerance=self.tolerance)
         except UnreachableError as unreachable:
-            raise explain(self.header.units, self.question, unreachable) from unreachable
+            raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
         found = design.result
         if found.gap > _ALMOST * self.tolerance:
             raise InaccurateError.because(
@@ -205,25 +193,33 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
-        raise InfeasibleError.because(
-            "too-long",
-            f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
-            f"no fewer than {least}), but limits.samples is {most}",
-            hint="allow more samples or more power, or ask for less accuracy",
-            key="limits.samples",
+        longest = replace(self.question, experiment=replace(self.experiment, samples=most), goal="factor")
+        best = solve_design(longest, tolerance=self.tolerance)
+        problem = best.problem.on(best.result.basis)
+        bought = Bought(self.header.units, self.stated, self.question.limits, problem, best.result)
+        raise InfeasibleError(
+            Diagnostic(
+                "too-long",
+                f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
+                f"no fewer than {least}), but limits.samples is {most}; with these {bought.sentence}",
+                "allow more samples or more power, or ask for less accuracy",
+                "limits.samples",
+                details=bought.details,
+            )
         )
 
-    def _signal_entry(self, done: Designed, record: Record) -> dict[str, Json]:
-        design = done.design
-        return signal_entry(
-            self.record,
+    def _signal_entry(self, done: Designed, made: Made, record: Record) -> dict[str, Json]:
+        design = made.design
+        entry = signal_entry(
+            made.request,
             self.header.units,
             done.experiment,
             record,
             design.problem.requirements,
-            designed=design.result.information,
-            spectrum=designed_spectrum(self.record, design, done.experiment.inputs),
+            designed=done.information if design is done.design else design.result.information,
+            spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
+        return entry | made.entry
 
     def _illustrations(
         self, done: Designed, record: Record | None
@@ -247,7 +243,7 @@ class ConvexTask:
             tables["bound"], curves["bound"] = bound_curves(
                 units,
                 errors or unstated,
-                found.information,
+                done.information,
                 white=white,
                 record=self._known(done, record),
                 stated=bool(errors),
@@ -257,7 +253,7 @@ class ConvexTask:
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
         shown = white if problem.needs_definite else None
-        ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
+        ellipses = experiment_ellipses(done.experiment, done.information, shown, self.ellipses)
         if ellipses is not None:
             curves["ellipses"] = ellipses
         return tables, curves

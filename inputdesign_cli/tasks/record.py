@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
+from inputdesign_cli.design.convex.problem import Weight, weights_of
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
@@ -23,7 +23,6 @@ from inputdesign_cli.signal import (
     best_record,
     limited_responses,
 )
-from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.shortest_record import shortest_record
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
@@ -66,6 +65,8 @@ class RecordRequest:
         most_samples: the longest experiment, where one is looked for.
         longest: samples of the longest record that is computed at all.
         limit_keys: of the spec, for what limits single samples.
+        stated_method: whether the spec states the kind of signal.
+        others: kinds of signals that may stand in for one that does not fit.
     """
 
     settings: SignalSettings
@@ -78,12 +79,19 @@ class RecordRequest:
     most_samples: int | None = None
     longest: int = 2**20
     limit_keys: tuple[str, ...] = ()
+    stated_method: bool = False
+    others: tuple[SignalSettings, ...] = ()
     delivery: Delivery = Delivery()
 
     def length(self, experiment: int) -> int:
         """Samples of the record of an experiment of so many: whole periods of held values."""
         block = self.settings.block
         return -(-(self.samples or experiment) // block) * block
+
+    @property
+    def searched(self) -> bool:
+        """Whether a record that misses the accuracy is not an answer, so that others are looked for."""
+        return self.bounds.hard and self.settings.level is None
 
     def feasible(self, experiment: int, least: int) -> bool:
         """Whether a record of this length is computed, with at least so many values a period."""
@@ -117,7 +125,7 @@ def make_record(
         _score(problem.requirements),
         meets=problem.goal != "factor" and request.meets,
         cost=request.cost,
-        designed=_cost(problem, design.result.basis, design.result.x, request.cost),
+        designed=design_cost(design, request.cost),
     )
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
@@ -130,7 +138,7 @@ def make_record(
         return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
 
     record = made(samples)
-    if record.met or settings.level is not None or not (bounds.hard and longer):
+    if record.met or not (request.searched and longer):
         return record
     allowed = request.most_samples if problem.goal == "samples" and request.samples is None else 0
     return shortest_record(record, settings.block, made, allowed, request.longest, request.limit_keys)
@@ -224,6 +232,7 @@ def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
     return lambda information: -criterion.level(information)
 
 
-def _cost(problem: Problem, basis: Basis, x: Array, weights: Mapping[PowerKind, Weight]) -> float:
-    at = problem.on(basis)
+def design_cost(design: Design, weights: Mapping[PowerKind, Weight]) -> float:
+    """What the powers of a design cost at these weights."""
+    at, x = design.problem.on(design.result.basis), design.result.x
     return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))

@@ -64,7 +64,7 @@ class ExchangeResult:
     objective: float
     information: Array
     certificate: Certificate
-    active: tuple[Place, ...]  # (requirement, frequency) with a positive multiplier
+    active: tuple[Place, ...]  # (requirement, frequency) with a positive multiplier, the largest first
     rounds: int
     cuts: int
 
@@ -322,4 +322,5 @@ def _most_violated(found: list[tuple[int, Violation]], known: list[Place], most:
 
 def _active(keys: list[Place], proof: Proof) -> tuple[Place, ...]:
     weights = np.array([np.trace(Y) for Y, _ in proof.cuts])
-    return tuple(key for key, weight in zip(keys, weights, strict=True) if weight > 1e-4 * weights.sum())
+    largest_first = np.argsort(-weights, kind="stable")
+    return tuple(keys[i] for i in largest_first if weights[i] > 1e-4 * weights.sum())

@@ -15,7 +15,7 @@ from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.parameters import check_known
-from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
+from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements, stated_bounds
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
@@ -68,6 +68,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         columns=_few_columns(spec, basis),
         record=build_record_request(spec, experiment.size),
         unstated=unstated_errors(spec, experiment),
+        stated=stated_bounds(spec),
         simulation=build_simulation(spec, experiment),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -49,6 +50,14 @@ class Designed:
         """The problem on the basis of the answer, which may have grown."""
         return self.design.problem.on(self.design.result.basis)
 
+    @cached_property
+    def information(self) -> Array:
+        """(k, k): M of the delivered spectrum over the delivered number of samples."""
+        if self.design.problem.goal != "samples":
+            return self.design.result.information
+        samples = float(self.experiment.samples)
+        return candidate_at(self.problem, samples * self.design.result.x, samples).information
+
 
 def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dict[str, Json]:
     """The content of `result.json` but for signal and timing.
@@ -67,7 +76,7 @@ def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dic
         "cost": cost,
         "samples": done.experiment.samples,
         "power": powers(problem, found.basis, found.x),
-        "information": information_entry(done.experiment, _information(done)),
+        "information": information_entry(done.experiment, done.information),
         "spectrum": spectrum_entry(done.units, found.basis, found.x),
         "baseline": {"white": _white(done, cost)},
         "solver": {**how, "tolerance": tolerance},
@@ -75,7 +84,7 @@ def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dic
     if status != "nothing_needed":
         asked = (*problem.requirements, *problem.side)
         active = found.active_frequencies
-        result |= requirements_entry(done.units, done.alpha, asked, found.information, active)
+        result |= requirements_entry(done.units, done.alpha, asked, done.information, active)
     for name, entry in (("limits", _limits(done)), ("notes", _notes(done))):
         if entry:
             result[name] = entry
@@ -167,14 +176,6 @@ def _objective(design: Design) -> dict[str, Json]:
         "relative_gap": abs(value - bound) / value if value > 0 else 0.0,
         "any_spectrum_bound": any_bound,
     }
-
-
-def _information(done: Designed) -> Array:
-    """M of the delivered spectrum over the delivered number of samples."""
-    if done.design.problem.goal != "samples":
-        return done.design.result.information
-    samples = float(done.experiment.samples)
-    return candidate_at(done.problem, samples * done.design.result.x, samples).information
 
 
 def _white(done: Designed, cost: float) -> dict[str, Json]:
