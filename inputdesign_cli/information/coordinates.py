@@ -69,6 +69,10 @@ class Coordinates:
             half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
         return half.T @ half
 
+    def raw_steps(self, steps: Array) -> Array:
+        """Differences (n, k) of parameters in these coordinates as such of raw parameters."""
+        return steps if self.factor is None else steps @ self._inverse_factor
+
     def whiten_rows(self, rows: NDArray) -> NDArray:
         """Gradients (n, k) of raw parameters in these coordinates."""
         if self.factor is None:

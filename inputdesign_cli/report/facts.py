@@ -34,6 +34,15 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
         yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+    if "confidence" in error:
+        told = error["confidence"]
+        low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
+        yield (
+            "confidence",
+            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} simulated estimates within r_adm",
+            f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
+            f"not {error['alpha']:.4g}",
+        )
     if "mean_squared_error" in result:
         error = result["mean_squared_error"]
         parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"

@@ -11,8 +11,15 @@ from typing import Literal
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
+from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.designs import Design, Question, solve_design
+from inputdesign_cli.design.convex.designs import (
+    Design,
+    Question,
+    solve_design,
+    white_power,
+    whitened_problem,
+)
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
@@ -25,8 +32,9 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
+from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, covered, settled_alpha
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn
+from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, worst_ratio
 from inputdesign_cli.tasks.record_search import Made, fitting_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
@@ -37,6 +45,8 @@ from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_cu
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
+# A record that needs a larger alpha is made anew, this often at the most.
+_RECORDS = 4
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
 
@@ -64,6 +74,7 @@ class ConvexTask:
     experiment: Experiment
     cost: dict[PowerKind, Weight]
     alpha: float
+    calibration: Calibration | None
     tolerance: float
     most_samples: int | None
     ellipses: Pairs | None
@@ -102,7 +113,7 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        made = fitting_record(self.record, self.question, done.design, done.experiment)
+        made = self._recorded(done)
         record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
@@ -121,10 +132,37 @@ class ConvexTask:
         units = self.header.units
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
-            return Delivered(results, None, None)
+            return Delivered(results, None, None, done.confidence.alpha)
         found = made.design.result
         generator = redrawn(made.request, made.design, record)
-        return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
+        renewed = Redrawn("design", generator, found.basis, found.x)
+        return Delivered(results, record.samples, renewed, done.confidence.alpha)
+
+    def _recorded(self, done: Designed) -> Made:
+        """The record, and where the confidence is calibrated, one that keeps it by its own samples.
+
+        A record distributes its information otherwise than the design, so that it may need a larger alpha.
+        """
+        design, experiment, alpha = done.design, done.experiment, done.confidence.alpha
+        made = fitting_record(self.record, self.question, design, experiment)
+        if self.calibration is None:
+            return made
+        for _ in range(_RECORDS):
+            known = self._known(done, made.record)
+            if known is None or not (made.record and made.record.met):
+                return made
+            needed = self.calibration.alpha(bounded_errors(done.problem.requirements), known)
+            if needed <= alpha * (1.0 + SETTLED):
+                break
+            alpha = needed
+            stricter = tuple(with_alpha(design.problem.requirements, alpha))
+            design = replace(design, problem=replace(design.problem, requirements=stricter))
+            made = fitting_record(self.record, self.question.at_alpha(alpha), design, experiment)
+        known = self._known(done, made.record)
+        if made.record is None or known is None:
+            return made
+        ratio = worst_ratio(done.problem.requirements)(known)
+        return replace(made, record=replace(made.record, worst_ratio=ratio))
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.
@@ -132,6 +170,34 @@ class ConvexTask:
         Raises:
             InfeasibleError, InaccurateError: see `solve`.
         """
+        if self.calibration is None:
+            return self._designed(Confidence(self.alpha, self.alpha))
+        calibration, found = self.calibration, dict[float, tuple[Designed, dict[str, Json]]]()
+
+        def needed(alpha: float) -> float:
+            at = replace(self, question=self.question.at_alpha(alpha))
+            found[alpha] = at._designed(Confidence(alpha, self.alpha))
+            done = found[alpha][0]
+            return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
+
+        alpha = settled_alpha(needed, self._first_alpha(calibration))
+        done, how = found[alpha]
+        coverage = calibration.coverage(bounded_errors(done.problem.requirements), done.information)
+        confidence = Confidence(alpha, self.alpha, calibration.probability, coverage)
+        return replace(done, confidence=confidence), {**how, "designs": len(found)}
+
+    def _first_alpha(self, calibration: Calibration) -> float:
+        """That of white excitation where the least cost is sought, lest the first design be out of reach."""
+        question = self.question
+        power = white_power(question) if question.goal == "cost" else 0.0
+        if power == 0.0:
+            return self.alpha
+        flat = replace(question, basis=flat_basis(self.experiment))
+        problem = whitened_problem(flat, np.full(self.experiment.inputs, power / self.experiment.inputs))
+        errors = bounded_errors(problem.requirements)
+        return calibration.alpha(errors, problem.information(np.array([power])))
+
+    def _designed(self, confidence: Confidence) -> tuple[Designed, dict[str, Json]]:
         design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
         if self.columns is not None:
             design, climbed = restrict_columns(self.columns, design)
@@ -139,7 +205,7 @@ class ConvexTask:
         experiment = design.problem.experiment
         if design.problem.goal == "samples":
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
-        return Designed(self.header, self.question, design, experiment, self.cost, self.alpha), how
+        return Designed(self.header, self.question, design, experiment, self.cost, confidence), how
 
     def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
         try:
@@ -219,6 +285,10 @@ class ConvexTask:
             designed=done.information if design is done.design else design.result.information,
             spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
+        known = self._known(done, record)
+        if self.calibration is not None and known is not None:
+            coverage = self.calibration.coverage(bounded_errors(done.problem.requirements), known)
+            entry["confidence"] = covered(coverage)
         return entry | made.entry
 
     def _illustrations(

@@ -18,6 +18,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, Deviations, blaming_columns, read_data
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
 from inputdesign_cli.tasks.result.estimates import (
     estimate_result,
@@ -33,7 +34,7 @@ class ModelQuestion:
 
     Attributes:
         experiment: with that model and the loop, in the coordinates of the data: their information is I.
-        alpha: of the model error, see the contract.
+        confidence: the size of the confidence region of r_u.
         requirements: all that is asked, in these coordinates.
         entries: what has r_u of every entry of G where no requirement has it.
         top_up: designs what makes up for what the data leave to be wished for; None where the spec designs
@@ -41,7 +42,7 @@ class ModelQuestion:
     """
 
     experiment: Experiment
-    alpha: float
+    confidence: Confidence
     requirements: Sequence[Requirement]
     entries: Sequence[ModelError]
     top_up: Callable[[], Results] | None
@@ -136,7 +137,7 @@ def identification_results(task: Identification, found: Identified, started: flo
         tables["bound"], curves["bound"], worst = bound_of_data(
             header.units, question.requirements, question.entries, question.information
         )
-        result["model_error"] = {"alpha": question.alpha, **worst}
+        result["model_error"] = {"alpha": question.confidence.alpha, **question.confidence.entry, **worst}
     if notes:
         result["notes"] = notes
     result["timing_s"] = {"identification": time.perf_counter() - started}

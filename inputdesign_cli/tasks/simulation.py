@@ -67,7 +67,7 @@ class Simulation:
         renewed: whether each run realises the spectrum anew.
         compare: what else is tried at equal power: signals of a flat spectrum over the band, of these kinds.
         cost: weights of the powers of an excitation.
-        entries, alpha: see `ModelQuestion`.
+        entries: see `ModelQuestion`.
     """
 
     units: Units
@@ -79,7 +79,6 @@ class Simulation:
     compare: Sequence[Method]
     cost: Mapping[PowerKind, Weight]
     entries: Sequence[ModelError]
-    alpha: float
 
 
 @dataclass(frozen=True)
@@ -90,11 +89,13 @@ class Delivered:
         results: what has been computed so far.
         record: (n, r), about its operating point; None if no excitation is needed.
         renewed: realises the spectrum anew in each run; None for a record that was given.
+        alpha: of r_u, see the contract.
     """
 
     results: Results
     record: Array | None
     renewed: Excitation | None
+    alpha: float
 
 
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
@@ -120,7 +121,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     result = dict(results.result)
     true = nominal if plan.truth is None else plan.truth.experiment(nominal, result["power"]["output"])
     study = Study(nominal, true, plan.runs, plan.seed, units.step)
-    predicted = _predicted(plan, results, excitations[0].information(nominal))
+    predicted = _predicted(plan, delivered, excitations[0].information(nominal))
     inputs: dict[str, Json] = {}
     curves: dict[str, Curves] = {}
     tables: dict[str, Table] = {}
@@ -184,9 +185,9 @@ def _flat(plan: Simulation, kind: Method, name: str, power: float, samples: int)
     return Redrawn.flat(name, kind, powers, band, samples, plan.units.step)
 
 
-def _predicted(plan: Simulation, results: Results, information: Array) -> PredictedError:
+def _predicted(plan: Simulation, delivered: Delivered, information: Array) -> PredictedError:
     """What bound.csv says; where there is none, the r_u that the `information` gives."""
-    bound = results.curves.get("bound")
+    bound = delivered.results.curves.get("bound")
     if not isinstance(bound, BoundCurves):
         _, bound = bound_curves(plan.units, plan.entries, information, stated=False)
     panels = bound.panels
@@ -197,6 +198,6 @@ def _predicted(plan: Simulation, results: Results, information: Array) -> Predic
         w=np.concatenate([panel.frequency for panel in panels]) * plan.units.frequency,
         r_u=np.concatenate([panel.r_u for panel in panels]),
         r_adm=np.concatenate(admissible) if admissible else None,
-        alpha=plan.alpha,
+        alpha=delivered.alpha,
         entries=np.repeat(np.array(places), sizes, axis=0) if places else None,
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, least_scale, scaled_up
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
@@ -49,6 +50,16 @@ class Question:
     cost: Mapping[PowerKind, Weight] = field(default_factory=dict)
     limits: Sequence[PowerLimit] = ()
     densities: Sequence[DensityLimit] = ()
+
+    def at_alpha(self, alpha: float) -> Question:
+        """The same question with another confidence factor of the model errors."""
+
+        def changed(make: RequirementFactory) -> RequirementFactory:
+            return lambda experiment: with_alpha([make(experiment)], alpha)[0]
+
+        return replace(
+            self, requirements=list(map(changed, self.requirements)), side=list(map(changed, self.side))
+        )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from inputdesign_cli.tasks.build.demand import check_design
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
-from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements, stated_bounds
 from inputdesign_cli.tasks.build.signal_checks import check_signal
@@ -61,6 +61,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         experiment=experiment,
         cost=cost,
         alpha=model_error_alpha(spec, experiment.model),
+        calibration=build_calibration(spec),
         tolerance=spec.solver.tolerance,
         most_samples=spec.limits.samples,
         ellipses=spec.report.ellipses,

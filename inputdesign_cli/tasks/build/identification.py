@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -14,10 +15,11 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.prior import build_earlier
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
@@ -87,10 +89,13 @@ def _question(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
             )
         ).solve()
 
+    requirements = [make(experiment) for make in build_requirements(spec, raw)]
+    usual, information = model_error_alpha(spec, raw.model), np.eye(experiment.size)
+    confidence = Confidence.of(build_calibration(spec), requirements, information, usual)
     return ModelQuestion(
         experiment=experiment,
-        alpha=model_error_alpha(spec, raw.model),
-        requirements=[make(experiment) for make in build_requirements(spec, raw)],
+        confidence=confidence,
+        requirements=with_alpha(requirements, confidence.alpha),
         entries=[replace(error, experiment=experiment) for error in unstated_errors(spec, raw)],
         top_up=topped_up if spec.designs else None,
     )

@@ -17,6 +17,7 @@ from inputdesign_cli.accuracy import (
     Weighted,
     active_entries,
 )
+from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.information import Experiment
@@ -44,6 +45,15 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
         return error.alpha
     probability = (error.probability if error is not None else None) or DEFAULT_CONFIDENCE
     return confidence_factor(probability, int(np.sum(model.in_plant)))
+
+
+def build_calibration(spec: Spec) -> Calibration | None:
+    """How alpha is calibrated where `confidence: {exact: ..}` asks for that."""
+    error = spec.accuracy.model_error
+    stated = None if error is None else error.calibrated
+    if stated is None or stated.exact is None:
+        return None
+    return Calibration(stated.exact, stated.draws)
 
 
 def required_band(

@@ -17,6 +17,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
 
 # A limit binds when the design uses all but this share of it.
@@ -38,7 +39,7 @@ class Designed:
     design: Design
     experiment: Experiment
     cost: dict[PowerKind, Weight]
-    alpha: float
+    confidence: Confidence
 
     @property
     def units(self) -> Units:
@@ -84,7 +85,7 @@ def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dic
     if status != "nothing_needed":
         asked = (*problem.requirements, *problem.side)
         active = found.active_frequencies
-        result |= requirements_entry(done.units, done.alpha, asked, done.information, active)
+        result |= requirements_entry(done.units, done.confidence, asked, done.information, active)
     for name, entry in (("limits", _limits(done)), ("notes", _notes(done))):
         if entry:
             result[name] = entry
@@ -109,11 +110,15 @@ def information_entry(experiment: Experiment, information: Array) -> dict[str, J
 
 
 def requirements_entry(
-    units: Units, alpha: float, requirements: Sequence[Requirement], information: Array, active: Array
+    units: Units,
+    confidence: Confidence,
+    requirements: Sequence[Requirement],
+    information: Array,
+    active: Array,
 ) -> dict[str, Json]:
     """`model_error` of the contract, and the worst ratio of each requirement."""
     listed: list[dict[str, Json]] = []
-    entry: dict[str, Json] = {"alpha": alpha}
+    entry: dict[str, Json] = {"alpha": confidence.alpha, **confidence.entry}
     for requirement in requirements:
         if isinstance(requirement, Criterion):
             continue
