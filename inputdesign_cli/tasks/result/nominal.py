@@ -45,7 +45,7 @@ def from_nominal(
         nominal, estimated: of one structure.
         errors: what has r_u and a band, entry by entry; information (k, k) is in their coordinates.
     """
-    of_plant = np.flatnonzero([name[0] not in "cd" for name in estimate.names])
+    of_plant = np.flatnonzero(estimated.in_plant)
     away = (nominal.theta - estimate.theta)[of_plant]
     scale = np.sqrt(np.diag(estimate.covariance))[of_plant]
     correlation = estimate.covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
