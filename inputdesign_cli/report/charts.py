@@ -121,6 +121,8 @@ def _bound(table: Mapping[str, Array], result: Result) -> Drawn | None:
         table.get("r_u_white"),
         active,
         table.get("r_u_record"),
+        # Beside a design the figure of the data is one of its own.
+        label="data" if "identification" in result and "objective" not in result else "design",
     )
     curves = BoundCurves((panel,))
     if panel.r_adm is None:

@@ -39,7 +39,7 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
         yield (
             "confidence",
-            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} simulated estimates within r_adm",
+            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} simulated estimates meet it",
             f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
             f"not {error['alpha']:.4g}",
         )

@@ -16,6 +16,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.plant.polynomial import Array
@@ -31,6 +32,7 @@ from inputdesign_cli.tasks.identification import (
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
+from inputdesign_cli.tasks.result.nominal import from_nominal
 from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 
@@ -92,7 +94,10 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     assessment: dict[str, Json] = {"met": verdict == "met", "requirements": listed}
     if reasons:
         assessment["undecided"] = reasons
-    judged = _judged(identification, verdict, assessment)
+    notes: list[str] = []
+    if found.question is not None:
+        assessment["nominal"], notes = _from_nominal(task, found, found.question)
+    judged = _with_notes(_judged(identification, verdict, assessment), notes)
     if verdict == "undecided":
         judged = _without_model(judged, task.header.units, found)
     if verdict != "missed" or found.question is None or found.question.top_up is None:
@@ -119,18 +124,30 @@ def _without_model(judged: Results, units: Units, found: Identified) -> Results:
     if response is None:
         return judged
     table, curves, told = response_of_data(units, found.model, response, by_reference=data.r is not None)
-    was = judged.result
-    result = {
-        **was,
-        "assessment": {**was["assessment"], "frequency_response": told},
-        "notes": [*was.get("notes", []), *response_note(told)],
-    }
-    return replace(
+    assessment = {**judged.result["assessment"], "frequency_response": told}
+    shown = replace(
         judged,
-        result=result,
+        result={**judged.result, "assessment": assessment},
         tables={**judged.tables, "frequency_response": table},
         curves={**judged.curves, "frequency_response": curves},
     )
+    return _with_notes(shown, response_note(told))
+
+
+def _from_nominal(
+    task: Identification, found: Identified, question: ModelQuestion
+) -> tuple[dict[str, Json], list[str]]:
+    """How far the estimate is from the plant of the spec, and a note where that is far."""
+    errors = model_errors(question.requirements) or question.entries
+    information, estimate = question.information, found.estimate
+    return from_nominal(task.header.units, task.nominal, found.model, estimate, errors, information)
+
+
+def _with_notes(results: Results, notes: Sequence[str]) -> Results:
+    """The same with further notes."""
+    if not notes:
+        return results
+    return replace(results, result={**results.result, "notes": [*results.result.get("notes", []), *notes]})
 
 
 def _experiments(question: ModelQuestion, both: Array) -> int | None:

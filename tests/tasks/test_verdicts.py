@@ -275,3 +275,30 @@ def test_in_a_loop_the_reference_is_used_where_it_is_recorded(record, tmp_path):
         result = assess(parse_spec(HEATER, overrides=loop), path).results.result
         assert result["assessment"]["frequency_response"]["excitation"] == by
         assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")
+
+
+@pytest.mark.parametrize(("factor", "contradicts"), [(1.0, False), (1.1, False), (-1.0, True), (3.0, True)])
+def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, record):
+    path = record("a.csv", 720, 1)
+    B = [0, 0, 0, 0, 0, 0, *(factor * 2.35 * (1 - SLOW) * share for share in (0.4, 0.6))]
+    found = assess(parse_spec(HEATER, overrides=[f"plant={{B: {B}, F: [1, {-SLOW}]}}"]), path)
+    result = found.results.result
+    nominal, notes = result["assessment"]["nominal"], " ".join(result.get("notes", []))
+    assert found.verdict == "met"
+    assert ("contradicts the plant of the spec" in notes) == contradicts
+    assert nominal["opposite_sign"] == (factor < 0)
+    assert nominal["degrees_of_freedom"] == 3
+    names = ["b6", "b7", "f1"]
+    P = covariance_of(result, names)
+    away = np.array([*B[6:], -SLOW]) - [result["identification"]["theta"][name] for name in names]
+    assert nominal["statistic"] == pytest.approx(away @ np.linalg.solve(P, away), rel=1e-6)
+    if contradicts:
+        share = abs(factor - 1.0) / max(abs(factor), 1.0)
+        assert nominal["worst_difference"] == pytest.approx(share, rel=0.15)
+        assert "b7 is" in notes or "b6 is" in notes
+
+
+def covariance_of(result, names):
+    """The covariance of some parameters."""
+    at = [result["information"]["parameters"].index(name) for name in names]
+    return np.array(result["information"]["covariance"])[np.ix_(at, at)]
