@@ -26,7 +26,7 @@ from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn
+from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, shortfall
 from inputdesign_cli.tasks.record_search import Made, fitting_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
@@ -115,6 +115,9 @@ class ConvexTask:
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
             notes = [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
+            known = self._known(done, record)
+            if record is not None and known is not None:
+                notes += shortfall(done.design, record, known)
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,
