@@ -12,6 +12,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
 from inputdesign_cli.design.convex.designs import Design, Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
@@ -105,7 +106,11 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        made = fitting_record(self.record, self.question, done.design, done.experiment)
+        try:
+            made = fitting_record(self.record, self.question, done.design, done.experiment)
+        except OutOfTimeError:
+            value = result["objective"]["value"]
+            raise out_of_time(f"the design is proved (value {value:.6g}), but not yet its record") from None
         record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
