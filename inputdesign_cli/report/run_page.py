@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -34,11 +35,6 @@ _OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound")
 _OF_RUNS = ("errors_", "cloud_", "disturbance_")
 _NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "made_from"})
 _MOST_ENTRIES = 16
-_COMMANDS = {
-    "assess": "idesign assess spec.yaml DATA",
-    "identify": "idesign identify DATA --spec spec.yaml",
-    **{verb: f"idesign {verb} spec.yaml" for verb in ("simulate", "solve", "analyse")},
-}
 
 
 def run_page(run: Path) -> dict[str, Json]:
@@ -76,8 +72,8 @@ def run_page(run: Path) -> dict[str, Json]:
         "simulated_runs": result.get("simulation", {}).get("runs"),
         "run_charts": runs,
         "assumptions": assumptions(question, result),
-        "command": _COMMANDS[verb],
-        "files": [],
+        "command": _command(verb, result),
+        "files": _data_files(result),
         "spec": text,
         "provenance": provenance(
             result.get("environment", {}),
@@ -99,6 +95,25 @@ def _verb(result: Result) -> str:
     if result.get("simulation"):
         return "simulate"
     return "solve" if "objective" in result else "analyse"
+
+
+def _data_files(result: Result) -> list[str]:
+    """The names of the records that the run was made from."""
+    return [Path(str(name)).name for name in result.get("made_from", [])[1:]]
+
+
+def _command(verb: str, result: Result) -> str:
+    """What makes the run again, with the names of the data and what was taken away from them."""
+    if verb not in ("assess", "identify"):
+        return f"idesign {verb} spec.yaml"
+    data, found = _data_files(result) or ["DATA"], result["identification"]
+    words = [verb, "spec.yaml", *data] if verb == "assess" else [verb, *data, "--spec", "spec.yaml"]
+    if found.get("means_removed"):
+        words.append("--remove-means")
+    elif found.get("operating_point"):
+        levels = [f"{name}={float(level)!r}" for name, level in found["operating_point"].items()]
+        words += ["--operating-point", ",".join(levels)]
+    return shlex.join(["idesign", *words])
 
 
 def _answer(result: Result) -> str:

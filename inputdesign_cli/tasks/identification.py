@@ -29,15 +29,15 @@ class ModelQuestion:
         alpha: of the model error, see the contract.
         requirements: all that is asked, in raw parameters.
         entries: what has r_u of every entry of G where no requirement has it.
-        top_up: designs what makes up for what data of information (k, k) leave to be wished for; None where
-            the spec designs nothing.
+        top_up: designs what makes up for what data of information (k, k) leave to be wished for, with a$
+            record about the levels of the inputs by name; None where the spec designs nothing.
     """
 
     experiment: Experiment
     alpha: float
     requirements: Sequence[Requirement]
     entries: Sequence[ModelError]
-    top_up: Callable[[Array], Results] | None
+    top_up: Callable[[Array, Mapping[str, float]], Results] | None
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ class Identified:
     estimate: Estimate
     model: Model
     data: Data
+    deviations: Deviations
     question: ModelQuestion | None
     unasked: str = ""
 
@@ -80,7 +81,8 @@ def identified(task: Identification, paths: Sequence[Path], deviations: Deviatio
     """
     units, nominal = task.header.units, task.nominal
     known = {**task.operating_point, **deviations.operating_point}
-    data = read_data(paths, units, replace(deviations, operating_point=known))
+    taken = replace(deviations, operating_point=known)
+    data = read_data(paths, units, taken)
     with blaming_columns(paths[0]):
         estimate = estimate_model(
             nominal,
@@ -95,8 +97,8 @@ def identified(task: Identification, paths: Sequence[Path], deviations: Deviatio
     try:
         question = task.at(model, len(data.y), f"{paths[0].name} (estimate)")
     except IdesignError as error:
-        return Identified(estimate, model, data, None, told(error))
-    return Identified(estimate, model, data, question)
+        return Identified(estimate, model, data, taken, None, told(error))
+    return Identified(estimate, model, data, taken, question)
 
 
 def told(error: IdesignError) -> str:
@@ -112,6 +114,10 @@ def identification_results(task: Identification, found: Identified, started: flo
     """
     header, question, estimate = task.header, found.question, found.estimate
     result = estimate_result(header.title, estimate)
+    if found.deviations.remove_means:
+        result["identification"]["means_removed"] = True
+    elif found.deviations.operating_point:
+        result["identification"]["operating_point"] = dict(found.deviations.operating_point)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
     if question is None:
