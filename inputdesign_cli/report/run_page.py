@@ -21,6 +21,7 @@ from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.runs.objectives import objective
+from inputdesign_cli.runs.record import RESULT, unreadable
 from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.run_directory import read_run
 
@@ -35,11 +36,36 @@ _OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound")
 _OF_RUNS = ("errors_", "cloud_", "disturbance_")
 _NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "made_from"})
 _MOST_ENTRIES = 16
+# What these fields of a result are, where it has them: somebody else may have written it.
+_FIELDS = {
+    str: (("title", "status"), "a text"),
+    list: (("requirements", "limits", "notes", "made_from"), "a list"),
+    dict: (
+        (
+            "objective",
+            "power",
+            "model_error",
+            "information",
+            "baseline",
+            "signal",
+            "solver",
+            "timing_s",
+            "environment",
+            "identification",
+            "assessment",
+            "simulation",
+            "moments",
+            "mean_squared_error",
+        ),
+        "a mapping",
+    ),
+}
 
 
 def run_page(run: Path) -> dict[str, Json]:
     """The content of the template for a run. Raises `DataError` as `read_run` does."""
     result = read_run(run)
+    _check_fields(run, result)
     verb = _verb(result)
     text = read_regular(run / "spec.yaml").decode()
     try:
@@ -85,6 +111,14 @@ def run_page(run: Path) -> dict[str, Json]:
         "citations": citations(question, result),
         "numbers": flat({key: value for key, value in result.items() if key not in _NOT_NUMBERS}),
     }
+
+
+def _check_fields(run: Path, result: Result) -> None:
+    """Raise `DataError` (`run-unreadable`) that names the first field which is not of its kind."""
+    for kind, (names, called) in _FIELDS.items():
+        for name in names:
+            if not isinstance(result.get(name, kind()), kind):
+                raise unreadable(run / RESULT, f'"{name}" is not {called}')
 
 
 def _verb(result: Result) -> str:
