@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from inputdesign_cli.report.numbers import Fact, listed, shown, spoken
 from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.results import Json, Result
 
 # What is said of an excitation that was given, by the status of the result.
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
@@ -103,8 +103,25 @@ def _signal(result: Result) -> Iterator[str]:
         error = "worst_ratio" in result.get("model_error", {})
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
         yield f"{ratio} at most {signal['worst_ratio']:.4g} with these samples"
-    more = signal.get("extra_power", 0.0)
-    if abs(more) >= 5e-5:
-        yield f"costs {abs(100 * more):.3g} % {'more' if more > 0 else 'less'} than the design"
     if "criterion" in signal:
         yield f"criterion {signal['criterion']:.6g} with these samples"
+    yield from _beside_the_design(result.get("objective", {}), signal)
+
+
+def _beside_the_design(found: Mapping[str, Json], signal: Mapping[str, Json]) -> Iterator[str]:
+    """What the samples buy less, where the best was asked for, or what else they cost."""
+    if "efficiency" in signal or found.get("kind") == "accuracy_factor":
+        less = 1.0 - signal.get("efficiency", 1.0)
+        if "worst_ratio" in signal:
+            less = 1.0 - found["value"] / signal["worst_ratio"]
+        if less >= 5e-4:
+            yield f"{100 * less:.3g} % less accuracy than the design"
+        return
+    more = signal.get("extra_power", 0.0)
+    if abs(more) < 5e-5:
+        return
+    aside = f"{abs(100 * more):.3g} % {'above' if more > 0 else 'below'} that of the design"
+    if signal.get("worst_ratio", 2.0) <= 1.0 + 1e-6:
+        yield f"the power that they need for the accuracy costs {aside}"
+    else:
+        yield f"their power costs {aside}"

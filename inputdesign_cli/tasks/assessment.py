@@ -103,11 +103,25 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
     try:
-        topped = found.question.top_up()
+        levels = {} if deviations.remove_means else found.deviations.operating_point
+        topped = _about(found.question.top_up(levels), levels)
     except IdesignError as error:
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))
     needed = partial(_experiments, found.question)
     return Assessment(verdict, _topped_up(judged, topped, needed))
+
+
+def _about(topped: Results, levels: Mapping[str, float]) -> Results:
+    """The top-up with a note on what its record varies about."""
+    point = topped.result.get("signal", {}).get("operating_point")
+    if not levels or point is None:
+        return topped
+    told = ", ".join(f"u{j + 1} = {level:g}" for j, level in enumerate(point))
+    return _with_note(topped, f"signal.csv varies about the operating point, {told}")
+
+
+def _with_note(results: Results, note: str) -> Results:
+    return replace(results, result={**results.result, "notes": [*results.result.get("notes", []), note]})
 
 
 def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Json]) -> Results:

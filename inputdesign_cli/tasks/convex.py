@@ -13,6 +13,7 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
 from inputdesign_cli.design.convex.designs import (
     Design,
     Question,
@@ -34,7 +35,14 @@ from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, covered, settled_alpha
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, worst_ratio
+from inputdesign_cli.tasks.record import (
+    RecordRequest,
+    designed_spectrum,
+    record_notes,
+    redrawn,
+    shortfall,
+    worst_ratio,
+)
 from inputdesign_cli.tasks.record_search import Made, fitting_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
@@ -113,7 +121,11 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        made = self._recorded(done)
+        try:
+            made = self._recorded(done)
+        except OutOfTimeError:
+            value = result["objective"]["value"]
+            raise out_of_time(f"the design is proved (value {value:.6g}), but not yet its record") from None
         record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
@@ -123,6 +135,9 @@ class ConvexTask:
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
             notes = [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
+            known = self._known(done, record)
+            if record is not None and known is not None:
+                notes += shortfall(done.design, record, known)
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,

@@ -37,15 +37,15 @@ class ModelQuestion:
         confidence: the size of the confidence region of r_u.
         requirements: all that is asked, in these coordinates.
         entries: what has r_u of every entry of G where no requirement has it.
-        top_up: designs what makes up for what the data leave to be wished for; None where the spec designs
-            nothing.
+        top_up: designs what makes up for what the data leave to be wished for, with a record about the
+            levels of the inputs by name; None where the spec designs nothing.
     """
 
     experiment: Experiment
     confidence: Confidence
     requirements: Sequence[Requirement]
     entries: Sequence[ModelError]
-    top_up: Callable[[], Results] | None
+    top_up: Callable[[Mapping[str, float]], Results] | None
 
     @property
     def information(self) -> Array:
@@ -83,6 +83,7 @@ class Identified:
     estimate: Estimate
     model: Model
     data: Data
+    deviations: Deviations
     question: ModelQuestion | None
     unasked: str = ""
 
@@ -95,7 +96,8 @@ def identified(task: Identification, paths: Sequence[Path], deviations: Deviatio
     """
     units, nominal = task.header.units, task.nominal
     known = {**task.operating_point, **deviations.operating_point}
-    data = read_data(paths, units, replace(deviations, operating_point=known))
+    taken = replace(deviations, operating_point=known)
+    data = read_data(paths, units, taken)
     with blaming_columns(paths[0]):
         estimate = estimate_model(
             nominal,
@@ -111,8 +113,8 @@ def identified(task: Identification, paths: Sequence[Path], deviations: Deviatio
     try:
         question = task.at(model, len(data.y), estimate.factor, f"{paths[0].name} (estimate)")
     except IdesignError as error:
-        return Identified(estimate, model, data, None, told(error))
-    return Identified(estimate, model, data, question)
+        return Identified(estimate, model, data, taken, None, told(error))
+    return Identified(estimate, model, data, taken, question)
 
 
 def told(error: IdesignError) -> str:
@@ -128,6 +130,10 @@ def identification_results(task: Identification, found: Identified, started: flo
     """
     header, question, estimate = task.header, found.question, found.estimate
     result = estimate_result(header.title, estimate)
+    if found.deviations.remove_means:
+        result["identification"]["means_removed"] = True
+    elif found.deviations.operating_point:
+        result["identification"]["operating_point"] = dict(found.deviations.operating_point)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
     notes += prior_notes(estimate, stated=task.has_prior)

@@ -28,6 +28,7 @@ from inputdesign_cli.tasks.shortest_record import shortest_record
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
+_FALLS_SHORT = 5e-3
 _NO_RECORD = (
     "there is no record: it would have {} samples, and at most {} are computed for this model; "
     "signal.samples sets a shorter one"
@@ -221,6 +222,28 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
             f"within the limits on single samples the accuracy takes {len(record.samples)} samples; the "
             f"spectrum alone would take {asked}"
         )
+    return notes
+
+
+def shortfall(design: Design, record: Record, information: Array) -> list[str]:
+    """What a record of the best accuracy misses: the accuracy that the design has, and what else is required.
+
+    Args:
+        information: (k, k) of the record.
+    """
+    problem, notes = design.problem, []
+    best = float(np.sqrt(design.result.objective))
+    if problem.goal == "factor" and problem.stated_criterion is None:
+        more = record.worst_ratio / best - 1.0
+        if more > _FALLS_SHORT:
+            notes.append(
+                f"the record reaches {record.worst_ratio:.4g} times the admissible error, the design "
+                f"{best:.4g}: {100 * more:.3g} % more, by its length or by the limits on single samples"
+            )
+    missed = worst_ratio(problem.side)(information)
+    if missed > 1.0 + _FALLS_SHORT:
+        names = " and ".join(dict.fromkeys(requirement.name for requirement in problem.side))
+        notes.append(f"the record misses {names}, which the design meets: its worst ratio is {missed:.4g}")
     return notes
 
 

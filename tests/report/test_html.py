@@ -112,6 +112,16 @@ def test_a_result_that_somebody_changed_is_an_error_or_a_page(runs, tmp_path, mo
             report_text(tmp_path / "a")
 
 
+@pytest.mark.parametrize("field", ["power", "signal", "objective", "notes", "title", "information"])
+def test_a_field_that_is_not_of_its_kind_is_named(runs, tmp_path, field):
+    shutil.copytree(runs / "open", tmp_path / "run")
+    file = tmp_path / "run" / "result.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), field: 7}))
+    with pytest.raises(DataError, match=f'result.json cannot be read .*"{field}" is not') as caught:
+        report_text(tmp_path / "run")
+    assert caught.value.diagnostics[0].code == "run-unreadable"
+
+
 @pytest.mark.parametrize("name", ["spec.yaml", "bound.csv", "result.json"])
 def test_a_pipe_in_a_run_directory_is_not_waited_for(runs, tmp_path, name):
     shutil.copytree(runs / "open", tmp_path / "a")

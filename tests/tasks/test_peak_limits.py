@@ -5,6 +5,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.report.facts import facts
 
 DEAR_OUTPUT = """
 sample_time: 5
@@ -80,3 +81,23 @@ def test_a_kind_of_signal_that_is_asked_for_is_not_replaced():
     as_told = DEAR_OUTPUT + f"signal: {{type: {kind}, candidates: 8}}\n"
     found = solve(parse_spec(as_told % f"amplitude: 2, input_power: {power}"))
     assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_a_record_that_falls_short_of_the_best_accuracy_is_not_called_cheap():
+    spec = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
+objective: best_accuracy
+spectrum: {type: fir, order: 8}
+limits: {amplitude: 0.4}
+signal: {type: multisine, candidates: 1}
+"""
+    result = solve(parse_spec(spec)).result
+    less = 1 - result["objective"]["value"] / result["signal"]["worst_ratio"]
+    assert less > 0.01
+    line = next(text for name, text, _ in facts(result, "s") if name == "signal")
+    assert f"{100 * less:.3g} % less accuracy than the design" in line
+    assert "cost" not in line
+    assert any(f"reaches {result['signal']['worst_ratio']:.4g} times" in note for note in result["notes"])

@@ -1,5 +1,6 @@
 """Met, missed or undecided: what `assess` says of records, right models and wrong ones."""
 
+import html
 import json
 from pathlib import Path
 
@@ -302,3 +303,33 @@ def covariance_of(result, names):
     """The covariance of some parameters."""
     at = [result["information"]["parameters"].index(name) for name in names]
     return np.array(result["information"]["covariance"])[np.ix_(at, at)]
+
+
+def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", record("first run.csv", 300, 2, level=(40.0, 52.3))
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    spec.write_text(STRUCTURE + asked)
+    out = tmp_path / "run"
+    call = [
+        "assess",
+        str(spec),
+        str(path),
+        "-o",
+        str(out),
+        "--no-figures",
+        "--operating-point",
+        "u1=40,y1=52.3",
+    ]
+    run = CliRunner().invoke(app, call)
+    assert run.exit_code == 1, run.output
+    result = json.loads((out / "result.json").read_text())
+    assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
+    assert result["signal"]["operating_point"] == [40.0]
+    assert any("varies about the operating point, u1 = 40" in note for note in result["notes"])
+    u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
+    assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
+    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
+    page = html.unescape((out / "report.html").read_text())
+    assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inputdesign_cli.accuracy import Cut, Violation
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.convex.candidate import (
     Candidate,
     Place,
@@ -102,6 +103,9 @@ def exchange(
         tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
             when the solver makes no more progress: its `gap` says so.
         enough: stop already when it says so of (objective, bound).
+
+    Raises:
+        OutOfTimeError: with what was reached.
     """
     done = enough or (lambda objective, bound: False)
     coarser = [] if interior is not None else problem.basis.coarser()
@@ -116,7 +120,12 @@ def exchange(
         gaps: list[float] = []
         for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
             rounds += 1
-            solved = state.improve(tolerance)
+            try:
+                solved = state.improve(tolerance)
+            except OutOfTimeError as ended:
+                if stage is problem:
+                    ended.reached = (state.best.objective, state.certificate.bound)
+                raise
             gaps.append(state.gap)
             grows = state.problem.basis.size > stage.basis.size
             patience = _PATIENCE_GROWING if grows else _PATIENCE

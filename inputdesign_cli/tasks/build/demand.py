@@ -17,6 +17,7 @@ _COPIES = 4  # of a record's gradient while its information matrix is formed
 # The solver's matrix fills up: with so many cuts, steps of the solver and rounds to begin with.
 _CUTS, _STEPS, _ROUNDS, _CRITERION = 15, 10, 5, 4
 _PER_SECOND = 1e10  # multiplications
+_GENEROUS = 10  # times the first rounds: plants that are hard take as long
 
 
 def check_model(spec: Spec, model: Model) -> None:
@@ -64,9 +65,16 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
             "too-large",
             f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more; "
             f"solver.time_limit is {limit:g}",
-            hint=f"{fits} parameters fit: lower the orders, or raise solver.time_limit",
+            hint=f"{fits} parameters fit: lower the orders, or write solver.time_limit: "
+            f"{_rounded(_GENEROUS * seconds(size))} or more",
             key="plant",
         )
+
+
+def _rounded(seconds: float) -> str:
+    """Two digits, rounded up, written out."""
+    unit = 10 ** max(len(f"{seconds:.0f}") - 2, 0)
+    return str(int(-(-seconds // unit) * unit))
 
 
 def check_record(spec: Spec, parameters: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -58,6 +59,15 @@ def _operating_point(spec: Spec) -> dict[str, float]:
     return {f"u{j + 1}": float(level) for j, level in enumerate(levels)}
 
 
+def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:
+    """The override that lets a record vary about the levels of the data, where the spec does not say it."""
+    inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
+    if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
+        return []
+    offsets = [levels.get(name, 0.0) for name in inputs]
+    return [f"signal.offset={json.dumps(offsets if len(offsets) > 1 else offsets[0])}"]
+
+
 def _restated(spec: Spec, model: Model, source: str) -> Spec:
     """The spec with another model in place of its nominal plant and noise."""
     return parse_spec(
@@ -78,13 +88,13 @@ def _question(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
     raw = replace(build_experiment(spec), samples=samples)
     experiment = replace(raw, factor=factor)
 
-    def topped_up() -> Results:
+    def topped_up(levels: Mapping[str, float]) -> Results:
         prior = {"parameters": list(raw.model.names), "information": (factor @ factor.T).tolist()}
         return build_convex(
             parse_spec(
                 spec.to_yaml(),
                 file="top-up",
-                overrides=[f"experiment.prior={json.dumps(prior)}"],
+                overrides=[f"experiment.prior={json.dumps(prior)}", *_offset(spec, levels)],
                 folder=spec.resolve_path("."),
             )
         ).solve()
