@@ -104,6 +104,10 @@ class Experiment(Coordinates):
         half = np.einsum("nmpa,nlpb->nlmab", F.conj(), F, optimize=True)
         return (0.5 * self.samples) * (half + half.swapaxes(1, 2))
 
+    def information_factor(self, w: ArrayLike) -> ComplexArray:
+        """F (n, k, p, r) whose products F_l^* F_m are `information_density`."""
+        return np.sqrt(self.samples) * self.excitation_gradient(w)
+
     def value_density(self, weight: Array, w: ArrayLike) -> NDArray:
         """(n,) or (n, r, r): the density of tr(Y (M - M0)), Y = `weight` (k, k) symmetric."""
         F = self.excitation_gradient(w)

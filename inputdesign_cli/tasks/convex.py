@@ -63,6 +63,7 @@ class ConvexTask:
     cost: dict[PowerKind, Weight]
     alpha: float
     tolerance: float
+    any_spectrum_tolerance: float
     most_samples: int | None
     ellipses: Pairs | None
     grid: GridMethod | None
@@ -158,7 +159,9 @@ class ConvexTask:
 
     def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
         try:
-            design = solve_design(self.question, tolerance=self.tolerance)
+            design = solve_design(
+                self.question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+            )
         except UnreachableError as unreachable:
             raise explain(self.header.units, self.question, unreachable) from unreachable
         found = design.result

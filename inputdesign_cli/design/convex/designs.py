@@ -11,7 +11,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, least_scale, scaled_up
+from inputdesign_cli.design.convex.candidate import (
+    Candidate,
+    Place,
+    candidate_at,
+    excess,
+    least_scale,
+    scaled_up,
+)
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.feasible import strictly_feasible
@@ -69,8 +76,10 @@ class Design:
     any_spectrum: ExchangeResult
 
 
-def solve_design(question: Question, *, tolerance: float) -> Design:
-    """Solve a design problem with its baseline and its bound over every spectrum.
+def solve_design(
+    question: Question, *, tolerance: float, any_spectrum_tolerance: float = _ANY_SPECTRUM_TOLERANCE
+) -> Design:
+    """Solve a design problem with its baseline and its bound over every spectrum, each to its relative gap.
 
     Raises:
         SpecError: `not-identifiable` when no excitation can tell some parameters apart;
@@ -94,8 +103,8 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     result = _without_faint_lines(problem, _solve(problem, start, tolerance))
     if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
-    loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
-    anything = _solve(anywhere, anywhere.basis.spread(powers), loose)
+    loose = max(tolerance, any_spectrum_tolerance)
+    anything = _solve(anywhere, anywhere.basis.spread(powers), loose, known=result.active)
     return Design(problem, white, white_level, within, result, anything)
 
 
@@ -181,21 +190,21 @@ def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
     return replace(problem, basis=lines, densities=(), finer=None)
 
 
-def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
+def _solve(problem: Problem, start: Array, tolerance: float, known: Sequence[Place] = ()) -> ExchangeResult:
     floors = problem.has_floors
     limited = bool(problem.limits or problem.densities)
     if problem.goal == "cost" and limited and not floors:
         # Limits that the cheapest design keeps anyway cost nothing.
         unlimited = replace(problem, limits=(), densities=(), finer=problem)
-        free = exchange(unlimited, start, tolerance=tolerance)
+        free = exchange(unlimited, start, tolerance=tolerance, known=known)
         kept = problem.on(free.basis)
         if excess(kept, candidate_at(kept, free.x, 1.0)) <= _KEEPS:
             no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
             return replace(free, certificate=no_weight)
     if not (floors or problem.side or (problem.goal == "cost" and limited)):
-        return exchange(problem, start, tolerance=tolerance)
+        return exchange(problem, start, tolerance=tolerance, known=known)
     basis, interior = strictly_feasible(problem, start)
-    return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior)
+    return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior, known=known)
 
 
 def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:

@@ -70,7 +70,8 @@ class Problem:
     must be met by M(x) itself. A density limit stands beside a limit on the power of the excitation
     (`design.limits.implied_power`). With `floors_fixed` (goal "factor") lower limits do not scale: the
     least multiple of the upper limits for which they can be met. `finer` is a problem of the same
-    experiment on the same or a larger basis, of whose integrals those of this basis are the head.
+    experiment on the same or a larger basis, of whose integrals those of this basis are the head; `head` is
+    the same problem before its basis grew.
     """
 
     experiment: Experiment
@@ -83,6 +84,7 @@ class Problem:
     side: tuple[Requirement, ...] = ()
     floors_fixed: bool = False
     finer: Problem | None = field(default=None, repr=False)
+    head: Problem | None = field(default=None, repr=False)
 
     @property
     def stated_criterion(self) -> Criterion | None:
@@ -91,7 +93,11 @@ class Problem:
 
     def on(self, basis: Basis) -> Problem:
         """The same problem on another basis, such as one that has grown out of this one."""
-        return self if basis is self.basis else replace(self, basis=basis, finer=None)
+        return self if basis is self.basis else replace(self, basis=basis, finer=None, head=None)
+
+    def grown(self, basis: Basis) -> Problem:
+        """The same problem on a basis that begins with this one."""
+        return replace(self, basis=basis, finer=None, head=replace(self, head=None))
 
     @property
     def scaled(self) -> bool:
@@ -114,7 +120,12 @@ class Problem:
         """(size, k, k): M_i, the information of each basis function."""
         if self.finer is not None:
             return self.finer.information_map[: self.basis.size]
-        return self.basis.integrals(self.experiment.information_density, self.experiment.singularities)
+        experiment, head = self.experiment, self.head
+        basis = self.basis if head is None else self.basis.beyond(head.basis.size)
+        found = basis.integrals(
+            experiment.information_density, experiment.singularities, experiment.information_factor
+        )
+        return found if head is None else np.concatenate([head.information_map, found])
 
     @property
     def baseline_information(self) -> Array:
@@ -185,10 +196,16 @@ class Problem:
 
     def value(self, weight: Array) -> Functional:
         """tr(Y (M(x) - M0)) for a fixed Y = `weight` (k, k) as a functional of the spectrum."""
-        return Functional(
-            np.tensordot(self.information_map, weight, axes=2),
-            lambda w: self.experiment.value_density(weight, w),
-        )
+        known: dict[int, NDArray] = {}
+
+        def density(w: Array) -> NDArray:
+            if w is not self.grid:
+                return self.experiment.value_density(weight, w)
+            if not known:  # asked for again with every share that limits keep of a price
+                known[0] = self.experiment.value_density(weight, w)
+            return known[0]
+
+        return Functional(np.tensordot(self.information_map, weight, axes=2), density)
 
     def density_at(self, place: DensityPlace) -> Functional:
         """v^* Phi v at one frequency as a functional; it has no density over frequency."""

@@ -61,6 +61,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         cost=cost,
         alpha=model_error_alpha(spec, experiment.model),
         tolerance=spec.solver.tolerance,
+        any_spectrum_tolerance=spec.solver.any_spectrum_tolerance,
         most_samples=spec.limits.samples,
         ellipses=spec.report.ellipses,
         grid=grid,
