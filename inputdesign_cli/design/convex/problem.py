@@ -23,7 +23,7 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Functional
@@ -70,8 +70,7 @@ class Problem:
     must be met by M(x) itself. A density limit stands beside a limit on the power of the excitation
     (`design.limits.implied_power`). With `floors_fixed` (goal "factor") lower limits do not scale: the
     least multiple of the upper limits for which they can be met. `finer` is a problem of the same
-    experiment on the same or a larger basis, of whose integrals those of this basis are the head; `head` is
-    the same problem before its basis grew.
+    experiment on the same or a larger basis, of whose integrals those of this basis are the head.
     """
 
     experiment: Experiment
@@ -84,7 +83,7 @@ class Problem:
     side: tuple[Requirement, ...] = ()
     floors_fixed: bool = False
     finer: Problem | None = field(default=None, repr=False)
-    head: Problem | None = field(default=None, repr=False)
+    _before: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @property
     def stated_criterion(self) -> Criterion | None:
@@ -93,11 +92,15 @@ class Problem:
 
     def on(self, basis: Basis) -> Problem:
         """The same problem on another basis, such as one that has grown out of this one."""
-        return self if basis is self.basis else replace(self, basis=basis, finer=None, head=None)
+        return self if basis is self.basis else replace(self, basis=basis, finer=None)
 
     def grown(self, basis: Basis) -> Problem:
-        """The same problem on a basis that begins with this one."""
-        return replace(self, basis=basis, finer=None, head=replace(self, head=None))
+        """The same problem on a basis that begins with this one; what is known of this one is kept."""
+        grown = replace(self, basis=basis, finer=None)
+        grown._before.append(self)
+        _ = grown.information_map, grown.grid, grown.grid_products
+        grown._before.clear()
+        return grown
 
     @property
     def scaled(self) -> bool:
@@ -120,12 +123,12 @@ class Problem:
         """(size, k, k): M_i, the information of each basis function."""
         if self.finer is not None:
             return self.finer.information_map[: self.basis.size]
-        experiment, head = self.experiment, self.head
-        basis = self.basis if head is None else self.basis.beyond(head.basis.size)
+        experiment = self.experiment
+        basis = self.basis.beyond(self._before[0].basis.size) if self._before else self.basis
         found = basis.integrals(
             experiment.information_density, experiment.singularities, experiment.information_factor
         )
-        return found if head is None else np.concatenate([head.information_map, found])
+        return np.concatenate([*(before.information_map for before in self._before), found])
 
     @property
     def baseline_information(self) -> Array:
@@ -202,7 +205,7 @@ class Problem:
             if w is not self.grid:
                 return self.experiment.value_density(weight, w)
             if not known:  # asked for again with every share that limits keep of a price
-                known[0] = self.experiment.value_density(weight, w)
+                known[0] = self.experiment.valued(self.grid_products, weight)
             return known[0]
 
         return Functional(np.tensordot(self.information_map, weight, axes=2), density)
@@ -242,7 +245,14 @@ class Problem:
     @cached_property
     def grid(self) -> Array:
         """Frequencies that see every resonance of the excitation's densities, over its band."""
+        if self._before:
+            return self._before[0].grid
         return graded_grid(self.experiment.singularities, *self.experiment.band)
+
+    @cached_property
+    def grid_products(self) -> WeightedProducts:
+        """The gradients at the frequencies of `grid`."""
+        return self._before[0].grid_products if self._before else self.experiment.products(self.grid)
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[tuple[int, Violation]]:
         """All local maxima of all requirements' ratios, each with the index of its requirement."""
