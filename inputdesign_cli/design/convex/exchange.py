@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inputdesign_cli.accuracy import Cut, Violation
+from inputdesign_cli.compute.watching import Round, tell
 from inputdesign_cli.design.convex.candidate import (
     Candidate,
     Place,
@@ -125,6 +126,7 @@ def exchange(
             rounds += 1
             solved = state.improve(tolerance)
             gaps.append(state.gap)
+            tell(Round(rounds, state.best.objective, state.certificate.bound, len(state.cuts)))
             grows = state.problem.basis.size > stage.basis.size
             patience = _PATIENCE_GROWING if grows else _PATIENCE
             stalled = len(gaps) > patience and gaps[-1] > 0.9 * gaps[-1 - patience]
