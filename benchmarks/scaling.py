@@ -111,7 +111,9 @@ def ours(spec: Spec) -> tuple[Design, Row]:
     started = time.process_time()
     task = build_task(parse_spec(json.dumps(spec)))
     built = time.process_time()
-    design = solve_design(task.question, tolerance=task.tolerance)
+    design = solve_design(
+        task.question, tolerance=task.tolerance, any_spectrum_tolerance=task.any_spectrum_tolerance
+    )
     found, free = design.result, design.any_spectrum
     return design, {
         "k": design.problem.experiment.size,

@@ -84,6 +84,7 @@ class ConvexTask:
     alpha: float
     calibration: Calibration | None
     tolerance: float
+    any_spectrum_tolerance: float
     most_samples: int | None
     ellipses: Pairs | None
     grid: GridMethod | None
@@ -224,7 +225,9 @@ class ConvexTask:
 
     def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
         try:
-            design = solve_design(self.question, tolerance=self.tolerance)
+            design = solve_design(
+                self.question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+            )
         except UnreachableError as unreachable:
             raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
         found = design.result

@@ -13,7 +13,14 @@ import numpy as np
 
 from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
-from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, least_scale, scaled_up
+from inputdesign_cli.design.convex.candidate import (
+    Candidate,
+    Place,
+    candidate_at,
+    excess,
+    least_scale,
+    scaled_up,
+)
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.feasible import strictly_feasible
@@ -81,8 +88,10 @@ class Design:
     any_spectrum: ExchangeResult
 
 
-def solve_design(question: Question, *, tolerance: float) -> Design:
-    """Solve a design problem with its baseline and its bound over every spectrum.
+def solve_design(
+    question: Question, *, tolerance: float, any_spectrum_tolerance: float = _ANY_SPECTRUM_TOLERANCE
+) -> Design:
+    """Solve a design problem with its baseline and its bound over every spectrum, each to its relative gap.
 
     Raises:
         SpecError: `not-identifiable` when no excitation can tell some parameters apart;
@@ -107,9 +116,9 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     result = _without_faint_lines(problem, _solve(problem, start, tolerance))
     if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
-    loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
+    loose = max(tolerance, any_spectrum_tolerance)
     try:
-        anything = _solve(anywhere, anywhere.basis.spread(powers), loose)
+        anything = _solve(anywhere, anywhere.basis.spread(powers), loose, known=result.active)
     except OutOfTimeError:
         raise _stopped(problem, (result.objective, result.certificate.bound)) from None
     return Design(problem, white, white_level, within, result, anything)
@@ -197,13 +206,13 @@ def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
     return replace(problem, basis=lines, densities=(), finer=None)
 
 
-def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
+def _solve(problem: Problem, start: Array, tolerance: float, known: Sequence[Place] = ()) -> ExchangeResult:
     floors = problem.has_floors
     limited = bool(problem.limits or problem.densities)
     if problem.goal == "cost" and limited and not floors:
         # Limits that the cheapest design keeps anyway cost nothing.
         unlimited = replace(problem, limits=(), densities=(), finer=problem)
-        free = exchange(unlimited, start, tolerance=tolerance)
+        free = exchange(unlimited, start, tolerance=tolerance, known=known)
         kept = problem.on(free.basis)
         if excess(kept, candidate_at(kept, free.x, 1.0)) <= _KEEPS:
             no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
@@ -212,7 +221,7 @@ def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
     if floors or problem.side or (problem.goal == "cost" and limited):
         basis, interior = strictly_feasible(problem, start)
     try:
-        return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior)
+        return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior, known=known)
     except OutOfTimeError as ended:
         raise ended if ended.reached is None else _stopped(problem, ended.reached) from None
 

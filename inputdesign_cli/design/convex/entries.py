@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,14 +53,39 @@ class Entries:
         if len(left) >= _TOGETHER and k**4 <= _MOST_PAIRS:
             # pairs[a k + c, b k + d] = sum L_ac R_bd
             pairs = left.reshape(len(left), -1).T @ right.reshape(len(right), -1)
-            at = np.ravel_multi_index
-            first, second = at((i[:, None], i), (k, k)), at((j[:, None], j), (k, k))
-            across, back = at((i[:, None], j), (k, k)), at((j[:, None], i), (k, k))
-            total = pairs[first, second] + pairs[second, first] + pairs[across, back] + pairs[back, across]
+            first, second, third = self._places
+            total = pairs.take(first) + pairs.take(second)
+            mixed = pairs.take(third)
         else:
-            total = np.zeros((i.size, i.size))
+            total, mixed = np.zeros((i.size, i.size)), np.zeros((i.size, i.size))
             for L, R in zip(left, right, strict=True):
-                total += L[i[:, None], i] * R[j[:, None], j] + L[j[:, None], j] * R[i[:, None], i]
-                total += L[i[:, None], j] * R[j[:, None], i] + L[j[:, None], i] * R[i[:, None], j]
-        total *= 0.25 * np.outer(self.scale, self.scale)
-        return 0.5 * (total + total.T)
+                total += self._product(L[i], i, R[j], j)
+                total += self._product(L[j], j, R[i], i)
+                mixed += self._product(L[i], j, R[j], i)
+        total += mixed
+        total += mixed.T
+        total *= self._weights
+        return total
+
+    def _product(self, one: Array, first: NDArray[np.intp], other: Array, second: NDArray[np.intp]) -> Array:
+        """Columns `first` of one times columns `second` of the other, in room that is used again."""
+        left, right = self._room
+        np.take(one, first, axis=1, out=left, mode="clip")
+        np.take(other, second, axis=1, out=right, mode="clip")
+        left *= right
+        return left
+
+    @cached_property
+    def _places(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """Where the pairs (i i', j j'), (j j', i i') and (i j', j i') stand."""
+        i, j, k = self.rows, self.columns, self.order
+        above, below = i[:, None] * k + i, j[:, None] * k + j
+        return above * k**2 + below, below * k**2 + above, (i[:, None] * k + j) * k**2 + j[:, None] * k + i
+
+    @cached_property
+    def _room(self) -> tuple[Array, Array]:
+        return np.empty((self.kept.size,) * 2), np.empty((self.kept.size,) * 2)
+
+    @cached_property
+    def _weights(self) -> Array:
+        return 0.25 * np.outer(self.scale, self.scale)

@@ -8,6 +8,7 @@ one, so that whatever is active has multipliers and slacks of order one.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -143,7 +144,15 @@ def _in_cone(face: Face, y: Array) -> Array:
 
 
 def _congruence(information: Array, *, definite: bool) -> Array:
-    """K with K M K^T = I, or nearly so where M is close to singular."""
+    """K with K M K^T = I, or nearly so where M is close to singular.
+
+    By the Cholesky factor, which leaves apart what M keeps apart.
+    """
+    if definite:
+        with suppress(np.linalg.LinAlgError):
+            factor = np.linalg.cholesky(information)
+            if np.diag(factor).min() ** 2 > _SINGULAR * np.diag(factor).max() ** 2:
+                return np.linalg.inv(factor)
     eigenvalues, vectors = np.linalg.eigh(information)
     floor = (_SINGULAR if definite else _INDEFINITE) * eigenvalues[-1]
     return (vectors / np.sqrt(np.maximum(eigenvalues, floor))).T
