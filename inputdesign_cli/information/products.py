@@ -27,7 +27,7 @@ class WeightedProducts:
     def of(cls, gradient: Callable[[Array], ComplexArray], w: Array) -> WeightedProducts:
         """Of F = `gradient` (n, k, p, r) at frequencies `w`."""
         return cls(
-            [_by_output(gradient(w[start : start + _AT_ONCE])) for start in range(0, w.size, _AT_ONCE)]
+            [_by_output(gradient(w[start : start + _AT_ONCE])) for start in range(0, max(w.size, 1), _AT_ONCE)]
         )
 
     def at(self, weight: Array) -> ComplexArray:
@@ -39,7 +39,7 @@ def _by_output(F: ComplexArray) -> list[tuple[NDArray[np.intp], ComplexArray]]:
     found = []
     for output in range(F.shape[2]):
         rows = F[:, :, output]
-        size = np.abs(rows).max(axis=(0, 2))
+        size = np.abs(rows).max(axis=(0, 2), initial=0.0)
         used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
         found.append((used, np.ascontiguousarray(rows[:, used].swapaxes(1, 2))))
     return found
@@ -49,7 +49,7 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
     n, r, _ = outputs[0][1].shape
     total = np.zeros((n, r, r), dtype=complex)
     for used, rows in outputs:
-        turned = (rows.reshape(-1, used.size) @ weight[np.ix_(used, used)]).reshape(rows.shape)
+        turned = np.tensordot(rows, weight[np.ix_(used, used)], axes=1)
         if r == 1:
             total[:, 0, 0] += np.einsum("nk,nk->n", rows[:, 0].conj(), turned[:, 0])
         else:
