@@ -27,7 +27,10 @@ class WeightedProducts:
     def of(cls, gradient: Callable[[Array], ComplexArray], w: Array) -> WeightedProducts:
         """Of F = `gradient` (n, k, p, r) at frequencies `w`."""
         return cls(
-            [_by_output(gradient(w[start : start + _AT_ONCE])) for start in range(0, max(w.size, 1), _AT_ONCE)]
+            [
+                _by_output(gradient(w[start : start + _AT_ONCE]))
+                for start in range(0, max(w.size, 1), _AT_ONCE)
+            ]
         )
 
     def at(self, weight: Array) -> ComplexArray:

@@ -1,4 +1,4 @@
-"""Weighted products of gradients against their definition, where nothing matters and where nothing is asked."""
+"""Weighted products of gradients against their definition, also of nothing and at no frequency."""
 
 import numpy as np
 import pytest
