@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
@@ -107,9 +107,22 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
 
     Raises:
         SpecError: `not-identifiable`, with the names of parameters that cannot be told apart.
+        InaccurateError: `numerically-singular`: other excitations could, but next to resonances all else is
+            lost to rounding.
     """
     factor, untold = triangular_factor(rows)
     if untold.size:
+        size = np.linalg.norm(rows, axis=1)
+        even = rows[size > 0.0] / size[size > 0.0, None]
+        if len(even) and not triangular_factor(even)[1].size:
+            raise InaccurateError.because(
+                "numerically-singular",
+                f"flat {excitation} does not tell these parameters apart in double precision: "
+                f"{taking_part(names, untold)}",
+                hint="nearly all that it tells stands next to a pole at the unit circle: leave those "
+                "frequencies out, with limits.band and spectrum: {type: multisine, ..}",
+                key="plant",
+            )
         raise bad_spec(
             "not-identifiable",
             f"no {excitation} can tell these parameters apart: {taking_part(names, untold)}",

@@ -27,6 +27,8 @@ _FREE = 1e-3
 _SUPPORT = 1e-3
 # An input with less than this share of the power has none.
 _NOTHING = 1e-9
+# Time constants that an experiment has at least, for its spectrum to tell what it reaches.
+_SETTLED = 2.0
 _KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "accuracy_factor"}
 
 
@@ -243,10 +245,25 @@ def _notes(done: Designed) -> list[str]:
         sources += ["experiment.prior"] if experiment.prior is not None else []
         known = " and ".join(sources) or "the noise"
         return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
-    notes = _left_out(done)
+    notes = _left_out(done) + _too_short(experiment)
     if units.closed_loop and not found.basis.has_density:
         notes += _free_of_charge(done)
     return notes
+
+
+def _too_short(experiment: Experiment) -> list[str]:
+    """Whether the experiment ends before its slowest mode has settled; without a length nothing is said."""
+    if experiment.model.continuous or experiment.samples == 1:
+        return []
+    damping = np.abs(experiment.singularities.imag)
+    slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
+    if slowest * experiment.samples >= _SETTLED:
+        return []
+    return [
+        f"the slowest mode has a time constant of {1.0 / slowest:.2g} samples, the experiment "
+        f"{experiment.samples}: spectra tell what long records reach; believe what the record reaches by its "
+        "own samples, and idesign simulate"
+    ]
 
 
 def _left_out(done: Designed) -> list[str]:
