@@ -90,11 +90,9 @@ class HeldEntry:
     @cached_property
     def entries(self) -> Array:
         """(2 order, 2): how u(k - lag) and u(k - lag - 1) enter the states."""
-        whole, n = self._held[: 2 * self.order, 2 * self.order], self.order
-        late = (
-            self._exponential(self.sample_time - self._fraction)[: 2 * n, 2 * n] if self._fraction else whole
-        )
-        return np.stack([late, whole - late], axis=1)
+        n = 2 * self.order
+        whole, early = self._held[:n, n], self._after_fraction[:n, n]
+        return np.stack([early, whole - early], axis=1)
 
     @property
     def lag(self) -> int:
@@ -129,7 +127,12 @@ class HeldEntry:
     def _pulse(self) -> Array:
         """(order,): how u(k - d - 1) - u(k - d) enters the derivatives of the first states."""
         n = self.order
-        return np.asarray(self.unit * self._exponential(self.sample_time - self._fraction)[:n, n - 1])
+        return np.asarray(self.unit * self._after_fraction[:n, n - 1])
+
+    @cached_property
+    def _after_fraction(self) -> Array:
+        """The exponential over what is left of a sample after the fraction."""
+        return self._exponential(self.sample_time - self._fraction) if self._fraction else self._held
 
     @cached_property
     def gain(self) -> Array:
