@@ -56,6 +56,11 @@ class Experiment(Coordinates):
         return self._source.singularities
 
     @property
+    def memory(self) -> float:
+        """How long, in samples or time units, signals matter beyond what poles remember."""
+        return self._source.memory
+
+    @property
     def _source(self) -> Model | Loop:
         return self.model if self.loop is None else self.loop
 

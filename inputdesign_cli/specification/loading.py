@@ -160,9 +160,9 @@ def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool
     """Whether this follows from what was taken out before.
 
     What was taken out may have told which kind of plant or spectrum this is, so later attempts say nothing
-    about keys: what is missing or too much was said by the first.
+    about keys and names: what is missing or too much was said by the first.
     """
-    if attempt > 0 and found.code in ("unknown-key", "unsuitable-key"):
+    if attempt > 0 and found.code in ("unknown-key", "unsuitable-key", "unknown-name", "unused-parameter"):
         return True
     if found.keys:
         return any(related((*found.path, key), broken) for key in found.keys)

@@ -50,6 +50,9 @@ class NoiseShape(Section):
     C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
     D: StablePerOutput = Field(default=(1.0,), description="Monic, stable denominator in q^-1 (default 1).")
     variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
+    known: Names | None = Field(
+        default=None, description="Names of coefficients of C and D that are known and not estimated."
+    )
 
     def covariance(self, outputs: int) -> np.ndarray:
         """The covariance of e (outputs, outputs); a number stands for that multiple of I, none for I."""

@@ -136,13 +136,21 @@ _MATRIX = Wording(
     "them: [[[0, 1], [0, 2]]]",
 )
 _CONTINUOUS = Wording(f"{_ONE}, or a list of factors, or rows (outputs) of columns (inputs) of coefficients")
-_Coefficients = Annotated[Several[Number], SIZES["coefficients of a numerator"], Wording(_ONE)]
-_Rooted = Annotated[Several[Number], SIZES["coefficients of a denominator"], Wording(_ONE)]
+_Coefficient = Annotated[
+    Number, Wording("a number", "names of parameters stand in a plant with parameters: {K: 2.1}")
+]
+_Coefficients = Annotated[Several[_Coefficient], SIZES["coefficients of a numerator"], Wording(_ONE)]
+_Rooted = Annotated[Several[_Coefficient], SIZES["coefficients of a denominator"], Wording(_ONE)]
 _Monic = Annotated[_Rooted, holds(check_monic)]
 _Stable = Annotated[_Monic, holds(check_delay_stable)]
 _Leading = Annotated[_Rooted, holds(check_leading)]
 _Channels = Annotated[Several[T], SIZES["inputs or outputs"]]
 _Rows = Annotated[_Channels[_Channels[T]], AfterValidator(same_columns)]
+_Grid = Annotated[
+    Annotated[T, tag("0")] | Annotated[_Rows[T], tag("2")],
+    _DEPTH,
+    Wording("a number, or rows (outputs) of columns (inputs) of numbers", "write 25, or [[1, 3], [7, 3]]"),
+]
 _OneOrList = Annotated[Annotated[T, tag("1")] | Annotated[Several[T], tag("2")], _DEPTH]
 _OneOrRows = Annotated[Annotated[T, tag("1")] | Annotated[_Rows[T], tag("3")], _DEPTH]
 
@@ -158,6 +166,10 @@ RowsMatrix = Annotated[
     nested(3, "rows (outputs) of columns (inputs) of coefficients", "write [[[0, 1], [0, 2]]]"),
 ]
 """A matrix of polynomials, never a single one."""
+NumberGrid = _Grid[Number]
+PositiveGrid = _Grid[Positive]
+NonNegativeGrid = _Grid[NonNegative]
+"""One number, or one for each entry of a transfer matrix."""
 ContinuousDenominator = Annotated[
     Annotated[_Leading, tag("1")]
     | Annotated[Several[_Leading], tag("2")]

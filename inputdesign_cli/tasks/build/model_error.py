@@ -162,7 +162,7 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
             hint="use region: first_order, or norm: entry with relative, absolute or table",
             key=f"{_KEY}.region",
         )
-    if not model.is_fraction(*entry):
+    if np.any(model.bends(*entry)):
         named = build_units(spec).entry(*entry) or "G"
         raise spec.complain(
             "not-supported",

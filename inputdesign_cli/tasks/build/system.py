@@ -34,6 +34,7 @@ from inputdesign_cli.specification.models.transfer import DiscreteMatrix, Discre
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.demand import check_model
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.tables import read_columns
 from inputdesign_cli.tasks.build.weights import rational
@@ -43,12 +44,13 @@ def build_model(spec: Spec) -> Model:
     """The model of `plant` and `noise`.
 
     Raises:
-        SpecError: `not-supported` for a regression, and for a plant in s whose noise is not white.
+        SpecError: `not-supported` for a regression, and for a plant in s whose noise is not white; what
+            is wrong with known and with named parameters.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
     match spec.plant:
         case PolynomialPlant() as plant:
-            return polynomial_model(plant, spec.noise, covariance)
+            return reparametrised(spec, plant, polynomial_model(plant, spec.noise, covariance))
         case ContinuousPlant() as plant:
             for name in spec.noise.filters:
                 raise spec.complain(
@@ -63,9 +65,12 @@ def build_model(spec: Spec) -> Model:
                 _reversed(matrix.numerator_matrix),
                 _reversed(matrix.denominator_matrix),
                 covariance,
-                common=depth(matrix.denominator) != 3,
+                common=matrix.common,
+                delay=delays_of(plant),
+                common_delay=matrix.common_delay,
             )
-            return SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
+            model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
+            return reparametrised(spec, plant, model)
     raise spec.complain(
         "not-supported",
         "a regression has no dynamics to be estimated here",
@@ -89,7 +94,8 @@ def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Arra
 def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
     """A plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
     matrix = plant.continuous
-    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, sample_time)
+    rows = (matrix.numerator_matrix, matrix.denominator_matrix)
+    held = hold_entries(*rows, sample_time, matrix.delays)
     B, F = (tuple(tuple(tuple(entry.tolist()) for entry in row) for row in rows) for rows in held)
     return PolynomialPlant.model_construct(A=(1.0,), B=B, F=F)
 
