@@ -277,6 +277,9 @@ def plot(rows: list[Row], path: Path) -> None:
     slow = [statistics.median(float(r["naive_seconds"]) for r in rival if r["k"] == size) for size in k]
     if k:
         axes.loglog(k, slow, "s--", color="0.5", label="naive loop (output error)")
+    ticks = [4, 8, 16, 32, 64, 128]
+    axes.set_xticks(ticks, labels=[str(tick) for tick in ticks])
+    axes.minorticks_off()
     axes.set_xlabel("number of parameters k")
     axes.set_ylabel("processor time [s]")
     axes.legend(fontsize="small")

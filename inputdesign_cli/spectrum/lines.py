@@ -17,7 +17,7 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import best_directions, directed_scale, first_directions, matrices
 
-_FIRST_LINES = 24
+_FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
 _MOST_NEW = 16
 # From so many atoms on, so many of the most power stay.
 _MOST_ATOMS, _KEPT_ATOMS = 320, 200
@@ -55,7 +55,8 @@ class LinesBasis:
     def anywhere(cls, lo: float, hi: float, inputs: int) -> LinesBasis:
         """Free frequencies on [lo, hi], to begin with some spread linearly and logarithmically."""
         low = max(lo, 1e-3 * hi)
-        start = np.concatenate([np.linspace(low, hi, _FIRST_LINES), np.geomspace(low, hi, _FIRST_LINES)])
+        number = int(np.clip(_FIRST_ATOMS // (2 * inputs**2), _FEWEST_LINES, _FIRST_LINES))
+        start = np.concatenate([np.linspace(low, hi, number), np.geomspace(low, hi, number)])
         return replace(cls.at(np.unique(start), inputs), free=True)
 
     @classmethod

@@ -25,6 +25,7 @@ from inputdesign_cli.spectrum import Face, Functional, smat, svec
 _SOLVER_MARGIN = 1e-2
 _SOLVER_FLOOR = 1e-10
 _SINGULAR = 1e-14
+_AT_ONCE = 256  # basis functions
 # Without a requirement that keeps M definite, weak directions are not blown up beyond this.
 _INDEFINITE = 1e-3
 
@@ -97,7 +98,9 @@ def solve_master(
     def turned(information: Array) -> Array:
         return svec(congruence @ information @ congruence.T)
 
-    gains = [worth * (turned(problem.information_map).T @ columns)]
+    maps = problem.information_map
+    parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
+    gains = [worth * (np.concatenate(parts).T @ columns)]
     signs = np.eye(number)[inside:]
     cost = problem.price.vector @ columns
     if problem.scaled:

@@ -59,7 +59,7 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
     def seconds(parameters: int) -> float:
         entries = parameters * (parameters + 1) / 2
         step = inequalities * (_FACTORINGS * parameters**3 + entries**2)
-        step += entries**2 * _UNKNOWNS + entries * _UNKNOWNS**2
+        step += entries**2 * _UNKNOWNS
         return step * _STEPS * _ROUNDS / _PER_SECOND
 
     # What takes less than a second is tried.
