@@ -167,7 +167,8 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
         raise spec.complain(
             "not-supported",
             f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not: it has "
-            "both A and F, or is sampled from s",
+            "both A and F, is sampled from s, has a dead time that is estimated, or expressions that are not "
+            "linear",
             hint="use region: first_order for this structure",
             key=f"{_KEY}.region",
         )
