@@ -120,8 +120,4 @@ def _beside_the_design(found: Mapping[str, Json], signal: Mapping[str, Json]) ->
     more = signal.get("extra_power", 0.0)
     if abs(more) < 5e-5:
         return
-    aside = f"{abs(100 * more):.3g} % {'above' if more > 0 else 'below'} that of the design"
-    if signal.get("worst_ratio", 2.0) <= 1.0 + 1e-6:
-        yield f"the power that they need for the accuracy costs {aside}"
-    else:
-        yield f"their power costs {aside}"
+    yield f"at a cost {abs(100 * more):.3g} % {'above' if more > 0 else 'below'} that of the designed spectrum"
