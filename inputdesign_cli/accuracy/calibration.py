@@ -48,11 +48,11 @@ class Calibration:
         reached = float(np.quantile(largest, self.probability, method="higher"))
         return errors[0].alpha * reached / max(error.worst(information).ratio for error in errors)
 
-    def coverage(self, errors: Sequence[ModelError], information: Array) -> Coverage:
-        """What fresh draws say."""
+    def coverage(self, errors: Sequence[ModelError], information: Array, within: float = 1.0) -> Coverage:
+        """What fresh draws say of r_adm times `within`, what the best accuracy reaches in its place."""
         steps = self._steps(errors, information, fresh=True)
         exact, linear = self._largest(errors, steps), _to_first_order(errors, steps)
-        return Coverage(self.draws, int(np.sum(exact <= 1.0)), int(np.sum(linear <= 1.0)))
+        return Coverage(self.draws, int(np.sum(exact <= within)), int(np.sum(linear <= within)))
 
     def _steps(self, errors: Sequence[ModelError], information: Array, *, fresh: bool) -> Array:
         """(draws, k): theta minus its nominal value, of covariance M^-1."""

@@ -109,9 +109,11 @@ def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse
         return None
     transformed = [_transforms(*record) for record in records]
     for w in _centres(longest):
-        one = _at(w, transformed, window, inputs)
+        one = _at(w, transformed, window, inputs, _PARABOLA)
         if one is not None:
-            found.append((w, *one))
+            G, radius = one
+            straight = _at(w, transformed, window, inputs, _PARABOLA - 1)
+            found.append((w, G, radius + (0.0 if straight is None else _bent(G - straight[0], radius))))
     if not found:
         return None
     w, G, radius = (np.array(values) for values in zip(*found, strict=True))
@@ -135,17 +137,17 @@ def _centres(samples: int) -> Array:
 
 
 def _at(
-    w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int
+    w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int, terms: int
 ) -> tuple[ComplexArray, NDArray[np.float64]] | None:
-    """G (p, r) and its radius at w; None where the inputs do not tell their effects apart."""
+    """G (p, r) and its radius at w, by polynomials of so many terms; None where inputs are not told apart."""
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):
         last = (lines.size - 1) // 2
         first = int(np.clip(np.searchsorted(lines, w) - window // 2, 1, last - window + 1))
         near = slice(first, first + window)
         away = (lines[near] - w) / (window * lines[1])
-        powers = away[:, None] ** np.arange(_PARABOLA)
-        leakage = np.zeros((window, len(transformed), _PARABOLA))
+        powers = away[:, None] ** np.arange(terms)
+        leakage = np.zeros((window, len(transformed), terms))
         leakage[:, number] = powers
         responses = X[near][:, None, :] * powers[:, :, None]
         rows.append(np.concatenate([responses.reshape(window, -1), leakage.reshape(window, -1)], axis=1))
@@ -170,6 +172,11 @@ def _at(
     power = np.sum(np.abs(errors) ** 2, axis=0) / freedom
     spread = np.sum(np.abs(back.T @ inverse[:inputs]) ** 2, axis=1)
     return G, _radius(np.outer(power, spread), freedom)
+
+
+def _bent(apart: ComplexArray, radius: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(p, r): what a parabola may be off where G bends: as much as a line is off it, beyond the noise."""
+    return np.asarray(np.sqrt(np.maximum(np.abs(apart) ** 2 - radius**2, 0.0)))
 
 
 def _radius(variance: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:

@@ -91,7 +91,7 @@ def local_maxima(
         width = (right - left) / (_ZOOM_POINTS + 1)
         left, right = np.maximum(left, best - width), np.minimum(right, best + width)
     for end, inner in ((0, 1), (-1, -2)):
-        level = float(function(grid[[end]])[0])
+        level = float(values[end])
         beside = np.abs(best - grid[end]) < np.abs(grid[inner] - grid[end])
         flat = beside & (np.abs(best_value - level) <= _FLAT * np.abs(best_value))
         best, best_value = np.where(flat, grid[end], best), np.where(flat, level, best_value)

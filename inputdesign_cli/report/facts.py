@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from inputdesign_cli.report.numbers import Fact, listed, shown, spoken
+from inputdesign_cli.report.numbers import Fact, listed, precise, shown, spoken
 from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Json, Result
 
@@ -39,7 +39,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
         yield (
             "confidence",
-            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} simulated estimates meet it",
+            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} estimates drawn by asymptotic "
+            "theory meet it",
             f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
             f"not {error['alpha']:.4g}",
         )
@@ -102,7 +103,9 @@ def _signal(result: Result) -> Iterator[str]:
     if "worst_ratio" in signal:
         error = "worst_ratio" in result.get("model_error", {})
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
-        yield f"{ratio} at most {signal['worst_ratio']:.4g} with these samples"
+        yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples"
+    if "confidence" in signal:
+        yield f"kept by {100 * signal['confidence']['exact']:.1f} % of the estimates"
     if "criterion" in signal:
         yield f"criterion {signal['criterion']:.6g} with these samples"
     yield from _beside_the_design(result.get("objective", {}), signal)
@@ -120,4 +123,5 @@ def _beside_the_design(found: Mapping[str, Json], signal: Mapping[str, Json]) ->
     more = signal.get("extra_power", 0.0)
     if abs(more) < 5e-5:
         return
-    yield f"at a cost {abs(100 * more):.3g} % {'above' if more > 0 else 'below'} that of the designed spectrum"
+    side = "above" if more > 0 else "below"
+    yield f"at a cost {abs(100 * more):.3g} % {side} that of the designed spectrum"

@@ -25,6 +25,11 @@ def shown(value: Json) -> str:
     return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
+def precise(ratio: float) -> str:
+    """A ratio with four digits, but with as many as tell it from one."""
+    return f"{ratio:.7g}" if ratio > 1.0 + 1e-6 and f"{ratio:.4g}" == "1" else f"{ratio:.4g}"
+
+
 def listed(values: Json) -> str:
     """A number, or one for each channel, with four digits."""
     return " ".join(f"{value:.4g}" for value in (values if isinstance(values, list | tuple) else [values]))

@@ -125,10 +125,10 @@ def _accuracy(spec: Spec) -> list[str]:
         if error.band is not None:
             low, high = error.band
             band += f" from {low:g} to {high:.6g} rad/{spec.time_unit}"
-        sentences.append(
-            f"At {band}, the error r_u of the model ({size}) must not exceed the admissible error r_adm: "
-            f"{bound}."
-        )
+        what = f"the error r_u of the model ({size})"
+        if error.calibrated is not None:
+            what = f"the error of {100 * (error.calibrated.exact or 0):g} % of the estimates"
+        sentences.append(f"At {band}, {what} must not exceed the admissible error r_adm: {bound}.")
     others = {
         "information": "The information matrix must exceed a given matrix.",
         "application": "The confidence region of the model must lie where the application tolerates it.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from pathlib import Path
 
@@ -27,7 +28,9 @@ def load_result(directory: Path) -> dict[str, Json]:
         DataError: `run-missing`, `run-unreadable`.
     """
     try:
-        result = json.loads(read_regular(directory / RESULT).decode("utf-8"))
+        result = json.loads(
+            read_regular(directory / RESULT).decode("utf-8"), parse_float=_finite, parse_constant=_finite
+        )
     except (FileNotFoundError, NotADirectoryError):
         message = f"{directory} holds no finished run: there is no {RESULT} in it"
         hint = "write one with `idesign solve SPEC -o DIR`"
@@ -72,6 +75,13 @@ def unreadable(file: Path, why: str) -> DataError:
     """The error about a record that cannot be used."""
     message = f"{file} cannot be read as the result of a run: {why}"
     return DataError.because("run-unreadable", message, hint="run the spec again")
+
+
+def _finite(text: str) -> float:
+    """A number of a result; idesign writes no other."""
+    if not math.isfinite(value := float(text)):
+        raise ValueError(f"{text} is no finite number")
+    return value
 
 
 def _is_plain(name: Json) -> bool:

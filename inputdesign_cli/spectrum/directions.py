@@ -75,12 +75,14 @@ def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
             quotient = value / price
         # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
         return np.where(price > 0, quotient, -np.inf), np.ones((price.size, 1), dtype=complex)
-    r = price.shape[-1]
-    P = price + _SINGULAR * np.eye(r) * np.einsum("naa->na", price).real.max(axis=0, initial=0.0)
+    size = np.einsum("naa->n", price).real
+    free = size <= 0.0
+    P = price + (_SINGULAR * size + free)[:, None, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))
     ratios, vectors = np.linalg.eigh(inverse @ value @ inverse.conj().swapaxes(1, 2))
     directions = (inverse.conj().swapaxes(1, 2) @ vectors[..., -1:])[..., 0]
-    return ratios[:, -1], directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    return np.where(free, -np.inf, ratios[:, -1]), directions / length
 
 
 def directed_scale(

@@ -9,7 +9,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage
-from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
@@ -17,6 +17,7 @@ from inputdesign_cli.runs.results import Json
 SETTLED = 1e-3
 _MOST_ROUNDS = 15
 _STEP = 2.0  # the most that one round changes alpha by
+_SMALLER = 0.02
 
 
 @dataclass(frozen=True)
@@ -68,21 +69,27 @@ def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:
     return [requirement for requirement in requirements if isinstance(requirement, ModelError)]
 
 
-def settled_alpha(needed: Callable[[float], float], start: float) -> float:
+def settled_alpha(needed: Callable[[float], float | None], start: float) -> float:
     """The alpha whose design needs just that alpha.
 
     A design for a larger alpha is more accurate, and needs a smaller one: log(needed / alpha) falls, and the
     secant method in log(alpha) finds its root.
 
     Args:
-        needed: the calibrated alpha of the design for an alpha.
+        needed: the calibrated alpha of the design for an alpha; None where the limits leave no such design.
 
     Raises:
+        InfeasibleError: no alpha was found whose design keeps within the limits.
         InaccurateError: `confidence-not-settled`.
     """
-    x, before = np.log(start), None
+    x, before, missing, refused = np.log(start), None, np.nan, False
     for _ in range(_MOST_ROUNDS):
-        missing = float(np.log(needed(float(np.exp(x)))) - x)
+        told = needed(float(np.exp(x)))
+        if told is None:
+            refused, before = True, None
+            x -= _SMALLER
+            continue
+        missing = float(np.log(told) - x)
         if abs(missing) <= SETTLED:
             return float(np.exp(x))
         step = missing
@@ -90,6 +97,14 @@ def settled_alpha(needed: Callable[[float], float], start: float) -> float:
             step = -missing / slope
         before = (x, missing)
         x += float(np.clip(step, -np.log(_STEP), np.log(_STEP)))
+    if refused:
+        raise InfeasibleError.because(
+            "infeasible",
+            "no design within the limits was found that keeps the exact confidence; that there is none is "
+            "not proved",
+            hint="loosen the limits, or ask for confidence: 0.95, of which infeasible tells what is proved",
+            key="limits",
+        )
     raise InaccurateError.because(
         "confidence-not-settled",
         f"no alpha was found for which a design keeps the confidence asked for: after {_MOST_ROUNDS} "

@@ -190,17 +190,27 @@ class ConvexTask:
             return self._designed(Confidence(self.alpha, self.alpha))
         calibration, found = self.calibration, dict[float, tuple[Designed, dict[str, Json]]]()
 
-        def needed(alpha: float) -> float:
+        def needed(alpha: float) -> float | None:
             at = replace(self, question=self.question.at_alpha(alpha))
-            found[alpha] = at._designed(Confidence(alpha, self.alpha))
+            try:
+                found[alpha] = at._designed(Confidence(alpha, self.alpha))
+            except InfeasibleError:  # a smaller alpha may do
+                return None
             done = found[alpha][0]
             return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
 
         alpha = settled_alpha(needed, self._first_alpha(calibration))
         done, how = found[alpha]
-        coverage = calibration.coverage(bounded_errors(done.problem.requirements), done.information)
+        errors = bounded_errors(done.problem.requirements)
+        coverage = calibration.coverage(errors, done.information, self._reached(errors, done.information))
         confidence = Confidence(alpha, self.alpha, calibration.probability, coverage)
         return replace(done, confidence=confidence), {**how, "designs": len(found)}
+
+    def _reached(self, errors: Sequence[ModelError], information: Array) -> float:
+        """What r_adm is multiplied by: where the best accuracy is sought, the ratio that was reached."""
+        if self.question.goal != "factor":
+            return 1.0
+        return max(error.worst(information).ratio for error in errors)
 
     def _first_alpha(self, calibration: Calibration) -> float:
         """That of white excitation where the least cost is sought, lest the first design be out of reach."""
@@ -305,7 +315,8 @@ class ConvexTask:
         )
         known = self._known(done, record)
         if self.calibration is not None and known is not None:
-            coverage = self.calibration.coverage(bounded_errors(done.problem.requirements), known)
+            errors = bounded_errors(done.problem.requirements)
+            coverage = self.calibration.coverage(errors, known, self._reached(errors, known))
             entry["confidence"] = covered(coverage)
         return entry | made.entry
 

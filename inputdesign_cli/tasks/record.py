@@ -212,7 +212,7 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
         )
     elif not record.met:
         notes.append(
-            f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.4g}; the limits on the "
+            f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; the limits on the "
             "powers, the level asked for or its length leave no room: a little more power or a few more "
             "samples would do"
         )

@@ -29,6 +29,7 @@ from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal.settings import LEVELLED, Method
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.simulation import (
+    confidence_notes,
     covariance_in_theory,
     fractions,
     gap_notes,
@@ -151,7 +152,7 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
             shown = disturbance(units, true.loop, tried.trials.first)
             tables[f"disturbance_{name}"], curves[f"disturbance_{name}"] = shown
     result["simulation"] = study_entry(study, inputs, excitation="new" if plan.renewed else "record")
-    notes = gap_notes(units, inputs)
+    notes = [*gap_notes(units, inputs), *confidence_notes(result, inputs)]
     if notes:
         result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.cli import app
-from inputdesign_cli.errors import InaccurateError, SpecError
+from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.tasks.build.task import build_task
 from inputdesign_cli.tasks.confidence import settled_alpha
 
@@ -103,6 +103,7 @@ def test_it_says_when_there_is_none():
     ("confidence", "code"),
     [
         ("{exact: 1.2}", "out-of-range"),
+        ("{exact: 0.99, draws: 100}", "out-of-range"),
         ("{exact: 0.9, draws: 1.0e9}", "too-large"),
         ("{draws: 10}", "missing-key"),
         ("{exact: 0.9, ellipsoid: 0.9}", "conflicting-keys"),
@@ -133,3 +134,20 @@ simulation: {runs: 2000, seed: 3}
 """
     study = simulate(spec(text)).result["simulation"]["inputs"]["design"]
     assert study["within_r_adm"] == pytest.approx(0.95, abs=0.015)
+
+
+def test_a_limit_that_leaves_just_enough_is_no_conflict():
+    free = solve(spec(FIR, FEW)).result["power"]["input"][0]
+    within = solve(spec(FIR, FEW, f"limits={{input_power: {1.002 * free!r}}}")).result
+    assert within["power"]["input"][0] == pytest.approx(free, rel=2e-3)
+    with pytest.raises(InfeasibleError, match="that there is none is not proved") as caught:
+        solve(spec(FIR, FEW, f"limits={{input_power: {0.9 * free!r}}}"))
+    assert caught.value.diagnostics[0].code == "infeasible"
+
+
+def test_of_the_best_accuracy_it_tells_what_is_kept_there():
+    best = ["objective=best_accuracy", "limits={input_power: 0.01}"]
+    told = solve(spec(FIR, FEW, *best)).result
+    assert told["objective"]["value"] > 1.1
+    assert told["model_error"]["confidence"]["exact"] == pytest.approx(0.95, abs=0.03)
+    assert told["signal"]["confidence"]["exact"] == pytest.approx(0.95, abs=0.03)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
@@ -31,6 +32,8 @@ from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import Controller, DiscreteTransfer, Transfer
 
 DEFAULT_CONFIDENCE = 0.95
+# Draws that lie on the rarer side.
+_LEAST_TELLING = 4
 _PROBABILITY = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 _NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
 
@@ -85,8 +88,13 @@ class Confidence(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """One probability is given."""
+        """One probability is given, and draws that tell it."""
         yield from self.exactly_one("ellipsoid", "exact")
+        rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
+        if self.draws * rare < _LEAST_TELLING - 1e-9:
+            message = f"{{key}} is {self.draws}: too few to tell a probability of {self.exact:g}"
+            least = math.ceil(_LEAST_TELLING / rare - 1e-9)
+            yield PathDiagnostic("out-of-range", message, f"write {least} or more", ("draws",))
 
 
 class ModelError(Section):

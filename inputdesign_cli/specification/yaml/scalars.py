@@ -53,7 +53,8 @@ def why_not_number(word: str) -> tuple[str, str, str]:
         return (
             "not-a-number",
             f"must be a number without leading zeros, not {quoted}",
-            f"some programs read {quoted} as an octal number; write {plain}",
+            f"some programs read {quoted} as an octal number; write {plain}, or 0.{text} if a decimal comma "
+            "was meant: a comma begins the next number",
         )
     if NUMBER.fullmatch(text):
         value = float(text)

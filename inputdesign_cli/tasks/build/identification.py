@@ -17,7 +17,7 @@ from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
-from inputdesign_cli.tasks.build.prior import build_earlier
+from inputdesign_cli.tasks.build.prior import build_earlier, stated_prior
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
 from inputdesign_cli.tasks.confidence import Confidence
@@ -39,6 +39,9 @@ def build_identification(spec: Spec) -> Identification:
             key="plant",
         )
     nominal = build_model(spec)
+    stated = stated_prior(spec)
+    if stated is not None:
+        stated.over(spec, nominal.names)  # says what does not fit before any data are read
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(
         header=build_header(spec),

@@ -106,6 +106,14 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
             "count on noise that vanishes or never fades; take more data, or a lower order"
         )
     notes += refutations(model, estimate)
+    unexplained = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
+    if unexplained:
+        single = len(estimate.noise) == 1
+        outputs = " and ".join("y" if single else f"y{i + 1}" for i in unexplained)
+        notes.append(
+            f"the inputs explain nothing of {outputs} in this model: see whether the columns are those of "
+            "the plant, in their order and their units, before anything is built on it"
+        )
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
     if vague:

@@ -105,6 +105,20 @@ def covariance_in_theory(information: Array) -> Array:
     return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
 
 
+def confidence_notes(result: Mapping[str, Json], inputs: Mapping[str, Json]) -> list[str]:
+    """Whether the runs keep less than the exact confidence that was asked for."""
+    asked = result.get("model_error", {}).get("confidence", {}).get("asked")
+    entry = inputs.get("design", {})
+    limits = entry.get("within_r_adm_limits")
+    if asked is None or limits is None or "on_design_model" in entry or limits[1] >= asked:
+        return []
+    return [
+        f"{100 * entry['within_r_adm']:.1f} % of the runs stay within r_adm, where exact: {asked:g} was "
+        "asked for: estimates of records this short scatter more than the asymptotic theory that sizes r_u; "
+        "ask for a little more, or take more samples"
+    ]
+
+
 def gap_notes(units: Units, inputs: Mapping[str, Json]) -> list[str]:
     """The gap between what the design predicts on its own model and what the true system gives."""
     for name, entry in inputs.items():
