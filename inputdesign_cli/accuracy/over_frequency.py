@@ -68,7 +68,9 @@ class OverFrequency(Requirement):
 
     def concerned(self, G: ComplexArray) -> ComplexArray:
         """The entry (n, 1) of G (n, p, r), or all of them (n, p r)."""
-        return G.reshape(len(G), -1) if self.entry is None else G[:, self.entry[0], self.entry[1], None]
+        if self.entry is None:
+            return G.reshape(len(G), G.shape[1] * G.shape[2])
+        return G[:, self.entry[0], self.entry[1], None]
 
     def nominal_size(self, w: ArrayLike) -> Array:
         """|G| (n,) of the entry, or the Frobenius norm."""

@@ -52,7 +52,7 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
     n, r, _ = outputs[0][1].shape
     total = np.zeros((n, r, r), dtype=complex)
     for used, rows in outputs:
-        turned = np.tensordot(rows, weight[np.ix_(used, used)], axes=1)
+        turned = rows @ weight[np.ix_(used, used)]
         if r == 1:
             total[:, 0, 0] += np.einsum("nk,nk->n", rows[:, 0].conj(), turned[:, 0])
         else:

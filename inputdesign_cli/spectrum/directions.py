@@ -13,6 +13,8 @@ from inputdesign_cli.spectrum.basis import Density, Factor, Functional
 
 _NODES_AT_ONCE = 256
 _SINGULAR = 1e-13
+# A price below this is none: its inverse would leave the range of double precision.
+_NOTHING = 1e-140
 _ROUNDING = 1e-15
 
 
@@ -76,7 +78,7 @@ def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
         # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
         return np.where(price > 0, quotient, -np.inf), np.ones((price.size, 1), dtype=complex)
     size = np.einsum("naa->n", price).real
-    free = size <= 0.0
+    free = size <= _NOTHING
     P = price + (_SINGULAR * size + free)[:, None, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))
     ratios, vectors = np.linalg.eigh(inverse @ value @ inverse.conj().swapaxes(1, 2))

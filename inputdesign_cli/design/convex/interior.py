@@ -81,7 +81,7 @@ def follow_path(
             if error <= tolerance or iteration - kept > patience or not np.isfinite(error):
                 break
             up, down = _step(q, v, direct, through, gains, gap, degree)
-        except np.linalg.LinAlgError:
+        except (np.linalg.LinAlgError, FloatingPointError):  # beyond what double precision holds
             break
         v = v + up[0] * up[1]
         for cone in cones:

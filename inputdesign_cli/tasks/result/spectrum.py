@@ -33,11 +33,11 @@ def axis(lo: float, hi: float, extra: Array) -> Array:
 
 
 def distinct(w: Array, highest: float) -> Array:
-    """One frequency for each cluster within a thousandth: the exchange visits an optimum several times.
+    """One frequency for each cluster within 0.3 %: the exchange visits an optimum several times.
 
     Below a millionth of the `highest` of the band, the first stands for all.
     """
-    return _apart(w, 1e-3, 1e-6 * highest)
+    return _apart(w, 3e-3, 1e-6 * highest)
 
 
 def _apart(w: Array, relative: float, absolute: float) -> Array:
