@@ -20,7 +20,7 @@ from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
-from inputdesign_cli.tasks.build.data import Deviations
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import Identification, identification_results, identified, told
 from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.refutations import refutations, unsettled
@@ -50,7 +50,7 @@ class Assessment:
         return self.verdict == "met"
 
 
-def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Assessment:
+def assess(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Assessment:
     """Identify the model from real experiments and compare what the data buy with what is asked.
 
     Both sides are evaluated at the new estimate: r_u by the information of the data themselves, r_adm by the
@@ -70,7 +70,7 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
             key="accuracy",
         )
     started = time.perf_counter()
-    found = identified(task, paths, deviations)
+    found = identified(task, paths, preparation)
     identification = identification_results(task, found, started)
     listed: list[dict[str, Json]] = []
     if found.question is not None:

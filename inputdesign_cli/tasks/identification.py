@@ -15,7 +15,8 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
-from inputdesign_cli.tasks.build.data import Data, Deviations, blaming_columns, read_data
+from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
 from inputdesign_cli.tasks.result.estimates import estimate_result, identification_notes, model_text
 
@@ -72,15 +73,15 @@ class Identified:
     unasked: str = ""
 
 
-def identified(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Identified:
+def identified(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Identified:
     """The estimate from the data in `paths`, jointly; the nominal parameters are one of the starts.
 
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
     """
     units, nominal = task.header.units, task.nominal
-    known = {**task.operating_point, **deviations.operating_point}
-    data = read_data(paths, units, replace(deviations, operating_point=known))
+    known = {**task.operating_point, **preparation.operating_point}
+    data = read_data(paths, units, replace(preparation, operating_point=known))
     with blaming_columns(paths[0]):
         estimate = estimate_model(
             nominal,
@@ -128,11 +129,11 @@ def identification_results(task: Identification, found: Identified, started: flo
     return Results(result, header.resolved_spec, header.units.time_unit, tables, curves, files)
 
 
-def identify(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Results:
+def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:
     """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
 
     Raises:
         DataError: see `identified`.
     """
     started = time.perf_counter()
-    return identification_results(task, identified(task, paths, deviations), started)
+    return identification_results(task, identified(task, paths, preparation), started)
