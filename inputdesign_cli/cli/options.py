@@ -115,6 +115,9 @@ def _into(default: str) -> Any:
 
 Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]
 EstimateOutput = Annotated[Path | None, _into("runs/DATA_identified, without the ending of the file")]
+ExplorationOutput = Annotated[
+    Path | None, _into("runs/DATA_explored, or runs/DATA_validated, without the ending of the file")
+]
 VerdictOutput = Annotated[Path | None, _into("runs/DATA_assessed, without the ending of the file")]
 SweepOutput = Annotated[Path | None, _into("runs/SPEC-sweep, without the ending of the file")]
 NoOutput = Annotated[

@@ -181,6 +181,38 @@ class ResidualCurves(Curves):
 
 
 @dataclass(frozen=True)
+class ResponsePanel:
+    """An entry of G over `frequency` (n,): of a model and, where the inputs have power, without a structure.
+
+    Standard deviations are of |G|; `measured` is at `measured_at` (m,).
+    """
+
+    frequency: Array
+    response: NDArray[np.complex128]
+    deviation: Array
+    measured_at: Array
+    measured: NDArray[np.complex128]
+    measured_deviation: Array
+    entry: tuple[int, int] | None = None  # as in `BoundPanel`
+
+
+@dataclass(frozen=True)
+class ResponseCurves(Curves):
+    """The frequency response of a model before that of the data alone, entry by entry."""
+
+    panels: tuple[ResponsePanel, ...]
+
+
+@dataclass(frozen=True)
+class OrderCurves(Curves):
+    """How well structures simulate data that they have not seen: per family the fit over the parameters."""
+
+    fits: Mapping[str, tuple[Array, Array]]  # family -> numbers of parameters, per cent
+    chosen: tuple[float, float]
+    output: int | None = None  # from zero; None: the only one
+
+
+@dataclass(frozen=True)
 class SignalCurves(Curves):
     """The record to be applied: `time` (n,), one array (n,) a channel."""
 

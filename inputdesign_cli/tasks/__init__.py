@@ -14,10 +14,13 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
+from inputdesign_cli.tasks.build.exploration import model_to_judge
 from inputdesign_cli.tasks.build.given import build_given
+from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
 
 Files = str | Path | Sequence[str | Path]
@@ -113,6 +116,25 @@ def assess(
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
         return assess_records(build_identification(spec), _paths(data), known)
+
+
+def explore(data: Files, preparation: Preparation | None = None, *, model: Spec | None = None) -> Exploration:
+    """Find a model in a log, without a spec; or judge a given model by it.
+
+    Args:
+        data: a data file, or several of the same experiment.
+        preparation: which column is which, and what to do to the record before.
+        model: to judge, as a spec (`load_spec(.., design=False)`).
+
+    Raises:
+        SpecError: the model cannot be judged.
+        DataError: the log cannot be used, or tells no model at all.
+    """
+    prepared = preparation or Preparation()
+    if model is None:
+        return explore_log(_paths(data), prepared)
+    with _placed(model):
+        return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
 
 
 def _paths(data: Files) -> list[Path]:

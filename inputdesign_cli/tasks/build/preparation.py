@@ -22,6 +22,8 @@ _GAP, _LONG_GAP = 1.5, 3.0
 _SHORTEST = 10
 # Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
 _OUTLYING = 8.0
+# More of them than this share are no outliers, but the other level of the signal.
+_OFTEN = 0.05
 _SHOWN = 5
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
@@ -130,7 +132,7 @@ def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     if spread <= 0.0:
         return []
     found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
-    if not found.size:
+    if not found.size or found.size > _OFTEN * x.size:
         return []
     listed = ", ".join(str(rows[i]) for i in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
     return [

@@ -1,0 +1,137 @@
+"""A log -> a model, what speaks for and against it, and a spec for the next experiment; or a verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.identification.explore import (
+    Found,
+    answers_output,
+    explore_records,
+    fits,
+    frequency_response,
+    order_of_excitation,
+)
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.units import Header
+from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
+from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
+from inputdesign_cli.tasks.build.log import read_logs
+from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
+from inputdesign_cli.tasks.result.exploration import (
+    exploration_entry,
+    exploration_notes,
+    response_curves,
+    structure_curves,
+    validation_curves,
+    validation_entry,
+)
+
+# A simulation that explains less than this of data it has not seen is no model.
+_LEAST_FIT = 5.0
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """The results, and why no model deserves trust; nothing where one does."""
+
+    results: Results
+    reasons: tuple[str, ...] = ()
+
+
+def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
+    """Find a model of the plant that a log is of.
+
+    Raises:
+        DataError: the log cannot be read, or tells no model at all.
+    """
+    started = time.perf_counter()
+    log = read_logs(paths, preparation)
+    loops = answers_output(log.parts)
+    with blaming_columns(paths[0]):
+        found = explore_records(log.parts, feedback=bool(loops))
+    reasons = _reasons(found)
+    text = spec_text(log, found, paths)
+    task = build_explored(text)
+    u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
+    lengths = tuple(len(part) for _, part in found.used)
+    notes = exploration_notes(log, found, loops, order_of_excitation(log.parts))
+    data = Data(u, y, lengths, (*log.steps, *notes, *(f"no trust: {reason}" for reason in reasons)))
+    identified = _asked(task, Identified(found.estimate, found.model, data, None))
+    results = identification_results(task, identified, started)
+    units = task.header.units
+    response = response_curves(units, found, frequency_response(log.parts))
+    orders = structure_curves(found)
+    result = {
+        **results.result,
+        "title": f"What {' and '.join(path.name for path in paths)} tells",
+        "exploration": exploration_entry(log, found, loops, reasons),
+        "validation": validation_entry(found.validation),
+    }
+    head = f"sample_time: {log.step!r}\ntime_unit: {log.time_unit}\n".encode()
+    files = {**results.files, "model.yaml": head + results.files["model.yaml"]}
+    complete = replace(
+        results,
+        result=result,
+        resolved_spec=text,
+        tables={**results.tables, "response": response[0]},
+        curves={**results.curves, "response": response[1], **orders},
+        files=files,
+    )
+    return Exploration(complete, reasons)
+
+
+def _asked(task: Identification, identified: Identified) -> Identified:
+    """With what the spec asks at the estimate, where it can be asked."""
+    try:
+        question = task.at(identified.model, len(identified.data.y), "the estimate")
+    except IdesignError as error:
+        return replace(identified, unasked=told(error))
+    return replace(identified, question=question)
+
+
+def _reasons(found: Found) -> tuple[str, ...]:
+    """Why nothing that was found deserves trust."""
+    single = found.model.outputs == 1
+    return tuple(
+        f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in data that it has not "
+        "seen: the inputs hardly act on it, or the record is too short or too noisy to tell how"
+        for i, fit in enumerate(found.validation.simulation)
+        if fit < _LEAST_FIT
+    )
+
+
+def judge(
+    model: PolynomialModel, header: Header, paths: Sequence[Path], preparation: Preparation
+) -> Exploration:
+    """How a given model does on other data.
+
+    Raises:
+        DataError: the data cannot be used.
+    """
+    started = time.perf_counter()
+    data = read_data(paths, header.units, preparation)
+    at = np.cumsum(data.lengths)[:-1]
+    parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
+    found = fits(model, parts)
+    table, curves = validation_curves(header.units, data.u, data.y, found)
+    result: dict[str, Json] = {
+        "format": 1,
+        "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
+        "status": "validated",
+        "samples": len(data.y),
+        "validation": validation_entry(found),
+        "notes": list(data.notes),
+        "timing_s": {"validation": time.perf_counter() - started},
+    }
+    return Exploration(
+        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves})
+    )
