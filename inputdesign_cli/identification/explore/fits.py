@@ -38,18 +38,30 @@ class Fits:
 
 def fits(model: PolynomialModel, parts: Parts) -> Fits:
     """The fits of a model to records u (n, r), y (n, p)."""
-    centred = [(u - u.mean(axis=0), y) for u, y in parts]
-    measured = np.concatenate([y for _, y in parts])
-    varying = np.concatenate([y - y.mean(axis=0) for _, y in parts])
-    simulated = np.concatenate([simulate_free(model, *part) for part in centred])
+    measured, varying, simulated = _simulated(model, parts)
     structure = Structure.of(model)
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-        errors = np.concatenate([_prediction_errors(structure, model.theta, u, y) for u, y in centred])
+        errors = np.concatenate([_prediction_errors(structure, model.theta, u, y) for u, y in parts])
     return Fits(percent(measured - simulated, varying), percent(errors, varying), simulated, errors)
 
 
+def simulation_fit(model: PolynomialModel, parts: Parts) -> tuple[float, ...]:
+    """The first of them alone."""
+    measured, varying, simulated = _simulated(model, parts)
+    return percent(measured - simulated, varying)
+
+
+def _simulated(model: PolynomialModel, parts: Parts) -> tuple[Array, Array, Array]:
+    """(N, p) each: the outputs, what of them varies in each record, and the simulations."""
+    return (
+        np.concatenate([y for _, y in parts]),
+        np.concatenate([y - y.mean(axis=0) for _, y in parts]),
+        np.concatenate([simulate_free(model, u - u.mean(axis=0), y) for u, y in parts]),
+    )
+
+
 def _prediction_errors(structure: Structure, theta: Array, u: Array, y: Array) -> Array:
-    record = PolynomialRecord(structure, u, y - y.mean(axis=0))
+    record = PolynomialRecord(structure, u - u.mean(axis=0), y - y.mean(axis=0))
     return Records((record,), free=True).at(theta).errors
 
 

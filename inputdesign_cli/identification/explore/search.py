@@ -14,10 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.explore.fits import Parts, fits
+from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
+from inputdesign_cli.identification.estimate import noise_of
+from inputdesign_cli.identification.explore.fits import Parts, fits, simulation_fit
 from inputdesign_cli.identification.explore.orders import Orders, arx, box_jenkins, plant_order
 from inputdesign_cli.identification.explore.regression import arx_grid, best_delays, from_rest, output_error
+from inputdesign_cli.identification.polynomial_record import PolynomialRecord
 from inputdesign_cli.identification.polynomials import identify_polynomials
+from inputdesign_cli.identification.records import Records, centred
+from inputdesign_cli.identification.search import search
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.polynomial import Array
 
@@ -146,44 +151,50 @@ def _candidate(
     orders: Orders, resting: Parts, first: Parts, second: Parts, feedback: bool
 ) -> Candidate | None:
     """A structure, quickly estimated from records that begin at rest, and judged."""
-    return _judged(orders, resting, first, second, None, feedback=feedback, rest=True)
+    u, y = (np.concatenate(signals) for signals in zip(*resting, strict=True))
+    lengths = [len(part) for _, part in resting]
+    try:
+        found = identify_polynomials(orders.model(), u, y, feedback=feedback, lengths=lengths, rest=True)
+    except (SpecError, np.linalg.LinAlgError):
+        return None
+    return _judged(orders, found.theta, found.noise, found.failed, found.converged, first, second)
 
 
 def _refined(candidate: Candidate, first: Parts, second: Parts, feedback: bool) -> Candidate | None:
-    """The same, levels and starts estimated along."""
-    return _judged(candidate.orders, first, first, second, candidate.theta, feedback=feedback, rest=False)
+    """The same, levels and starts estimated along: the search goes on from where it ended."""
+    structure = Structure.of(candidate.orders.model())
+    records = Records(tuple(PolynomialRecord(structure, *part) for part in centred(first)), free=True)
+    try:
+        found = search(records, candidate.theta[None], starts=1)
+        tests = failed(score_tests(records, found.point, recent=structure.memory, feedback=feedback))
+    except (SpecError, np.linalg.LinAlgError):
+        return None
+    noise = noise_of(found.point, structure.own())
+    return _judged(candidate.orders, found.point.theta, noise, tests, found.converged, first, second)
 
 
 def _judged(
     orders: Orders,
-    records: Parts,
+    theta: Array,
+    noise: Array,
+    tests: Sequence[ScoreTest],
+    converged: bool,
     first: Parts,
     second: Parts,
-    start: Array | None,
-    *,
-    feedback: bool,
-    rest: bool,
-) -> Candidate | None:
-    """A structure, estimated from `records`; None where these do not determine it."""
-    u, y = (np.concatenate(signals) for signals in zip(*records, strict=True))
-    model = orders.model()
-    lengths = [len(part) for _, part in records]
-    try:
-        found = identify_polynomials(model, u, y, start=start, feedback=feedback, lengths=lengths, rest=rest)
-    except (SpecError, np.linalg.LinAlgError):
-        return None
-    fitted = model.at(found.theta, found.noise)
+) -> Candidate:
+    fitted = orders.model().at(theta, noise)
     on_first, on_second = fits(fitted, first), fits(fitted, second)
+    samples = sum(len(y) for _, y in first)
     return Candidate(
         orders,
-        found.theta,
+        theta,
         on_first.simulation[0],
         on_second.simulation[0] if all(fitted.stable_outputs) else -np.inf,
         on_second.prediction[0],
-        float(np.log(max(found.noise[0, 0], 1e-300)) + orders.size * np.log(len(y)) / len(y)),
-        tuple(test.name for test in found.failed),
-        orders.a > 0 and bool(found.failed),
-        found.converged,
+        float(np.log(max(noise[0, 0], 1e-300)) + orders.size * np.log(samples) / samples),
+        tuple(test.name for test in tests),
+        orders.a > 0 and bool(tests),
+        converged,
     )
 
 
@@ -196,7 +207,7 @@ def _best_arx(first: Parts, second: Parts, delays: tuple[int, ...], r: int, samp
         if np.all(np.isfinite(theta)) and Structure.of(orders.model()).size == theta.size:
             model = orders.model().at(theta)
             if all(model.stable_outputs):
-                ranked.append((fits(model, second).simulation[0], orders))
+                ranked.append((simulation_fit(model, second)[0], orders))
     ranked.sort(key=lambda pair: -pair[0])
     return (orders for _, orders in ranked[:_ARX_KEPT])
 
