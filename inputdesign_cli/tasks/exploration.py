@@ -23,7 +23,8 @@ from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
-from inputdesign_cli.tasks.build.log import read_logs
+from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.log import channels_by_name, read_logs
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
 from inputdesign_cli.tasks.result.exploration import (
@@ -118,6 +119,11 @@ def judge(
         DataError: the data cannot be used.
     """
     started = time.perf_counter()
+    if not preparation.columns:
+        found_columns = channels_by_name(read_sheet(paths[0], key=""))
+        counts = {"u": header.units.inputs, "y": header.units.outputs}
+        own = {name: c for name, c in found_columns.items() if int(name[1:]) <= counts[name[0]]}
+        preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))

@@ -12,7 +12,6 @@ from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.specification import load_spec, parse_spec
 from inputdesign_cli.tasks import explore, solve
-from inputdesign_cli.tasks.build.preparation import Preparation
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
 
@@ -52,14 +51,11 @@ def test_the_model_is_judged_on_other_data(found, tmp_path):
     model = tmp_path / "model.yaml"
     model.write_bytes(found.results.files["model.yaml"])
     other = record(tmp_path / "other.csv", seed=1)
-    judged = explore(other, model=load_spec(model, design=False), preparation=COLUMNS)
+    judged = explore(other, model=load_spec(model, design=False))
     validation = judged.results.result["validation"]
     fit = 100.0 * (1.0 - 0.2 / np.std(np.loadtxt(other, delimiter=",", skiprows=1)[:, 2]))
     assert validation["simulation_fit_percent"] == pytest.approx(fit, abs=3.0)
     assert validation["prediction_fit_percent"] == pytest.approx(fit, abs=3.0)
-
-
-COLUMNS = Preparation(columns={"u1": "input", "y1": "output"})
 
 
 def test_the_command_writes_model_spec_figures_and_report(tmp_path):
@@ -98,3 +94,12 @@ def test_logs_that_tell_nothing_are_refused(text, message, tmp_path):
     path.write_text(text)
     with pytest.raises(DataError, match=message):
         explore(path)
+
+
+def test_a_verdict_on_other_data_is_printed(found, tmp_path):
+    model = tmp_path / "model.yaml"
+    model.write_bytes(found.results.files["model.yaml"])
+    other = record(tmp_path / "other.csv", seed=2)
+    run = CliRunner().invoke(app, ["explore", str(other), "--validate", str(model), "--no-output"])
+    assert run.exit_code == 0, run.output
+    assert "simulation explains" in run.stdout

@@ -57,7 +57,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         DataError: the file cannot be read, or does not tell its inputs and outputs.
     """
     sheet = read_sheet(path, key="")
-    columns = dict(preparation.columns) or _by_name(sheet)
+    columns = dict(preparation.columns) or channels_by_name(sheet)
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = Preparation(**{**vars(preparation), "columns": columns})
     signals = signals_of(sheet, counts["u"], counts["y"], given)
@@ -87,7 +87,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     )
 
 
-def _by_name(sheet: Sheet) -> dict[str, str]:
+def channels_by_name(sheet: Sheet) -> dict[str, str]:
     """Channels whose columns are called u, u1, input, .., y, y1, output, .."""
     found = {}
     for letter, pattern in _CHANNELS.items():
