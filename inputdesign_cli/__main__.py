@@ -1,12 +1,23 @@
 """`python -m inputdesign_cli` and `idesign`: an interrupt while modules are imported is orderly too."""
 
+from __future__ import annotations
+
+import os
+import signal
 import sys
+import threading
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 INTERRUPTED = 130  # as in `errors`, which may not have been imported yet
+_AGAIN = 0.05  # seconds
 
 
 def main() -> None:
     """The `idesign` command."""
+    sys.unraisablehook = _send_again
     try:
         from inputdesign_cli.cli import main as run
 
@@ -14,6 +25,20 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(INTERRUPTED)
+
+
+def _send_again(lost: UnraisableHookArgs) -> None:
+    """A signal whose exception was raised in a finalizer, where Python drops it, is sent once more."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        number = signal.SIGINT
+    elif issubclass(lost.exc_type, SystemExit):
+        number = signal.SIGTERM
+    else:
+        sys.__unraisablehook__(lost)
+        return
+    again = threading.Timer(_AGAIN, os.kill, [os.getpid(), number])
+    again.daemon = True
+    again.start()
 
 
 if __name__ == "__main__":

@@ -34,8 +34,11 @@ def render(error: IdesignError, color: bool = False) -> str:
 
 
 def as_json(error: IdesignError) -> list[dict[str, object]]:
-    """The diagnostics as plain data; `location` is null where there is none."""
-    return [asdict(diagnostic) for diagnostic in error.diagnostics]
+    """The diagnostics as plain data; `location` is null where there is none, `details` are left out."""
+    return [
+        {key: value for key, value in asdict(diagnostic).items() if key != "details" or value}
+        for diagnostic in error.diagnostics
+    ]
 
 
 def _block(diagnostic: Diagnostic, color: bool) -> str:

@@ -8,8 +8,8 @@ column where it is at hand.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Self
 
 STANDARD_INPUT = "-"  # in place of the name of a spec
@@ -35,13 +35,17 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One thing that is wrong: a code to look up, what is wrong, how to mend it, and where it stands."""
+    """One thing that is wrong: a code to look up, what is wrong, how to mend it, and where it stands.
+
+    `details` are the figures of the message for programs: plain data, ready for JSON.
+    """
 
     code: str
     message: str
     hint: str = ""
     key: str = ""
     location: Location | None = None
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
 
 
 class IdesignError(Exception):

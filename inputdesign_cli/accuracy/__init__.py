@@ -10,8 +10,10 @@ from inputdesign_cli.accuracy.admissible import (
 )
 from inputdesign_cli.accuracy.criteria import Criterion as Criterion, criterion_of as criterion_of
 from inputdesign_cli.accuracy.cuts import (
+    ConcaveFunction as ConcaveFunction,
     Cut as Cut,
     CutBlock as CutBlock,
+    Inequality as Inequality,
     MatrixCut as MatrixCut,
     positive_part as positive_part,
 )

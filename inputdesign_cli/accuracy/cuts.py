@@ -7,7 +7,7 @@ unknown h scales the constants with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
@@ -31,6 +31,30 @@ class CutBlock:
     auxiliary: sp.csc_matrix
 
 
+@dataclass(frozen=True)
+class Inequality:
+    """h * `constant` + `scale` * M + nu * `form` positive semidefinite, M filling the leading (k, k).
+
+    The matrices are (d, d) with d >= k; nu >= 0 is an unknown of its own, where there is a `form`.
+    """
+
+    constant: Array
+    scale: float = 1.0
+    form: Array | None = None
+
+
+@dataclass(frozen=True)
+class ConcaveFunction:
+    """g(M) >= h, g concave on the positive definite matrices (k, k) and of degree one: g(t M) = t g(M).
+
+    `at` maps (M, M^-1) to g(M) and its gradient G (k, k). The second derivative along D is `curvature`
+    (tr(G D)^2 / g - tr(M^-1 D G D)).
+    """
+
+    curvature: float
+    at: Callable[[Array, Array], tuple[float, Array]]
+
+
 class Cut(Protocol):
     """A convex set of information matrices (k, k) that contains every admissible one.
 
@@ -47,12 +71,23 @@ class Cut(Protocol):
     def blocks(self, size: int) -> list[CutBlock]:
         """Its cones, all with the same number of auxiliary unknowns; `size` is k."""
 
+    @property
+    def inequality(self) -> Inequality | None:
+        """The same set as one matrix inequality, unless it is a concave function."""
+
+    @property
+    def concave(self) -> ConcaveFunction | None:
+        """The same set by a concave function, unless it is a matrix inequality."""
+
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
         """(Y, r) with Y >= 0 (k, k) and tr(Y M) >= h r for every M of the set.
 
         Args:
             multipliers: one array a block, suggestions of a solver; the inequality holds whatever they are.
         """
+
+    def implied(self, weight: Array) -> tuple[Array, float]:
+        """The same from one matrix: a multiplier of `inequality`, or of `concave` times its gradient."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +96,8 @@ class MatrixCut:
 
     matrix: Array
     frequency: float | None = None
+
+    concave = None
 
     def transformed(self, congruence: Array) -> MatrixCut:
         """The same set for K M K^T, see `Cut`."""
@@ -71,9 +108,18 @@ class MatrixCut:
         rows = svec_length(size)
         return [CutBlock("psd", size, -svec(self.matrix), sp.eye_array(rows, format="csc"), _none(rows))]
 
+    @property
+    def inequality(self) -> Inequality:
+        """M - `matrix`."""
+        return Inequality(-self.matrix)
+
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """See `implied`."""
+        return self.implied(smat(multipliers[0]))
+
+    def implied(self, weight: Array) -> tuple[Array, float]:
         """tr(Y M) >= tr(Y matrix)."""
-        Y = positive_part(smat(multipliers[0]))
+        Y = positive_part(weight)
         return Y, float(np.sum(Y * self.matrix))
 
 
@@ -87,6 +133,8 @@ class VarianceCut:
 
     directions: Array
     frequency: float | None = None
+
+    inequality = None
 
     def transformed(self, congruence: Array) -> VarianceCut:
         """The same set for K M K^T, see `Cut`."""
@@ -109,10 +157,25 @@ class VarianceCut:
             CutBlock("nonnegative", 1, np.ones(1), sp.csc_matrix((1, svec_length(size))), trace),
         ]
 
+    @property
+    def concave(self) -> ConcaveFunction:
+        """1 / tr(V^T M^-1 V)."""
+
+        def at(information: Array, inverse: Array) -> tuple[float, Array]:
+            half = inverse @ self.directions
+            value = 1.0 / float(np.sum(half * self.directions))
+            return value, value**2 * (half @ half.T)
+
+        return ConcaveFunction(2.0, at)
+
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
-        """tr(Y M) >= |Y^{1/2} V|_*^2."""
+        """See `implied`."""
         size = self.directions.shape[0]
-        Y = positive_part(smat(multipliers[0])[:size, :size])
+        return self.implied(smat(multipliers[0])[:size, :size])
+
+    def implied(self, weight: Array) -> tuple[Array, float]:
+        """tr(Y M) >= |Y^{1/2} V|_*^2."""
+        Y = positive_part(weight)
         return Y, float(np.linalg.svd(_root(Y) @ self.directions, compute_uv=False).sum() ** 2)
 
 
@@ -127,6 +190,8 @@ class DeterminantCut:
 
     level: float = 1.0
     frequency: float | None = None
+
+    inequality = None
 
     def transformed(self, congruence: Array) -> DeterminantCut:
         """The same set for K M K^T, see `Cut`."""
@@ -165,11 +230,26 @@ class DeterminantCut:
             ),
         ]
 
+    @property
+    def concave(self) -> ConcaveFunction:
+        """(det M)^{1/k} / level."""
+
+        def at(information: Array, inverse: Array) -> tuple[float, Array]:
+            size = len(information)
+            value = float(np.exp(np.linalg.slogdet(information)[1] / size)) / self.level
+            return value, value / size * inverse
+
+        return ConcaveFunction(1.0, at)
+
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
-        """tr(Y M) >= k (det Y)^{1/k} level."""
+        """See `implied`."""
         block = smat(multipliers[0])
         size = len(block) // 2
-        Y = positive_part(block[:size, :size])
+        return self.implied(block[:size, :size])
+
+    def implied(self, weight: Array) -> tuple[Array, float]:
+        """tr(Y M) >= k (det Y)^{1/k} level."""
+        Y, size = positive_part(weight), len(weight)
         sign, logarithm = np.linalg.slogdet(Y)
         mean = float(np.exp(logarithm / size)) if sign > 0 else 0.0
         return Y, size * mean * self.level
@@ -181,6 +261,8 @@ class TraceCut:
 
     weight: Array
     frequency: float | None = None
+
+    inequality = None
 
     def transformed(self, congruence: Array) -> TraceCut:
         """The same set for K M K^T, see `Cut`."""
@@ -197,6 +279,17 @@ class TraceCut:
         y = max(float(multipliers[0][0]), 0.0)
         return y * self.weight, y
 
+    @property
+    def concave(self) -> ConcaveFunction:
+        """tr(W M), which is linear."""
+        return ConcaveFunction(
+            0.0, lambda information, inverse: (float(np.sum(self.weight * information)), self.weight)
+        )
+
+    def implied(self, weight: Array) -> tuple[Array, float]:
+        """The multiple of W that is nearest to the suggestion."""
+        return self.proof([np.array([np.sum(weight * self.weight) / np.sum(self.weight**2)])])
+
 
 @dataclass(frozen=True)
 class EllipsoidCut:
@@ -210,6 +303,8 @@ class EllipsoidCut:
     form: Array
     alpha: float
     frequency: float | None = None
+
+    concave = None
 
     def transformed(self, congruence: Array) -> EllipsoidCut:
         """The same set for K M K^T, see `Cut`."""
@@ -229,7 +324,18 @@ class EllipsoidCut:
             CutBlock("nonnegative", 1, np.zeros(1), sp.csc_matrix((1, entries)), sp.csc_matrix(np.eye(1))),
         ]
 
+    @property
+    def inequality(self) -> Inequality:
+        """That of the S-procedure."""
+        corner = np.zeros_like(self.form)
+        corner[-1, -1] = -1.0
+        return Inequality(corner, 1.0 / self.alpha**2, -self.form)
+
     def proof(self, multipliers: Sequence[Array]) -> tuple[Array, float]:
+        """See `implied`."""
+        return self.implied(smat(multipliers[0]))
+
+    def implied(self, weight: Array) -> tuple[Array, float]:
         """tr(Z_11 M) / alpha^2 >= Z_22, from any Z >= 0 (k + 1, k + 1) with tr(Z Q) >= 0.
 
         Weigh the matrix inequality with Z: tr(Z_11 M) / alpha^2 - Z_22 >= nu tr(Z Q) >= 0, whatever nu is.
@@ -238,7 +344,7 @@ class EllipsoidCut:
         column, or to add to Z_11 the direction in which Q_11 is largest. The first proves more, where it
         is possible.
         """
-        Z = positive_part(smat(multipliers[0]))
+        Z = positive_part(weight)
         missing = -float(np.sum(Z * self.form))
         if missing > 0.0:
             shorter = _shortened(Z, self.form)

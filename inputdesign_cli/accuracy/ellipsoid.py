@@ -25,7 +25,7 @@ _FLOOR = 1e-150  # its square is a number still
 
 @dataclass(frozen=True, kw_only=True)
 class EllipsoidError(OnModelError):
-    """The requirement for one entry of G that is a fraction affine in theta (`Model.is_fraction`).
+    """The requirement for one entry of G that is a fraction affine in theta (`Model.bends`).
 
     `admissible` is r_adm over |G| of the error relative to G(theta) ("relative"), or r_adm itself. The
     ellipsoid is that of the parameters of all entries, which share it.

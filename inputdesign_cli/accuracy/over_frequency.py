@@ -66,12 +66,13 @@ class OverFrequency(Requirement):
         flat = np.moveaxis(gradient.reshape(*gradient.shape[:2], -1), 1, 2)
         return np.concatenate([flat.real, flat.imag], axis=1)
 
+    def concerned(self, G: ComplexArray) -> ComplexArray:
+        """The entry (n, 1) of G (n, p, r), or all of them (n, p r)."""
+        return G.reshape(len(G), -1) if self.entry is None else G[:, self.entry[0], self.entry[1], None]
+
     def nominal_size(self, w: ArrayLike) -> Array:
         """|G| (n,) of the entry, or the Frobenius norm."""
-        G = self.experiment.model.plant_at(w)
-        if self.entry is not None:
-            return np.abs(G[:, self.entry[0], self.entry[1]])
-        return np.linalg.norm(G, axis=(1, 2))
+        return np.linalg.norm(self.concerned(self.experiment.model.plant_at(w)), axis=1)
 
     @cached_property
     def grid_singularities(self) -> ComplexArray:

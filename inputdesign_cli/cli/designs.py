@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,8 +24,11 @@ from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, exe
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
+    from inputdesign_cli.compute.watching import Round
     from inputdesign_cli.runs.results import Results
     from inputdesign_cli.sweep.verbs import Verb
+
+_PATIENCE = 2.0  # seconds after which the rounds of a design are told
 
 
 def solve(
@@ -105,7 +109,15 @@ def _results(
     executor: Executor | None = None,
 ) -> Results:
     """What a verb makes of a spec file; the numerical libraries are imported behind the message."""
-    with status(f"{file}: computing ...", quiet=quiet):
+    with status(f"{file}: computing ...", quiet=quiet) as show:
+        from inputdesign_cli.compute.watching import watching
         from inputdesign_cli.sweep.verbs import run_verb
 
-        return run_verb(verb, read_spec(file, overrides, confine), executor)
+        started = time.monotonic()
+
+        def told(done: Round) -> None:
+            if time.monotonic() - started > _PATIENCE:
+                show(f"{file}: {done} ...")
+
+        with watching(told):
+            return run_verb(verb, read_spec(file, overrides, confine), executor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -38,7 +39,12 @@ SpecFile = Annotated[
 SpecOnDisc = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
 Confine = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="Refuse a spec that names files outside DIR (links followed)."),
+    typer.Option(
+        metavar="DIR",
+        exists=True,
+        file_okay=False,
+        help="Refuse a spec that names files outside DIR (links followed).",
+    ),
 ]
 DataFiles = Annotated[
     list[Path],
@@ -108,9 +114,17 @@ def path_option(text: str) -> Path:
     return Path(text)
 
 
+def run_path(text: str) -> Path:
+    """The directory that a run is to be written into."""
+    path = path_option(text)
+    if path.absolute() == Path(path.absolute().anchor) or os.path.realpath(path) == os.path.abspath(os.sep):
+        raise typer.BadParameter("the root of the file system is no directory for a run")
+    return path
+
+
 def _into(default: str) -> Any:
     told = f"Directory to write. The default is {default}."
-    return typer.Option("--output", "-o", metavar="DIR", help=told, parser=path_option)
+    return typer.Option("--output", "-o", metavar="DIR", help=told, parser=run_path)
 
 
 Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]

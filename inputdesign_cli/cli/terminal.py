@@ -98,16 +98,16 @@ def colourful(stream: TextIO) -> bool:
 
 
 @contextmanager
-def status(text: str, *, quiet: bool) -> Iterator[None]:
-    """Show `text` on stderr while the block runs, if anybody is looking."""
+def status(text: str, *, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Show `text` on stderr while the block runs, if anybody is looking; the block may replace it."""
     if quiet or not sys.stderr.isatty():
-        yield
+        yield lambda text: None
         return
     from rich.console import Console
     from rich.text import Text
 
-    with Console(stderr=True).status(Text(text)):
-        yield
+    with Console(stderr=True).status(Text(text)) as line:
+        yield lambda text: line.update(Text(text))
 
 
 def aligned(

@@ -10,6 +10,13 @@ from math import inf
 
 from inputdesign_cli.errors import InaccurateError
 
+
+class OutOfTimeError(InaccurateError):
+    """The time limit has passed; `reached` is what a design underway had attained, and its proved bound."""
+
+    reached: tuple[float, float] | None = None
+
+
 _end: ContextVar[float] = ContextVar("end", default=inf)
 
 
@@ -27,14 +34,20 @@ def seconds_left() -> float:
     """What is left of the time limit; infinite where there is none.
 
     Raises:
-        InaccurateError: `out-of-time` when nothing is left.
+        OutOfTimeError: `out-of-time` when nothing is left.
     """
     left = _end.get() - time.monotonic()
     if left <= 0.0:
-        raise InaccurateError.because(
-            "out-of-time",
-            "the answer was not found within solver.time_limit",
-            hint="raise solver.time_limit (in seconds), lower the orders, or ask for a shorter signal",
-            key="solver.time_limit",
-        )
+        raise out_of_time("")
     return left
+
+
+def out_of_time(reached: str) -> OutOfTimeError:
+    """The error, with a sentence on what was reached."""
+    told = "the answer was not found within solver.time_limit"
+    return OutOfTimeError.because(
+        "out-of-time",
+        f"{told}: {reached}" if reached else told,
+        hint="raise solver.time_limit (in seconds), lower the orders, or ask for a shorter signal",
+        key="solver.time_limit",
+    )

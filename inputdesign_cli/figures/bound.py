@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, marked
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, log_axes, marked
 from inputdesign_cli.runs.results import Array, BoundCurves, BoundPanel
 
 
@@ -20,19 +20,19 @@ def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
 def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
     """The curves of one entry on `axes`; the handles of their legend."""
     w = curves.frequency
-    axes.set_yscale("log")
+    log_axes(axes, "y")
     handles: list[Artist] = []
-    handles += axes.plot(w, _positive(curves.G_abs), color=BLACK, linewidth=1.2, label="$|G|$")
+    handles += axes.plot(w, _positive(curves.G_abs), color=BLACK, linewidth=1.2, label="|G|")
     if curves.r_adm is not None:
         r_adm = _positive(curves.r_adm)
-        handles += axes.plot(w, r_adm, color=ORANGE, linestyle=DASHED, label=r"$r_\mathrm{adm}$")
-    handles += axes.plot(w, _positive(curves.r_u), color=BLUE, linewidth=2.0, label=f"$r_u$, {curves.label}")
+        handles += axes.plot(w, r_adm, color=ORANGE, linestyle=DASHED, label="r_adm")
+    handles += axes.plot(w, _positive(curves.r_u), color=BLUE, linewidth=2.0, label=f"r_u, {curves.label}")
     if curves.r_u_record is not None:
         record = _positive(curves.r_u_record)
-        handles += axes.plot(w, record, color=GREEN, linewidth=1.1, label="$r_u$, record")
+        handles += axes.plot(w, record, color=GREEN, linewidth=1.1, label="r_u, record")
     if curves.r_u_white is not None:
         white = _positive(curves.r_u_white)
-        handles += axes.plot(w, white, color=GREY, linestyle=DOTTED, label="$r_u$, white")
+        handles += axes.plot(w, white, color=GREY, linestyle=DOTTED, label="r_u, white")
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
         handles += marked(axes, curves.active, height, color=BLUE, label="active")

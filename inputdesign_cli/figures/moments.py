@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE, legend_above
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE, legend_above, log_axes
 from inputdesign_cli.runs.results import ErrorCurves, MomentsCurves
 
 NUMBERED = 8  # rows up to which the entries are written into the cells
@@ -23,7 +23,7 @@ def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
     lines.plot(curves.line_frequency, curves.line_power, "o", color=ORANGE, markersize=5)
     lines.set_xlim(-0.03 * curves.nyquist, 1.03 * curves.nyquist)
     lines.set_ylim(0.0, 1.08 * float(curves.line_power.max()))
-    lines.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+    lines.set_xlabel(f"frequency ω (rad/{time_unit})")
     lines.set_ylabel("power of each line (mean square)")
 
 
@@ -60,7 +60,7 @@ def draw_error(page: Figure, curves: ErrorCurves, time_unit: str) -> None:
     if curves.target is not None:
         handles.append(axes.axhline(curves.target, color=BLACK, linewidth=0.9, label="target"))
     (mark,) = axes.plot(*curves.design, "o", color=BLUE, markersize=7, label="design")
-    axes.set_xscale("log")
+    log_axes(axes, "x")
     axes.set_xlim(energy[0], energy[-1])
     axes.set_ylim(0.0, 3.0 * curves.design[1])
     axes.set_xlabel("energy, trace R")

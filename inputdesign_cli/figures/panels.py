@@ -10,7 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all
+from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all, log_axes
 from inputdesign_cli.runs.results import Array
 
 
@@ -65,12 +65,12 @@ def draw_panels(
     for panel, (i, j) in zip(panels, places, strict=True):
         axes = grid[i, j]
         longest = max(longest, plot(axes, panel), key=len)
-        axes.set_xscale("log")
+        log_axes(axes, "x")
         axes.set_xlim(float(panel.frequency.min()), float(panel.frequency.max()))
         axes.set_title(f"$G_{{{i + 1}{j + 1}}}$", loc="left", color=GREY)
     for i, j in product(range(rows), range(columns)):
         if (i, j) not in places:
             grid[i, j].set_axis_off()
     for axes in grid[-1]:
-        axes.set_xlabel(rf"$\omega$ (rad/{time_unit})")
+        axes.set_xlabel(f"ω (rad/{time_unit})")
     legend_over_all(page, longest, title)

@@ -12,6 +12,7 @@ from inputdesign_cli.figures.data import draw_fit, draw_residuals
 from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.exploration import draw_orders, draw_response
 from inputdesign_cli.figures.moments import draw_error, draw_moments
+from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
 from inputdesign_cli.figures.style import FileType, rendered

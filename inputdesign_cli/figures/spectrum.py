@@ -14,10 +14,12 @@ from inputdesign_cli.figures.style import (
     DASHED,
     GREEN,
     GREY,
+    LOWERED,
     ORANGE,
     PALETTE,
     frequency_axis,
     legend_above,
+    log_axes,
     marked,
 )
 from inputdesign_cli.runs.results import Array, DirectionCurves, OptimalityCurves, SpectrumCurves
@@ -54,17 +56,17 @@ def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
 def _plot_density(
     axes: Axes, w: Array, density: Array, record: Array | None, curves: SpectrumCurves
 ) -> list[Artist]:
-    phi = rf"\Phi_{{{curves.symbol}}}"
+    phi = f"Φ{curves.symbol.translate(LOWERED)}"
     handles: list[Artist] = []
-    handles += axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"${phi}$, design")
+    handles += axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"{phi}, design")
     if record is not None:
         handles += axes.plot(w, record, color=GREEN, linewidth=1.0, alpha=0.8, label="record, smoothed")
     if curves.white is not None:
-        handles.append(_plot_white(axes, curves.white, f"${phi}$, white"))
-    axes.set_ylabel(rf"spectral density ${phi}(\omega)$")
+        handles.append(_plot_white(axes, curves.white, f"{phi}, white"))
+    axes.set_ylabel(f"spectral density {phi}(ω)")
     peak = float(density.max())
     if peak > LOG_FROM * (curves.white or float(np.median(density))):
-        axes.set_yscale("log", nonpositive="mask")
+        log_axes(axes, "y", "mask")
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, peak * 10.0**-DECADES), high)
     else:
@@ -80,7 +82,7 @@ def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> l
     stems = axes.vlines(w, 0.0, power, color=ORANGE, linewidth=1.8 if few else 0.8, label=total)
     axes.plot(w, power, linestyle="none", marker="o", markersize=5 if few else 2.5, color=ORANGE)
     axes.set_ylim(0.0, 1.08 * float(power.max(initial=0.0)) or 1.0)
-    axes.set_ylabel(rf"power of each sinusoid of ${curves.symbol}$ (mean square)")
+    axes.set_ylabel(f"power of each sinusoid of {curves.symbol} (mean square)")
     return [stems]
 
 
@@ -122,7 +124,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
         low, high = float(w.min()), float(w.max()) if w.max() > w.min() else float(w.min()) + 1.0
         margin = MARGIN * (high - low) if curves.lines else 0.0
         below.set_xlim(low - margin, high + margin)
-        below.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+        below.set_xlabel(f"frequency ω (rad/{time_unit})")
 
 
 def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> None:
@@ -135,7 +137,7 @@ def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> No
         gains += upper.plot(w, gain, color=PALETTE[i % MOST], label=rf"$\sigma_{i + 1}(G)$")
         label = rf"$v_{i + 1}^* \Phi_u v_{i + 1}$"
         powers += _plot_power(lower, w, power, lines=curves.lines, number=i, label=label)
-    upper.set_yscale("log", nonpositive="mask")
+    log_axes(upper, "y", "mask")
     upper.set_ylabel("gains of the plant")
     legend_above(upper, gains)
     if curves.white is not None:
@@ -181,6 +183,6 @@ def _logarithmic(axes: Axes, values: Array) -> None:
     """A logarithmic axis over the leading decades: zeros of a spectrum would stretch it without end."""
     peak = float(values.max(initial=0.0))
     if peak > 0.0:
-        axes.set_yscale("log", nonpositive="mask")
+        log_axes(axes, "y", "mask")
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, peak * 10.0**-DECADES), max(high, 2.0 * peak))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatterSciNotation
 
 from inputdesign_cli.runs.results import Array
 
@@ -32,6 +34,9 @@ PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
 
+LOWERED = str.maketrans("ur0123456789", "ᵤᵣ₀₁₂₃₄₅₆₇₈₉")
+_RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "idesign",
     "font.size": 10.0,
@@ -47,6 +52,16 @@ _RC: dict[Any, Any] = {
     "legend.fontsize": 9.0,
     "mathtext.fontset": "dejavusans",
 }
+
+
+class _LogTicks(LogFormatterSciNotation):
+    """10⁻² as plain text: typesetting formulas takes a third of the time of a figure."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        formula = re.fullmatch(r"\$\\mathdefault\{(.*?)(?:\^\{(.*)\})?\}\$", super().__call__(x, pos))
+        if formula is None:
+            return ""
+        return formula[1].replace(r"\times", "×") + (formula[2] or "").translate(_RAISED)
 
 
 def rendered(paint: Callable[[Figure], object], file_type: FileType = "png") -> bytes:
@@ -70,10 +85,18 @@ def rendered(paint: Callable[[Figure], object], file_type: FileType = "png") -> 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
     """A logarithmic axis over the positive ones of `frequencies`, in rad per time unit."""
     positive = frequencies[frequencies > 0]
-    axes.set_xscale("log")
+    log_axes(axes, "x")
     if positive.size > 1:
         axes.set_xlim(positive.min(), positive.max())
-    axes.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+    axes.set_xlabel(f"frequency ω (rad/{time_unit})")
+
+
+def log_axes(axes: Axes, which: Literal["x", "y"], nonpositive: Literal["clip", "mask"] = "clip") -> None:
+    """Make one axis logarithmic, `nonpositive` values at its lower end or left out."""
+    set_scale, axis = (axes.set_xscale, axes.xaxis) if which == "x" else (axes.set_yscale, axes.yaxis)
+    set_scale("log", nonpositive=nonpositive)
+    axis.set_major_formatter(_LogTicks())
+    axis.set_minor_formatter(_LogTicks())
 
 
 def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Line2D]:

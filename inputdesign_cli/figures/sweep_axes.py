@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from inputdesign_cli.figures.style import ORANGE
+from inputdesign_cli.figures.style import ORANGE, log_axes
 from inputdesign_cli.runs.results import Array
 
 # Values over a wider ratio are drawn on a logarithmic scale; keys from the second ratio on.
@@ -47,7 +47,7 @@ def scale_key(axes: Axes, key: str, x: Array) -> None:
     """The scale and the name of the axis of a key: logarithmic for N and over decades."""
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     if low > 0 and (key == "experiment.samples" or high > _LOG_KEYS_FROM * low):
-        axes.set_xscale("log")
+        log_axes(axes, "x")
         plain_numbers(axes.xaxis, high / low)
     elif np.all(x == np.round(x)):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -15,7 +15,16 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.figures.style import BLACK, DASHED, DOTTED, GREY, PALETTE, legend_above, rendered
+from inputdesign_cli.figures.style import (
+    BLACK,
+    DASHED,
+    DOTTED,
+    GREY,
+    PALETTE,
+    legend_above,
+    log_axes,
+    rendered,
+)
 from inputdesign_cli.figures.sweep_axes import (
     LOG_FROM,
     curve,
@@ -110,7 +119,7 @@ def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | Non
     values = np.concatenate([part[np.isfinite(part)] for part in shown])
     low, high = float(values.min()), float(values.max())
     if low > 0 and high > LOG_FROM * low and table.kind != "D":
-        axes.set_yscale("log")
+        log_axes(axes, "y")
         plain_numbers(axes.yaxis, high / low)
     elif _maximised(table):
         # What counts are differences; but those of rounding are none.

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above
+from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above, log_axes
 from inputdesign_cli.figures.sweep_axes import LOG_FROM, curve, mark_failures, plain_numbers, scale_key
 from inputdesign_cli.figures.sweep_table import SweepTable
 
@@ -49,7 +49,7 @@ def draw_moments(table: SweepTable, along: str, page: Figure) -> None:
     mark_failures(axes, x[~np.isfinite(trace)])
     span = float(np.nanmax(trace) / np.nanmin(trace))
     if span > LOG_FROM and min(float(np.nanmin(part)) for part in values) > 0:
-        axes.set_yscale("log")
+        log_axes(axes, "y")
         plain_numbers(axes.yaxis, span)
     scale_key(axes, along, x)
     axes.set_ylabel("moments, summed over the samples")

@@ -22,6 +22,7 @@ from inputdesign_cli.figures.style import (
     ORANGE,
     legend_above,
     legend_over_all,
+    log_axes,
     page_of_pairs,
 )
 from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
@@ -64,7 +65,7 @@ def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
     """The curves of one entry; the handles of their legend."""
     w, levels = curves.frequency, sorted(curves.quantiles)
     low, high = levels[0], levels[-1]
-    axes.set_yscale("log")
+    log_axes(axes, "y")
     label = f"{100 * low:g} to {100 * high:g} % of {runs} runs"
     band = axes.fill_between(
         w, curves.quantiles[low], curves.quantiles[high], color=BLUE, alpha=0.25, linewidth=0, label=label
@@ -73,10 +74,10 @@ def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
     for level in levels[1:-1]:
         handles += axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
     if curves.r_u is not None:
-        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="$r_u$, predicted")
+        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="r_u, predicted")
     if curves.r_adm is not None:
         r_adm = np.where(curves.r_adm > 0, curves.r_adm, np.nan)
-        handles += axes.plot(w, r_adm, color=ORANGE, label=r"$r_\mathrm{adm}$")
+        handles += axes.plot(w, r_adm, color=ORANGE, label="r_adm")
     return handles
 
 

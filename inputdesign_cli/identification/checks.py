@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.linalg
 
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.information.coordinates import taking_part
+from inputdesign_cli.information.coordinates import taking_part, triangular_factor
 from inputdesign_cli.plant.polynomial import Array
 
-# Below this share of the largest eigenvalue (parameters scaled) a direction is not excited.
-_FAINT = 1e-12
+# A direction is not excited where gradients change by more than this share of themselves when they are
+# rounded otherwise.
+_UNCERTAIN = 0.03
 # Residuals of this power relative to the output are rounding.
 _EXACT = 1e-20
 # Correlation matrices of residuals with a smaller eigenvalue are singular but for rounding.
@@ -108,24 +110,35 @@ def check_apart(covariance: Array) -> None:
     )
 
 
-def covariance_of(names: Sequence[str], information: Array) -> Array:
-    """M^-1 (k, k) by way of unit diagonal.
+def factor_of_data(names: Sequence[str], rows: Array, again: Array) -> Array:
+    """L (k, k), lower triangular, with M = L L^T the information of the data.
+
+    Slow poles make the coefficients of a polynomial nearly collinear: scaled, eigenvalues of M 1e14 apart are
+    common and mean no lack of excitation. So M is never formed, and directions count as untold only where the
+    gradients themselves are rounding.
+
+    Args:
+        rows: gradients in white units, (samples, k).
+        again: the same with other rounding.
 
     Raises:
         SpecError: `not-exciting`, with the parameters that the data cannot tell apart.
     """
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    faint = values <= _FAINT * values[-1]
-    if faint.any():
+    factor, untold = triangular_factor(rows)
+    if not untold.size:
+        changes = scipy.linalg.solve_triangular(factor, (again - rows).T, lower=True).T
+        _, shares, vectors = np.linalg.svd(changes, full_matrices=False)
+        uncertain = vectors[shares > _UNCERTAIN].T
+        sizes = np.linalg.norm(factor, axis=1)[:, None]
+        untold = sizes * scipy.linalg.solve_triangular(factor, uncertain, lower=True, trans="T")
+    if untold.size:
         raise bad_spec(
             "not-exciting",
-            f"the data cannot tell these parameters apart: {taking_part(names, vectors[:, faint])}",
+            f"the data cannot tell these parameters apart: {taking_part(names, untold)}",
             hint="the input is too simple (too few sinusoids, a short step), or the orders are too high",
             key="u",
         )
-    half = vectors / np.sqrt(values)
-    return np.asarray((half @ half.T) / np.outer(scale, scale))
+    return factor
 
 
 def fit_percent(y: Array, simulated: Array, lengths: Sequence[int]) -> float:

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
-from inputdesign_cli.identification.checks import check_apart, check_noisy, covariance_of, fit_percent
+from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.plant.polynomial import Array
+
+# Parameters this share apart are the same to rounding.
+_LAST_DIGITS = 8.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,7 @@ class Estimate:
 
     Attributes:
         names, theta: (k,).
-        covariance, information: (k, k) of theta; they are inverse to each other.
+        factor: L (k, k), lower triangular; L L^T is the `information`, its inverse the `covariance` of theta.
         noise: (p, p) covariance of e; of white noise on the samples where the model knows no other.
         errors: (samples, p) prediction errors at theta.
         converged: whether the search settled; `steps` that it took, from the best of `starts`.
@@ -33,6 +38,8 @@ class Estimate:
         simulated: (samples, p), what the inputs and the start of each record cause in the model.
         free: whether unknown starts and levels were estimated along with theta.
         first: (records, p), the first residuals if each record began at rest about zero.
+        agreement: the probability that an earlier estimate differs as much as the one that counts along; None
+            where there is none.
         lengths: the samples of each of the records, which follow each other.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
@@ -41,8 +48,7 @@ class Estimate:
 
     names: tuple[str, ...]
     theta: Array
-    covariance: Array
-    information: Array
+    factor: Array
     noise: Array
     errors: Array
     converged: bool
@@ -52,10 +58,22 @@ class Estimate:
     simulated: Array
     free: bool
     first: Array
+    agreement: float | None
     lengths: tuple[int, ...]
     whiteness: ResidualTest
     independence: ResidualTest
     tests: tuple[ScoreTest, ...]
+
+    @cached_property
+    def information(self) -> Array:
+        """(k, k)."""
+        return self.factor @ self.factor.T
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(k, k), by way of the factor: the information itself may be singular to rounding."""
+        half = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.factor)), lower=True)
+        return np.asarray(half.T @ half)
 
     @property
     def failed(self) -> tuple[ScoreTest, ...]:
@@ -117,13 +135,12 @@ def concluded(
     check_apart(noise)
     if records.weights is not None:
         noise = np.asarray(np.linalg.inv(records.weights), dtype=float)
-    information = information_of(records, point, noise)
-    lengths = records.lengths
+    lengths, earlier = records.lengths, records.earlier
+    factor = factor_of_data(names, *_gradients(records, point, noise))
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
-        covariance=covariance_of(names, information),
-        information=information,
+        factor=factor,
         noise=noise,
         errors=point.errors,
         converged=found.converged,
@@ -136,6 +153,7 @@ def concluded(
         simulated=simulated,
         free=records.free,
         first=found.first,
+        agreement=None if earlier is None else earlier.agreement(point.theta, factor),
         lengths=lengths,
         whiteness=whiteness(point.errors, fitted=in_noise, lengths=lengths),
         independence=cross_correlations(
@@ -152,6 +170,27 @@ def noise_of(point: Point, own: Array) -> Array:
     return np.asarray(point.errors.T @ point.errors / np.outer(left, left))
 
 
+def _gradients(records: Records, point: Point, noise: Array) -> tuple[Array, Array]:
+    """psi (N p, k) in units of the noise, and the same at parameters that differ in their last digits.
+
+    What is known besides the data counts as further rows.
+    """
+    root = np.linalg.cholesky(_weights(records, noise)).T
+    last = _LAST_DIGITS * np.resize([1.0, -1.0], point.theta.size)
+    found = [point.psi, records.at(point.theta * (1.0 + last)).psi]
+    rows, again = ((psi @ root.T).reshape(len(psi), -1).T for psi in found)
+    if records.earlier is None:
+        return rows, again
+    known = records.earlier.rows
+    return np.concatenate([rows, known]), np.concatenate([again, known])
+
+
 def information_of(records: Records, point: Point, noise: Array) -> Array:
     """(k, k): sum over the samples of psi noise^-1 psi^T."""
-    return replace(point, weights=inverses((noise + rounding(records))[None])[0][0]).hessian
+    at_noise = replace(point, weights=_weights(records, noise), known=np.zeros_like(point.known))
+    return at_noise.hessian
+
+
+def _weights(records: Records, noise: Array) -> Array:
+    """W (p, p), the inverse of the noise, which may be no more than rounding."""
+    return inverses((noise + rounding(records))[None])[0][0]

@@ -7,10 +7,23 @@ from dataclasses import dataclass
 from functools import singledispatch
 from typing import Protocol
 
+import numpy as np
+
+from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
-from inputdesign_cli.identification.polynomials import fit_polynomials, identify_polynomials
-from inputdesign_cli.identification.transfer_matrix import fit_transfer_matrices, identify_transfer_matrix
-from inputdesign_cli.plant import ContinuousModel, Intersample, Model, PolynomialModel, SampledModel
+from inputdesign_cli.identification.kind import Kind, identify_records
+from inputdesign_cli.identification.polynomials import PolynomialKind, fit_polynomials
+from inputdesign_cli.identification.reparametrised import ReparametrisedKind, fit_reparametrised
+from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.identification.transfer_matrix import TransferKind, fit_transfer_matrices
+from inputdesign_cli.plant import (
+    ContinuousModel,
+    Intersample,
+    Model,
+    PolynomialModel,
+    Reparametrised,
+    SampledModel,
+)
 from inputdesign_cli.plant.polynomial import Array
 
 # Of records that follow each other; None for one.
@@ -18,12 +31,11 @@ Lengths = Sequence[int] | None
 
 
 class Estimator(Protocol):
-    """Estimates the structure of one model."""
+    """Estimates the structure of one model: what its records answer, and many of them at once."""
 
-    def identify(
-        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
-    ) -> Estimate:
-        """From one or several records; see the function of this name."""
+    @property
+    def kind(self) -> Kind:
+        """What is estimated."""
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
         """From many records; see the function of this name."""
@@ -31,33 +43,26 @@ class Estimator(Protocol):
 
 @dataclass(frozen=True)
 class _Polynomials:
-    model: PolynomialModel
-
-    def identify(
-        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
-    ) -> Estimate:
-        return identify_polynomials(
-            self.model, u, y, start=start, feedback=feedback, lengths=lengths, rest=rest
-        )
+    kind: PolynomialKind
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        return fit_polynomials(self.model, u, y, start=start)
+        return fit_polynomials(self.kind.model, u, y, start=start)
 
 
 @dataclass(frozen=True)
 class _TransferMatrix:
-    model: ContinuousModel
-    between: Intersample
-
-    def identify(
-        self, u: Array, y: Array, start: Array | None, *, feedback: bool, lengths: Lengths, rest: bool | None
-    ) -> Estimate:
-        return identify_transfer_matrix(
-            self.model, u, y, self.between, start=start, feedback=feedback, lengths=lengths, rest=rest
-        )
+    kind: TransferKind
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        return fit_transfer_matrices(self.model, u, y, self.between, start=start)
+        return fit_transfer_matrices(self.kind.model, u, y, self.kind.between, start=start)
+
+
+@dataclass(frozen=True)
+class _Reparametrised:
+    kind: ReparametrisedKind
+
+    def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
+        return fit_reparametrised(self.kind, u, y, start)
 
 
 @singledispatch
@@ -72,17 +77,22 @@ def estimator(model: Model, step: float) -> Estimator:
 
 @estimator.register
 def _(model: PolynomialModel, step: float) -> Estimator:
-    return _Polynomials(model)
+    return _Polynomials(PolynomialKind(model, Structure.of(model)))
 
 
 @estimator.register
 def _(model: ContinuousModel, step: float) -> Estimator:
-    return _TransferMatrix(model, Intersample(step, hold=False))
+    return _TransferMatrix(TransferKind(model, Intersample(step, hold=False)))
 
 
 @estimator.register
 def _(model: SampledModel, step: float) -> Estimator:
-    return _TransferMatrix(model.continuous_plant, Intersample(model.sample_time, hold=True))
+    return _TransferMatrix(TransferKind(model.continuous_plant, Intersample(model.sample_time, hold=True)))
+
+
+@estimator.register
+def _(model: Reparametrised, step: float) -> Estimator:
+    return _Reparametrised(ReparametrisedKind(model, estimator(model.coefficients, step).kind))
 
 
 def identify(
@@ -95,12 +105,13 @@ def identify(
     feedback: bool = False,
     lengths: Lengths = None,
     rest: bool | None = None,
+    earlier: Earlier | None = None,
 ) -> Estimate:
     """The structure of `model` estimated from one record, or jointly from several.
 
     Args:
-        model: its orders and delays, zero entries and common polynomials are those of the estimate; its
-            numbers are not used.
+        model: its orders, zero entries, common polynomials and known parameters are those of the estimate;
+            its other numbers are not used.
         u, y: (samples, r), (samples, p).
         step: time between samples of a plant in continuous time.
         start: (k,), tried besides starts that are made from the data.
@@ -108,12 +119,22 @@ def identify(
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; otherwise its start and its level are unknown and
             estimated along. None: as the data say.
+        earlier: an estimate from other data, which counts along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
             `not-exciting`.
     """
-    return estimator(model, step).identify(u, y, start, feedback=feedback, lengths=lengths, rest=rest)
+    return identify_records(
+        estimator(model, step).kind,
+        np.asarray(u, dtype=float),
+        np.asarray(y, dtype=float),
+        start=start,
+        feedback=feedback,
+        lengths=lengths,
+        rest=rest,
+        earlier=earlier,
+    )
 
 
 def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Array) -> BatchEstimate:

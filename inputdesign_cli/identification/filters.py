@@ -7,8 +7,8 @@ commute exactly.
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
 
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
 
 # With fewer runs than this, a call of lfilter a run is faster than a loop over time.
@@ -65,7 +65,7 @@ class Stream:
             return
         if self._runs < FEW:
             for run in range(self._runs):
-                out[:, run] = scipy.signal.lfilter([1.0], monic[run], out[:, run])
+                out[:, run] = filtered([1.0], monic[run], out[:, run])
             return
         taps = self._columns(f"{name} {source}", monic)[1:]
         if name not in self._lines:

@@ -100,7 +100,7 @@ class OutputOrders:
         def of(letter: str) -> tuple[Array, ...]:
             parts = []
             for block in self.by_letter[letter]:
-                p = np.zeros((theta.shape[0], block.lags.stop))
+                p = np.zeros((theta.shape[0], block.lags.stop), dtype=theta.dtype)
                 p[:, 0] = letter != "b"
                 p[:, block.lags.start : block.lags.stop] = theta[:, block.columns]
                 parts.append(p)

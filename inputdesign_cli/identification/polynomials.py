@@ -8,18 +8,20 @@ covariance, so that each residual is weighed by what the others tell of it ([lju
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.checks import check_length, check_varying
-from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, concluded
+from inputdesign_cli.identification.earlier import Earlier
+from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
+from inputdesign_cli.identification.kind import Part, Starts, identify_records
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.polynomial_record import PolynomialRecord
 from inputdesign_cli.identification.problem import PredictionErrors, inverses
-from inputdesign_cli.identification.records import Records, centred, longest, split
-from inputdesign_cli.identification.search import Search, from_rest_or_free, search
+from inputdesign_cli.identification.records import split
+from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant import PolynomialModel
@@ -27,6 +29,69 @@ from inputdesign_cli.plant.polynomial import Array
 
 # Many runs share the cost of a pass over time; with more outputs at once the blocks no longer fit the cache.
 _OUTPUTS_AT_ONCE = 512
+
+
+@dataclass(frozen=True)
+class PolynomialKind:
+    """Polynomials in q^-1; see `Kind`."""
+
+    model: PolynomialModel
+    structure: Structure
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the parameters."""
+        return self.structure.names
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.model.outputs
+
+    @property
+    def recent(self) -> int:
+        """How far back the regressions look."""
+        return self.structure.memory
+
+    @property
+    def explaining(self) -> NDArray[np.bool_]:
+        """(k,): those of B and F."""
+        return np.array([parameter.letter in "bf" for parameter in self.model.parameters], dtype=bool)
+
+    @property
+    def whitening(self) -> NDArray[np.bool_]:
+        """(k,): those of A, C and D."""
+        return ~self.explaining
+
+    def own(self) -> Array:
+        """(p,): how many parameters each output has."""
+        return self.structure.own()
+
+    def record(self, u: Array, y: Array) -> PolynomialRecord:
+        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        return PolynomialRecord(self.structure, u, y)
+
+    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+        """Each output estimated alone, then what outputs share weighed by how well each knows it."""
+        found = [
+            _starts(self.structure, self.structure.problem(*(x[None] for x in part)), given) for part in parts
+        ]
+        points = np.concatenate([p for p, _ in found])
+        return Starts(points, np.zeros(len(points), dtype=np.int64), max(tried for _, tried in found))
+
+    def holding(self, known: NDArray[np.bool_]) -> PolynomialKind:
+        """The same: starts come from regressions on all coefficients."""
+        return self
+
+    def simulated(
+        self, found: Search, y: Array, lengths: Sequence[int] | None
+    ) -> tuple[Array, Sequence[bool]]:
+        """What the inputs cause in the estimate, and what unknown starts explain."""
+        fitted = self.model.at(found.point.theta)
+        records, begun = found.records, found.point.near.begun
+        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+            caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
+        return np.concatenate(caused) + y - records.y, fitted.stable_outputs
 
 
 def identify_polynomials(
@@ -39,6 +104,7 @@ def identify_polynomials(
     feedback: bool = False,
     lengths: Sequence[int] | None = None,
     rest: bool | None = None,
+    earlier: Earlier | None = None,
 ) -> Estimate:
     """Prediction-error estimate from one record; in closed loop the direct method.
 
@@ -55,47 +121,22 @@ def identify_polynomials(
         feedback: whether u(t) answers y(t), which the tests of the residuals heed.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
+        earlier: an estimate from other data, which counts along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
             `not-exciting`.
     """
-    structure = Structure.of(model)
-    inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
-    check_length(len(outputs), structure.size, structure.memory, outputs=len(structure.rows))
-    check_varying(structure.names, inputs, outputs)
-    weights = None if noise is None else np.linalg.inv(np.asarray(noise, dtype=float))
-    given = None if start is None else np.asarray(start, dtype=float)
-    parts = split(inputs, outputs, lengths)
-
-    def searched(records: Records, known: Array | None) -> Search:
-        found = [
-            _starts(structure, structure.problem(*(x[None] for x in part)), given)
-            for part in (centred(longest(parts)) if records.free else longest(parts))
-        ]
-        points = np.concatenate([*(p for p, _ in found), *([] if known is None else [known[None]])])
-        return search(records, points, starts=max(tried for _, tried in found))
-
-    def records_of(signals: Sequence[tuple[Array, Array]]) -> Records:
-        return Records(tuple(PolynomialRecord(structure, *part) for part in signals), weights=weights)
-
-    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched)
-    fitted = model.at(best.point.theta)
-    records, begun = best.records, best.point.near.begun
-    with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-        caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
-    simulated = np.concatenate(caused) + outputs - records.y
-    return concluded(
-        structure.names,
-        best,
-        outputs,
-        simulated,
-        fitted.stable_outputs,
-        own=structure.own(),
-        in_noise=structure.in_noise,
-        in_plant=structure.in_plant,
-        recent=structure.memory,
+    return identify_records(
+        PolynomialKind(model, Structure.of(model)),
+        np.asarray(u, dtype=float),
+        np.asarray(y, dtype=float),
+        start=None if start is None else np.asarray(start, dtype=float),
         feedback=feedback,
+        lengths=lengths,
+        rest=rest,
+        earlier=earlier,
+        weights=None if noise is None else np.linalg.inv(np.asarray(noise, dtype=float)),
     )
 
 

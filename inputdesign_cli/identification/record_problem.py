@@ -3,6 +3,9 @@
 With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), as in `problem.py`. It falls with the likelihood of
 Gaussian noise of unknown covariance; minus half its gradient is sum psi(t) W e(t), half its Hessian sum
 psi W psi^T up to what vanishes at the minimum, with W = cost / (p N) S^-1. Known weights are kept.
+
+An earlier estimate at a distance q, -2 log of its density, multiplies that cost by exp(q / (N p)), which adds
+q to -2 log likelihood; with known weights it is added as it is.
 """
 
 from __future__ import annotations
@@ -23,12 +26,19 @@ _EXACT = 1e-20
 
 @dataclass(frozen=True)
 class Point:
-    """Records at theta (k,): their errors and gradient, W (p, p), cost."""
+    """Records at theta (k,): their errors and gradient, W (p, p), cost.
+
+    Attributes:
+        known: (k, k), what half the Hessian has from an earlier estimate; `towards` (k,), minus half the
+            gradient.
+    """
 
     theta: Array
     near: Linearised
     weights: Array
     cost: float
+    known: Array
+    towards: Array
 
     @property
     def errors(self) -> Array:
@@ -42,18 +52,18 @@ class Point:
 
     @property
     def slope(self) -> Array:
-        """(k,): sum of psi W e."""
-        return np.asarray(self._weighed.reshape(self.theta.size, -1) @ self.errors.ravel())
+        """(k,): minus half the gradient of the cost."""
+        return np.asarray(self._weighed.reshape(self.theta.size, -1) @ self.errors.ravel() + self.towards)
 
     @property
     def hessian(self) -> Array:
-        """(k, k): sum of psi W psi^T."""
+        """(k, k): half that of the cost, to first order."""
         return self.against(self.psi)
 
     def against(self, regressors: NDArray[np.float64]) -> Array:
-        """(k, k): sum of psi W phi^T for regressors phi (k, N, p)."""
+        """(k, k): the same with regressors phi (k, N, p) in place of one psi."""
         k = self.theta.size
-        return np.asarray(self._weighed.reshape(k, -1) @ regressors.reshape(k, -1).T)
+        return np.asarray(self._weighed.reshape(k, -1) @ regressors.reshape(k, -1).T + self.known)
 
     @property
     def _weighed(self) -> NDArray[np.float64]:
@@ -70,17 +80,42 @@ def evaluate(records: Records, theta: Array) -> Point:
     with np.errstate(over="ignore", invalid="ignore"):
         near = records.at(theta)
         S = near.errors.T @ near.errors / records.samples
+    none, nowhere = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
     if not (np.all(np.isfinite(S)) and np.all(np.isfinite(near.psi))):
         nothing = replace(near, errors=np.zeros(near.errors.shape), psi=np.zeros(near.psi.shape))
-        return Point(theta, nothing, np.eye(len(S)), np.inf)
+        return Point(theta, nothing, np.eye(len(S)), np.inf, none, nowhere)
     floor = rounding(records)
     if np.all(np.diag(S) <= np.diag(floor)):
-        return Point(theta, near, np.eye(len(S)), 0.0)
+        return Point(theta, near, np.eye(len(S)), 0.0, none, nowhere)
     if records.weights is not None:
-        return Point(theta, near, records.weights, records.samples * float(np.sum(records.weights * S)))
+        cost = records.samples * float(np.sum(records.weights * S))
+        return _with_earlier(records, Point(theta, near, records.weights, cost, none, nowhere))
     inverse, logarithm = inverses((S + floor)[None])
     root = float(np.exp(logarithm[0] / len(S)))
-    return Point(theta, near, root / len(S) * inverse[0], records.samples * root)
+    weights = root / len(S) * inverse[0]
+    return _with_earlier(records, Point(theta, near, weights, records.samples * root, none, nowhere))
+
+
+def _with_earlier(records: Records, point: Point) -> Point:
+    """A point of the data with what is known besides."""
+    earlier = records.earlier
+    if earlier is None:
+        return point
+    q, towards = earlier.q(point.theta), -earlier.slope(point.theta)
+    if records.weights is not None:
+        return replace(point, cost=point.cost + q, known=earlier.information, towards=towards)
+    with np.errstate(over="ignore"):
+        factor = float(np.exp(q / records.y.size))
+    if not np.isfinite(factor * point.cost):
+        return replace(point, cost=np.inf)
+    share = factor * point.cost / records.y.size
+    return replace(
+        point,
+        weights=factor * point.weights,
+        cost=factor * point.cost,
+        known=share * earlier.information,
+        towards=share * towards,
+    )
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.plant.polynomial import Array
 
 # Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
 _DEPENDENT = 1e-7
 _MOST_ROUNDS = 30
-_STEP = 1e-6
 _MOST_STARTED = 3
 
 
@@ -48,6 +48,9 @@ class Record(Protocol):
     @property
     def in_starts(self) -> NDArray[np.int64]:
         """The parameters on which the free responses depend."""
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """The derivatives of the free responses with respect to one of them."""
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): what measured outputs in place of the model's add to psi."""
@@ -83,11 +86,13 @@ class Records:
     Attributes:
         free: whether each begins in an unknown state about an unknown level, instead of at rest at zero.
         weights: W (p, p) of the errors; None to weigh by their own covariance.
+        earlier: what is known besides.
     """
 
     parts: tuple[Record, ...]
     free: bool = False
     weights: Array | None = None
+    earlier: Earlier | None = None
 
     @cached_property
     def u(self) -> Array:
@@ -124,11 +129,9 @@ class Records:
             return Linearised(errors, psi, np.zeros_like(errors), np.zeros((errors.size, 0)))
         coefficients, root, directions = self._fitted(starts, errors)
         begun = np.tensordot(coefficients, starts, 1)
-        scale = np.maximum(np.abs(theta), 1e-3) * _STEP
         for k in self.parts[0].in_starts:
-            step = scale[k] * np.eye(self.size)[k]
-            moved = [np.tensordot(coefficients, self.starts(theta + s * step), 1) for s in (1.0, -1.0)]
-            psi[k] += (moved[0] - moved[1]) / (2.0 * scale[k])
+            slopes = self._placed([part.free_slopes(theta, int(k)) for part in self.parts])
+            psi[k] += np.tensordot(coefficients, slopes, 1)
         flat = (psi @ root.T).reshape(len(psi), -1)
         flat = flat - (flat @ directions) @ directions.T
         psi = flat.reshape(psi.shape) @ np.linalg.inv(root).T
@@ -138,10 +141,14 @@ class Records:
         """(m, N, p): what the unknowns of all parts add to the prediction errors, each to one output."""
         if not self.free:
             return np.zeros((0, *self.y.shape))
+        return self._placed([part.free_responses(theta) for part in self.parts])
+
+    def _placed(self, found: Sequence[tuple[NDArray[np.float64], ...]]) -> NDArray[np.float64]:
+        """Responses of every part and output as (m, N, p)."""
         columns, begin = [], 0
-        for part in self.parts:
+        for part, own in zip(self.parts, found, strict=True):
             end = begin + len(part.y)
-            for output, responses in enumerate(part.free_responses(theta)):
+            for output, responses in enumerate(own):
                 block = np.zeros((len(responses), *self.y.shape))
                 block[:, begin:end, output] = responses
                 columns.append(block)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.special
+from numpy.typing import NDArray
 
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
@@ -17,6 +18,10 @@ from inputdesign_cli.plant.polynomial import Array
 _MISTAKEN = 0.01
 # Above this probability nothing is searched for.
 _UNLIKELY = 0.2
+# Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
+_SETTLED = 1e-8
+_ASIDE = 0.01
+_MOST_HELD_STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -45,9 +50,72 @@ def search(records: Records, points: Array, *, starts: int, before: Array | int 
     found = minimise(RecordProblem((records,) * len(points)), points)
     best = best_run(found)
     steps = int(found.steps[best] + np.broadcast_to(before, len(points))[best])
-    point = evaluate(records, found.theta[best])
+    point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])
+    if not converged and np.isfinite(point.cost):
+        kinked = settled_at_kinks(records, point)
+        point, converged = (point, False) if kinked is None else (kinked, True)
     first = point.errors[np.cumsum((0, *records.lengths[:-1]))]
-    return Search(records, point, bool(found.converged[best]), steps, starts, first)
+    return Search(records, point, converged, steps, starts, first)
+
+
+def settled_at_kinks(records: Records, point: Point) -> Point | None:
+    """Where a search settles that was stopped by kinks of the cost; None where that is not what stopped it.
+
+    A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
+    and Newton gains what its slopes promise. Parameters that block the way are held, one after the other; the
+    rest settles, and then each held one is moved to both sides, where the cost must be higher.
+    """
+    size = point.theta.size
+    held = np.zeros(size, dtype=bool)
+    for _ in range(_MOST_HELD_STEPS):
+        step, gain = _newton(point, held)
+        if gain * point.errors.size > _SETTLED * point.cost:
+            trial = _moved(records, point, step)
+            if trial.cost >= point.cost:
+                more = [held | _unit(size, j) for j in map(int, np.flatnonzero(~held))]
+                if len(more) < 2:
+                    return None
+                tried = [_moved(records, point, _newton(point, blocking)[0]) for blocking in more]
+                best = int(np.argmin([other.cost for other in tried]))
+                held, trial = more[best], tried[best]
+            point = trial if trial.cost < point.cost else point
+            continue
+        lower = _beside(records, point, held)
+        if lower is None:
+            return point if np.any(held) else None
+        held, point = np.zeros_like(held), lower
+    return None
+
+
+def _newton(point: Point, held: NDArray[np.bool_]) -> tuple[Array, float]:
+    """The step (k,) of Gauss and Newton that leaves some parameters, and the gain that it promises."""
+    free = np.flatnonzero(~held)
+    scale = np.sqrt(np.maximum(np.diag(point.hessian)[free], 1e-300))
+    step = np.zeros(held.size)
+    slope = point.slope[free] / scale
+    matrix = point.hessian[np.ix_(free, free)] / np.outer(scale, scale)
+    step[free] = np.linalg.lstsq(matrix, slope, rcond=1e-12)[0] / scale
+    return step, float(abs(step @ point.slope))
+
+
+def _moved(records: Records, point: Point, step: Array) -> Point:
+    return evaluate(records, records.stabilised(point.theta + step))
+
+
+def _beside(records: Records, point: Point, held: NDArray[np.bool_]) -> Point | None:
+    """A point of lower cost where a held parameter is a little more or less; None if there is none."""
+    variance = point.cost / point.errors.size
+    for j in map(int, np.flatnonzero(held)):
+        size = _ASIDE * np.sqrt(variance / max(float(point.hessian[j, j]), 1e-300))
+        for sign in (1.0, -1.0):
+            trial = _moved(records, point, sign * size * _unit(held.size, j))
+            if trial.cost < point.cost:
+                return trial
+    return None
+
+
+def _unit(size: int, index: int) -> NDArray[np.bool_]:
+    return np.arange(size) == index
 
 
 def from_rest_or_free(

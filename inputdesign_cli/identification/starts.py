@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import scipy.signal
 
 from inputdesign_cli.identification.orders import Block, OutputOrders
 from inputdesign_cli.identification.stability import reflected
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 15
@@ -69,7 +69,7 @@ def _long_model(row: OutputOrders, inputs: list[Array], y: Array) -> tuple[Array
     (a, *bs), residual = regress(y, [(-y, range(1, order + 1)), *regressors])
     A = reflected(np.concatenate([[1.0], a]))
     responses = [
-        scipy.signal.lfilter(np.concatenate([np.zeros(entry.delay), b]), A, x)
+        filtered(np.concatenate([np.zeros(entry.delay), b]), A, x)
         for b, x, entry in zip(bs, inputs, row.entries, strict=True)
     ]
     return residual, responses
@@ -109,8 +109,8 @@ def _output_error(
     if coloured and (row.c or row.d):
         v = y.copy()
         for b, f, x, entry in zip(bs, denominators, inputs, row.entries, strict=True):
-            v -= scipy.signal.lfilter(np.concatenate([np.zeros(entry.delay), b]), f, x)
-        v = scipy.signal.lfilter(shaped, [1.0], v)
+            v -= filtered(np.concatenate([np.zeros(entry.delay), b]), f, x)
+        v = filtered(shaped, [1.0], v)
         long = max(1, min(10 + 2 * (row.c + row.d), y.size // 6))
         _, noise = regress(v, [(-v, range(1, long + 1))])
         (d, c), _ = regress(v, [(-v, D.lags), (noise, C.lags)])
@@ -123,9 +123,9 @@ def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> 
     F = np.ones(1)
     numerators: list[Array] = []
     for _ in range(_ITERATIONS if below else 1):
-        y = scipy.signal.lfilter([1.0], F, target)
-        filtered = [(scipy.signal.lfilter([1.0], F, x), lags) for x, lags in above]
-        (f, *numerators), _ = regress(y, [(-y, below), *filtered])
+        y = filtered([1.0], F, target)
+        smoothed = [(filtered([1.0], F, x), lags) for x, lags in above]
+        (f, *numerators), _ = regress(y, [(-y, below), *smoothed])
         F = reflected(np.concatenate([[1.0], f]))
     return F, numerators
 

@@ -2,31 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.checks import check_length, check_varying
-from inputdesign_cli.identification.estimate import (
-    BatchEstimate,
-    Estimate,
-    concluded,
-    information_of,
-    noise_of,
-)
-from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
-from inputdesign_cli.identification.records import Records, centred, longest, split
+from inputdesign_cli.identification.earlier import Earlier
+from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
+from inputdesign_cli.identification.kind import Part, Starts, fit_records, identify_records
+from inputdesign_cli.identification.record_problem import evaluate
+from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.refined_iv import refine
-from inputdesign_cli.identification.search import Search, from_rest_or_free, search
+from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
 from inputdesign_cli.plant import ContinuousModel, Intersample
+from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 
 # Of the starts made from the data, as many are followed to the end: the likeliest after the instruments.
 _FOLLOWED = 3
+
+
+@dataclass(frozen=True)
+class TransferKind:
+    """A transfer matrix in s; see `Kind`."""
+
+    model: ContinuousModel
+    between: Intersample
+    held: Mapping[tuple[int, int], float] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the parameters."""
+        return self.model.names
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.model.outputs
+
+    @property
+    def recent(self) -> int:
+        """No lag but that of the present: all others act through poles."""
+        return 0
+
+    @property
+    def explaining(self) -> NDArray[np.bool_]:
+        """(k,): all."""
+        return np.ones(len(self.names), dtype=bool)
+
+    @property
+    def whitening(self) -> NDArray[np.bool_]:
+        """(k,): none."""
+        return np.zeros(len(self.names), dtype=bool)
+
+    def own(self) -> Array:
+        """(p,): how many parameters each output has; those that several share count by their share."""
+        taken = np.zeros(self.outputs)
+        for parameter in self.model.parameters:
+            rows = sorted({i for i, _ in parameter.places})
+            taken[rows] += 1.0 / len(rows)
+        return taken
+
+    def record(self, u: Array, y: Array) -> TransferRecord:
+        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        return TransferRecord(self.model, u, y, self.between)
+
+    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+        """The likeliest after refined instrumental variables, from rest, and those from the `given` one."""
+        singles = tuple(self.record(*part) for part in parts)
+        about = Records(singles)
+        made = [
+            refine(about, evaluate(about, theta))
+            for single in singles
+            for theta in starting_points(single, self.held)
+        ]
+        refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
+        if given is not None:
+            refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))
+        return Starts(
+            np.array([point.theta for point, _ in refined]),
+            np.array([steps for _, steps in refined], dtype=np.int64),
+            len(made) + (given is not None),
+        )
+
+    def holding(self, known: NDArray[np.bool_]) -> TransferKind:
+        """The same; dead times that are known are not looked for."""
+        held = {
+            place: parameter.value
+            for parameter, fixed in zip(self.model.parameters, known, strict=True)
+            for place in parameter.places
+            if fixed and parameter.letter == DELAY
+        }
+        return replace(self, held=held)
+
+    def simulated(
+        self, found: Search, y: Array, lengths: Sequence[int] | None
+    ) -> tuple[Array, Sequence[bool]]:
+        """What the prediction errors leave, for the noise is white."""
+        return y - found.point.errors, (True,) * self.outputs
 
 
 def identify_transfer_matrix(
@@ -39,6 +115,7 @@ def identify_transfer_matrix(
     feedback: bool = False,
     lengths: Sequence[int] | None = None,
     rest: bool | None = None,
+    earlier: Earlier | None = None,
 ) -> Estimate:
     """Maximum-likelihood estimate of a transfer matrix in s from one record, white noise on the outputs.
 
@@ -54,51 +131,21 @@ def identify_transfer_matrix(
         feedback: whether u(t) answers y(t), which the tests of the residuals heed.
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
+        earlier: an estimate from other data, which counts along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
             `not-exciting`.
     """
-    inputs, outputs = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
-    check_length(len(outputs), len(model.names), 0, outputs=model.outputs)
-    check_varying(model.names, inputs, outputs)
-    parts = split(inputs, outputs, lengths)
-
-    def records_of(signals: Sequence[tuple[Array, Array]]) -> tuple[TransferRecord, ...]:
-        return tuple(TransferRecord(model, *part, between) for part in signals)
-
-    def searched(records: Records, known: Array | None) -> Search:
-        # Instruments from rest, on deviations from the means, begin near enough to what unknown starts allow.
-        chosen = longest(parts)
-        singles = records_of(centred(chosen) if records.free else chosen)
-        about = Records(singles)
-        made = [
-            refine(about, evaluate(about, theta)) for single in singles for theta in starting_points(single)
-        ]
-        refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
-        for given in (start, known):
-            if given is not None:
-                refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))
-        return search(
-            records,
-            np.array([point.theta for point, _ in refined]),
-            starts=len(made) + (start is not None),
-            before=np.array([steps for _, steps in refined]),
-        )
-
-    together, deviations = Records(records_of(parts)), Records(records_of(centred(parts)))
-    best = from_rest_or_free(together, deviations, rest, searched)
-    return concluded(
-        model.names,
-        best,
-        outputs,
-        outputs - best.point.errors,
-        (True,) * model.outputs,
-        own=_own(model),
-        in_noise=0,
-        in_plant=len(model.names),
-        recent=0,
+    return identify_records(
+        TransferKind(model, between),
+        np.asarray(u, dtype=float),
+        np.asarray(y, dtype=float),
+        start=None if start is None else np.asarray(start, dtype=float),
         feedback=feedback,
+        lengths=lengths,
+        rest=rest,
+        earlier=earlier,
     )
 
 
@@ -116,30 +163,11 @@ def fit_transfer_matrices(
     outputs = np.asarray(y, dtype=float)
     inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], model.inputs))
     begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(model.names)))
-    records = tuple(
-        Records((TransferRecord(model, *run, between),)) for run in zip(inputs, outputs, strict=True)
-    )
-    theta, refined = [], []
-    for record, row in zip(records, begin, strict=True):
-        point, steps = refine(record, evaluate(record, record.stabilised(row)))
-        theta.append(point.theta)
-        refined.append(steps)
-    found = minimise(RecordProblem(records), np.array(theta))
-    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
-    noise = np.array([noise_of(point, _own(model)) for point in points])
-    return BatchEstimate(
-        theta=found.theta,
-        noise=noise,
-        information=np.array([information_of(*each) for each in zip(records, points, noise, strict=True)]),
-        converged=found.converged,
-        steps=found.steps + np.array(refined),
-    )
-
-
-def _own(model: ContinuousModel) -> Array:
-    """(p,): how many parameters each output has; those that several share count by their share."""
-    taken = np.zeros(model.outputs)
-    for parameter in model.parameters:
-        rows = sorted({i for i, _ in parameter.places})
-        taken[rows] += 1.0 / len(rows)
-    return taken
+    kind = TransferKind(model, between)
+    records = [Records((kind.record(*run),)) for run in zip(inputs, outputs, strict=True)]
+    refined = [
+        refine(record, evaluate(record, record.stabilised(row)))
+        for record, row in zip(records, begin, strict=True)
+    ]
+    theta = np.array([point.theta for point, _ in refined])
+    return fit_records(records, theta, np.array([steps for _, steps in refined]), kind.own())

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant import ContinuousModel, Intersample
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
+from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 
 # A mode that loses less than this over the whole record cannot be told from one on the stability limit.
 _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
+_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,12 +46,11 @@ class TransferRecord:
         errors, psi = self.y.copy(), np.zeros((self.size, *self.y.shape))
         for i, j in self.structure.active:
             entry, u = self._entry(model, i, j), self.u[:, j]
-            states = self.intersample.states(entry, u, hold=self.intersample.hold)
-            errors[:, i] -= entry.direct * u + states @ entry.gain
+            columns = self.intersample.responses(entry, u, hold=self.intersample.hold)
+            errors[:, i] -= columns @ entry.gain
             for index, parameter in enumerate(self.structure.parameters):
                 if (i, j) in parameter.places:
-                    direct, row = entry.gradient(parameter.letter, parameter.power)
-                    psi[index, :, i] += direct * u + states @ row
+                    psi[index, :, i] += columns @ entry.gradient(parameter.letter, parameter.power)
         return errors, psi
 
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
@@ -61,13 +62,24 @@ class TransferRecord:
             if not entry.order:
                 continue
             poles = np.poly(entry.transition[: entry.order, : entry.order])
-            found[i].append(scipy.signal.lfilter([1.0], poles, np.eye(entry.order, samples)))
+            found[i].append(filtered([1.0], poles, np.eye(entry.order, samples)))
         return tuple(np.concatenate(parts) for parts in found)
 
     @property
     def in_starts(self) -> NDArray[np.int64]:
         """Those of the denominators."""
         return np.flatnonzero([parameter.letter == "a" for parameter in self.structure.parameters])
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """By central differences."""
+        parameter = self.structure.parameters[index]
+        i, j = parameter.places[0]
+        order = self.structure.denominator[i][j].size - 1
+        slowest = 1.0 / (self.samples * self.intersample.sample_time)
+        size = _STEP * max(abs(theta[index]), slowest ** (order - parameter.power))
+        step = size * np.eye(self.size)[index]
+        above, below = self.free_responses(theta + step), self.free_responses(theta - step)
+        return tuple((a - b) / (2.0 * size) for a, b in zip(above, below, strict=True))
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """(p, N, m): the signals (N, m) as they are, for the noise is white."""
@@ -77,27 +89,32 @@ class TransferRecord:
         """(k, N, p): s^k / a through the errors of the output, for the coefficient a_k of an entry.
 
         That is what regressors made of measured outputs have beyond those made of the model's. The errors are
-        interpolated within their band. Entries of an output with a common denominator share it.
+        interpolated within their band, and no dead time is between them. Entries of an output with a common
+        denominator share it.
         """
         model = self.structure.at(theta)
         found = np.zeros((self.size, *errors.shape))
         filtered: dict[tuple[int, int], NDArray[np.float64]] = {}
         for index, parameter in enumerate(self.structure.parameters):
-            if parameter.letter == "b":
+            if parameter.letter != "a":
                 continue
             for i, j in {place[0]: place for place in parameter.places}.values():
-                entry = self._entry(model, i, j)
+                entry = replace(self._entry(model, i, j), delay=None)
                 if (i, j) not in filtered:
-                    filtered[i, j] = self.intersample.states(entry, errors[:, i], hold=False)
+                    filtered[i, j] = self.intersample.responses(entry, errors[:, i], hold=False)
                 power = np.eye(entry.order)[parameter.power]
                 found[index, :, i] = filtered[i, j] @ entry.row(power, 1)
         return found
 
     def stabilised(self, theta: Array) -> Array:
-        """theta with poles in the right half plane mirrored, and kept off its edge and off infinity."""
+        """theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
+
+        Dead times are kept between zero and the length of the record.
+        """
         step = self.intersample.sample_time
         slowest, fastest = _LEAST_DECAY / (self.samples * step), _FASTEST / step
         out = theta.copy()
+        out[self._late] = np.clip(out[self._late], 0.0, (self.samples - 1) * step)
         for columns in self._denominators:
             poles = polynomial_roots(np.append(theta[columns], 1.0))
             if np.all(poles.real <= -slowest) and np.all(np.abs(poles) <= fastest):
@@ -108,7 +125,12 @@ class TransferRecord:
         return out
 
     def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
-        return self.intersample.entry(model.numerator[i][j], model.denominator[i][j])
+        return model.held(i, j, self.intersample.sample_time)
+
+    @cached_property
+    def _late(self) -> NDArray[np.int64]:
+        """Where the dead times stand in theta."""
+        return np.flatnonzero([parameter.letter == DELAY for parameter in self.structure.parameters])
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:

@@ -8,24 +8,39 @@ frequency response by the iteration of [sanathanan-koerner-1963].
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.polynomial import polynomial as ascending
 
+from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.plant.held import HeldEntry
+from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _CUTOFFS = 5
 _HIGHEST_ORDER = 8
 _ITERATIONS = 8
 _MOST_FREQUENCIES = 1000
+# Dead times are tried sample by sample up to so many, then each so much longer than the last.
+_FINE, _GROWTH = 20, 1.2
+_SWEEPS, _MINIMA = 2, 3
 
 Place = tuple[int, int]
 
 
-def starting_points(record: TransferRecord) -> Array:
-    """(points, k): one for each cutoff and order of the rows, between the record's length and its step."""
+def starting_points(record: TransferRecord, held: Mapping[Place, float] | None = None) -> Array:
+    """(points, k): one for each cutoff and order of the rows, between the record's length and its step.
+
+    Dead times are looked for on a grid, by what the regression of the row leaves: one after the other, and
+    where an output has only one also at its next best minima.
+
+    Args:
+        held: dead times of entries that are known.
+    """
     step = record.intersample.sample_time
     lines = slice(1, None, -(-record.samples // (2 * _MOST_FREQUENCIES)))
     w = np.asarray(2.0 * np.pi / step * np.fft.rfftfreq(record.samples), dtype=float)[lines]
@@ -34,48 +49,129 @@ def starting_points(record: TransferRecord) -> Array:
     points = []
     for cutoff in np.geomspace(8.0 * np.pi / (record.samples * step), 0.5 * np.pi / step, _CUTOFFS):
         for summed in summing:
-            responses: dict[Place, ComplexArray] = {}
-            for output in sorted({i for i, _ in record.structure.active}):
-                responses |= _row(record, output, float(cutoff), w, summed=summed)
-            points.append(_reduced(record, responses, w, spectra))
+            filtered = _Filtered(record, float(cutoff), summed)
+            for delays in _delays(record, filtered, held or {}):
+                responses: dict[Place, ComplexArray] = {}
+                for output in sorted({i for i, _ in record.structure.active}):
+                    responses |= filtered.responses(output, delays, w)
+                points.append(_reduced(record, responses, delays, w, spectra))
     return np.array(points)
 
 
-def _row(
-    record: TransferRecord, output: int, cutoff: float, w: Array, *, summed: bool
-) -> dict[Place, ComplexArray]:
-    """The responses at `w` of the entries of a row, by least squares behind a state-variable filter.
-
-    The order of their denominator is the largest of the entries', or the sum of all.
-    """
+def _delays(
+    record: TransferRecord, filtered: _Filtered, held: Mapping[Place, float]
+) -> list[dict[Place, float]]:
+    """Dead times of all entries: the best found on the grid, and the best beside it."""
     model = record.structure
-    places = [place for place in model.active if place[0] == output]
-    orders = [model.denominator[i][j].size - 1 for i, j in places]
-    m = min(sum(orders), _HIGHEST_ORDER) if summed else max(orders)
-    biproper = m == 0 or any(model.numerator[i][j].size > n for (i, j), n in zip(places, orders, strict=True))
-    chain = HeldEntry.of(np.ones(1), _power(cutoff, m), record.intersample.sample_time)
-    # s is in units of the cutoff from here on.
-    monic = _power(1.0, m)
-
-    def derivatives(signal: Array, *, hold: bool, highest: bool) -> Array:
-        low = record.intersample.states(chain, signal, hold=hold)[:, :m]
-        return np.column_stack([low, signal - low @ monic[:-1]]) if highest else low
-
-    y = derivatives(record.y[:, output], hold=False, highest=True)
-    parts = [derivatives(record.u[:, j], hold=record.intersample.hold, highest=biproper) for _, j in places]
-    matrix = np.column_stack([-y[:, :m], *parts])
-    solution = _regression(matrix, y[:, m])
-    s = 1j * w / cutoff
-    below = ascending.polyval(s, np.append(solution[:m], 1.0))
-    tops = np.split(solution[m:], len(places))
-    return {
-        place: np.asarray(ascending.polyval(s, top) / below) for place, top in zip(places, tops, strict=True)
-    }
+    best = {place: held.get(place, model.dead_time(*place)) for place in model.active}
+    groups = [
+        p.places for p in model.parameters if p.letter == DELAY and not any(x in held for x in p.places)
+    ]
+    if not groups:
+        return [best]
+    grid, alone = _grid(record), len(groups) == 1
+    ranked = grid
+    for _ in range(1 if alone else _SWEEPS):
+        for places in groups:
+            outputs = {i for i, _ in places}
+            tried = [best | dict.fromkeys(places, float(delay)) for delay in grid]
+            left = np.array([sum(filtered.left(i, delays) for i in outputs) for delays in tried])
+            padded = np.concatenate([[np.inf], left, [np.inf]])
+            minima = np.flatnonzero((left <= padded[:-2]) & (left <= padded[2:]))
+            ranked = grid[minima[np.argsort(left[minima])]]
+            best |= dict.fromkeys(places, float(ranked[0]))
+    beside = ranked[1:_MINIMA].tolist() if alone else []
+    return [best, *(best | dict.fromkeys(groups[0], delay) for delay in beside)]
 
 
-def _reduced(record: TransferRecord, responses: dict[Place, ComplexArray], w: Array, spectra: Array) -> Array:
+def _grid(record: TransferRecord) -> Array:
+    """Dead times in steps of a sample, then ever longer ones, up to a third of the record."""
+    longest = max(record.samples // 3, 1)
+    fine = np.arange(min(_FINE, longest))
+    steps = 1 + int(np.log(max(longest / _FINE, 1.0)) / np.log(_GROWTH))
+    far = np.rint(np.geomspace(_FINE, longest, steps)) if longest > _FINE else np.zeros(0)
+    return np.concatenate([fine, far]) * record.intersample.sample_time
+
+
+@dataclass
+class _Filtered:
+    """Derivatives of the signals of a record behind one state-variable filter, in units of its cutoff.
+
+    With `summed` the order of the denominator of a row is the sum of those of its entries, otherwise the
+    largest.
+    """
+
+    record: TransferRecord
+    cutoff: float
+    summed: bool
+    _columns: dict[tuple[int, int, float], Array] = field(default_factory=dict)
+
+    def responses(self, output: int, delays: Mapping[Place, float], w: Array) -> dict[Place, ComplexArray]:
+        """The responses at `w` of the entries of a row without their dead times, by least squares."""
+        matrix, target = self._regression(output, delays)
+        solution, m = _regression(matrix, target), self._order(output)
+        s = 1j * w / self.cutoff
+        below = ascending.polyval(s, np.append(solution[:m], 1.0))
+        places = self._places(output)
+        tops = np.split(solution[m:], len(places))
+        return {
+            place: np.asarray(ascending.polyval(s, top) / below)
+            for place, top in zip(places, tops, strict=True)
+        }
+
+    def left(self, output: int, delays: Mapping[Place, float]) -> float:
+        """The share of the power of the target that the regression leaves."""
+        matrix, target = self._regression(output, delays)
+        squared = float(np.sum((target - matrix @ _regression(matrix, target)) ** 2))
+        return squared / max(float(np.sum(target**2)), 1e-300)
+
+    def _places(self, output: int) -> list[Place]:
+        return [place for place in self.record.structure.active if place[0] == output]
+
+    def _orders(self, output: int) -> list[int]:
+        return [self.record.structure.denominator[i][j].size - 1 for i, j in self._places(output)]
+
+    def _order(self, output: int) -> int:
+        orders = self._orders(output)
+        return min(sum(orders), _HIGHEST_ORDER) if self.summed else max(orders)
+
+    def _regression(self, output: int, delays: Mapping[Place, float]) -> tuple[Array, Array]:
+        """Regressors and target: the highest derivative of the output on the others and on the inputs'."""
+        model, record, m = self.record.structure, self.record, self._order(output)
+        places, orders = self._places(output), self._orders(output)
+        biproper = m == 0 or any(
+            model.numerator[i][j].size > n for (i, j), n in zip(places, orders, strict=True)
+        )
+        y = self._derivatives(-1 - output, m, 0.0, hold=False)
+        parts = [self._derivatives(j, m, delays[i, j], hold=record.intersample.hold) for i, j in places]
+        kept = slice(None) if biproper else slice(0, m)
+        return np.column_stack([-y[:, :m], *(part[:, kept] for part in parts)]), y[:, m]
+
+    def _derivatives(self, signal: int, m: int, delay: float, *, hold: bool) -> Array:
+        """(N, m + 1): of order 0 to m, of an input j >= 0 or of output -1 - j, behind 1 / (s + 1)^m."""
+        key = (signal, m, delay)
+        if key not in self._columns:
+            step = self.record.intersample.sample_time
+            x = self.record.u[:, signal] if signal >= 0 else self.record.y[:, -1 - signal]
+            chain = HeldEntry.of(np.ones(1), _power(self.cutoff, m), step, delay or None)
+            low = self.record.intersample.responses(chain, x, hold=hold)[:, :m]
+            late = shifted(x, int(np.rint(delay / step)), (x.size,))
+            self._columns[key] = np.column_stack([low, late - low @ _power(1.0, m)[:-1]])
+        return self._columns[key]
+
+
+def _reduced(
+    record: TransferRecord,
+    responses: dict[Place, ComplexArray],
+    delays: Mapping[Place, float],
+    w: Array,
+    spectra: Array,
+) -> Array:
     """theta of the structure's own orders, fitted to the responses where the inputs (n, r) have power."""
     theta = np.zeros(record.size)
+    for index, parameter in enumerate(record.structure.parameters):
+        if parameter.letter == DELAY:
+            theta[index] = delays[parameter.places[0]]
     active = record.structure.active
     for places in [active] if record.structure.common else [(place,) for place in active]:
         _fit_group(record.structure, theta, places, responses, w, spectra)
@@ -94,7 +190,7 @@ def _fit_group(
     parameters = [
         (index, parameter)
         for index, parameter in enumerate(model.parameters)
-        if set(parameter.places) <= set(places)
+        if set(parameter.places) <= set(places) and parameter.letter != DELAY
     ]
     inside = [index for index, _ in parameters]
     n = model.denominator[places[0][0]][places[0][1]].size - 1

@@ -7,6 +7,7 @@ from inputdesign_cli.information.experiment import (
     PowerKind as PowerKind,
 )
 from inputdesign_cli.information.finite_record import FiniteRecord as FiniteRecord
+from inputdesign_cli.information.products import WeightedProducts as WeightedProducts
 from inputdesign_cli.information.quadrature import (
     Quadrature as Quadrature,
     graded_quadrature as graded_quadrature,

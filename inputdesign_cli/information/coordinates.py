@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import InaccurateError, bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
@@ -69,6 +69,10 @@ class Coordinates:
             half = scipy.linalg.solve_triangular(self.factor, half.T, lower=True, trans="T").T
         return half.T @ half
 
+    def raw_steps(self, steps: Array) -> Array:
+        """Differences (n, k) of parameters in these coordinates as such of raw parameters."""
+        return steps if self.factor is None else steps @ self._inverse_factor
+
     def whiten_rows(self, rows: NDArray) -> NDArray:
         """Gradients (n, k) of raw parameters in these coordinates."""
         if self.factor is None:
@@ -103,19 +107,39 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
 
     Raises:
         SpecError: `not-identifiable`, with the names of parameters that cannot be told apart.
+        InaccurateError: `numerically-singular`: other excitations could, but next to resonances all else is
+            lost to rounding.
+    """
+    factor, untold = triangular_factor(rows)
+    if untold.size:
+        size = np.linalg.norm(rows, axis=1)
+        even = rows[size > 0.0] / size[size > 0.0, None]
+        if len(even) and not triangular_factor(even)[1].size:
+            raise InaccurateError.because(
+                "numerically-singular",
+                f"flat {excitation} does not tell these parameters apart in double precision: "
+                f"{taking_part(names, untold)}",
+                hint="nearly all that it tells stands next to a pole at the unit circle: leave those "
+                "frequencies out, with limits.band and spectrum: {type: multisine, ..}",
+                key="plant",
+            )
+        raise bad_spec(
+            "not-identifiable",
+            f"no {excitation} can tell these parameters apart: {taking_part(names, untold)}",
+            hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
+            "order too high, and take it out",
+            key="plant",
+        )
+    return factor
+
+
+def triangular_factor(rows: NDArray[np.float64]) -> tuple[Array, Array]:
+    """L (k, k), lower triangular, with rows^T rows = L L^T, and directions (k, m) that the rows do not tell.
+
+    Rank is judged with every column of the rows (number, k) at norm one, whatever its units.
     """
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0.0] = 1.0
     triangle = np.asarray(np.linalg.qr(rows / scale, mode="r"))
     _, singular, vectors = np.linalg.svd(triangle)
-    rank = int(np.sum(singular > _RANK_TOLERANCE * singular[0]))
-    if rank < len(names):
-        listed = taking_part(names, vectors[rank:].T)
-        raise bad_spec(
-            "not-identifiable",
-            f"no {excitation} can tell these parameters apart: {listed}",
-            hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
-            "order too high, and take it out",
-            key="plant",
-        )
-    return (triangle * scale).T
+    return (triangle * scale).T, vectors[singular <= _RANK_TOLERANCE * singular[0]].T

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
+from inputdesign_cli.information.products import WeightedProducts
 from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -53,6 +54,11 @@ class Experiment(Coordinates):
     def singularities(self) -> ComplexArray:
         """Poles of all densities below, as points frequency + j damping of the frequency plane."""
         return self._source.singularities
+
+    @property
+    def memory(self) -> float:
+        """How long, in samples or time units, signals matter beyond what poles remember."""
+        return self._source.memory
 
     @property
     def _source(self) -> Model | Loop:
@@ -104,12 +110,21 @@ class Experiment(Coordinates):
         half = np.einsum("nmpa,nlpb->nlmab", F.conj(), F, optimize=True)
         return (0.5 * self.samples) * (half + half.swapaxes(1, 2))
 
+    def information_factor(self, w: ArrayLike) -> ComplexArray:
+        """F (n, k, p, r) whose products F_l^* F_m are `information_density`."""
+        return np.sqrt(self.samples) * self.excitation_gradient(w)
+
     def value_density(self, weight: Array, w: ArrayLike) -> NDArray:
         """(n,) or (n, r, r): the density of tr(Y (M - M0)), Y = `weight` (k, k) symmetric."""
-        F = self.excitation_gradient(w)
-        weighted = np.tensordot(F, weight, axes=(1, 1))  # (n, p, r, k)
-        value = self.samples * np.einsum("nkpa,npbk->nab", F.conj(), weighted, optimize=True)
-        return self._squeezed(value)
+        return self.valued(self.products(np.atleast_1d(np.asarray(w, dtype=float))), weight)
+
+    def products(self, w: Array) -> WeightedProducts:
+        """What `value_density` needs of the frequencies, whatever the weight."""
+        return WeightedProducts.of(self.excitation_gradient, w)
+
+    def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
+        """`value_density` where the products are at hand."""
+        return self._squeezed(self.samples * products.at(weight))
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
         """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x or x, of all channels or of one."""

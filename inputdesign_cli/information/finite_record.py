@@ -39,9 +39,17 @@ class FiniteRecord:
 
     def information(self, record: Array) -> Array:
         """(k, k): M0 + sum_t psi(t) Lambda^-1 psi(t)^T of samples (n, r), in these coordinates."""
+        return self.known + self._excited(record)
+
+    def information_of_experiment(self, record: Array) -> Array:
+        """(k, k): the same of an experiment of its own length that goes on as the record does."""
+        share = self.experiment.samples / self.samples
+        return self.experiment.baseline_information + share * self._excited(record)
+
+    def _excited(self, record: Array) -> Array:
         psi = self.gradient(record)
         flat = psi.transpose(1, 0, 2).reshape(self.experiment.size, -1)
-        return self.known + flat @ flat.T
+        return np.asarray(flat @ flat.T)
 
     def gradient(self, record: Array) -> NDArray[np.float64]:
         """(n, k, p): psi of the prediction, from rest, in these coordinates, noise whitened to I."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.information.experiment import Experiment, PowerKind
 from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
 
 Filter = tuple[Array, Array]  # numerator and denominator, ascending in q^-1
@@ -37,7 +37,7 @@ class RecordFilters:
     def signals(self, of: PowerKind, record: Array) -> Array:
         """(n, 1): what the samples (n, 1) alone cause at the input or the output."""
         numerator, denominator = self._responses[of]
-        return _filtered(numerator, denominator, record)
+        return filtered(numerator, denominator, record, axis=0)
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """(n, 1): the transpose of `signals`; a filter run backwards in time is its own."""
@@ -76,17 +76,10 @@ class RecordFilters:
         """
         m, letters = self.model, {p.letter for p in self.model.parameters}
         B, C, D, F = m.B[0][0], m.C[0], m.D[0], m.F[0][0]
-        by_b = _filtered(D, np.convolve(C, F), self.signals("input", record)[:, 0])
+        by_b = filtered(D, np.convolve(C, F), self.signals("input", record)[:, 0])
         sources = {"b": by_b}
         if "a" in letters:
-            sources["a"] = _filtered(-D, C, self.signals("output", record)[:, 0])
+            sources["a"] = filtered(-D, C, self.signals("output", record)[:, 0])
         if "f" in letters:
-            sources["f"] = _filtered(-B, F, by_b)
+            sources["f"] = filtered(-B, F, by_b)
         return sources
-
-
-def _filtered(numerator: Array, denominator: Array, values: Array) -> Array:
-    """The values (n, ...) through numerator / denominator, from rest."""
-    if len(numerator) == len(denominator) == 1:
-        return values * (numerator[0] / denominator[0])
-    return scipy.signal.lfilter(numerator, denominator, values, axis=0)

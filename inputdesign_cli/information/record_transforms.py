@@ -91,7 +91,8 @@ class RecordTransforms:
         damping = float(np.min(experiment.singularities.imag, initial=1.0)) * (
             self.step if experiment.model.continuous else 1.0
         )
-        memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9))), _LONGEST_MEMORY)
+        further = experiment.memory / (self.step if experiment.model.continuous else 1.0)
+        memory = min(int(np.ceil(_FORGOTTEN / max(damping, 1e-9) + further)), _LONGEST_MEMORY)
         return int(2 ** np.ceil(np.log2(self.samples + memory)))
 
     @cached_property

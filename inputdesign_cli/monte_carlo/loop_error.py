@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
 from inputdesign_cli.compute.executor import Executor
@@ -22,6 +21,7 @@ from inputdesign_cli.identification.least_squares import estimated_polynomials, 
 from inputdesign_cli.monte_carlo.batches import Seed, run_batches
 from inputdesign_cli.monte_carlo.error_filters import error_filters, prefilter
 from inputdesign_cli.plant import TransferMatrix
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.periodic import dense_roots, noise_drive, shaped_noise
@@ -137,11 +137,11 @@ def _entering(
     coloured, common = problem.reference_filter, prefilter(target)
     source = rng.standard_normal((problem.plant.outputs, runs, samples))
     source *= np.sqrt(problem.reference_variance)[:, None, None]
-    source = scipy.signal.lfilter(coloured.numerator, coloured.denominator_polynomial, source)
+    source = filtered(coloured.numerator, coloured.denominator_polynomial, source)
     source -= np.moveaxis(_noise(problem.plant, runs, samples, rng), -1, 0)
     out = np.zeros_like(source)
     for i, j in zip(*np.nonzero(np.any(common.numerator, axis=2)), strict=True):
-        out[i] += scipy.signal.lfilter(common.numerator[i, j], common.denominator[i], source[j])
+        out[i] += filtered(common.numerator[i, j], common.denominator[i], source[j])
     return np.moveaxis(out, 0, -1)
 
 
@@ -150,7 +150,7 @@ def _simulated(numerator: Array, denominator: Array, entering: Array, stable: ND
     samples = entering.shape[1]
     for run in np.flatnonzero(stable):
         # The denominator first: it is common to all entries, and what is left are short convolutions.
-        slow = [scipy.signal.lfilter([1.0], denominator[run], v) for v in entering[run].T]
+        slow = [filtered([1.0], denominator[run], v) for v in entering[run].T]
         total = 0.0
         for row in numerator[run]:
             out = np.convolve(row[0], slow[0])[:samples]

@@ -9,8 +9,10 @@ from inputdesign_cli.plant.frequencies import (
 from inputdesign_cli.plant.intersample import Intersample as Intersample
 from inputdesign_cli.plant.loop import Loop as Loop, LoopResponse as LoopResponse, close_loop as close_loop
 from inputdesign_cli.plant.model import Fraction as Fraction, Model as Model, Parameter as Parameter
+from inputdesign_cli.plant.parametrisation import Parametrisation as Parametrisation
 from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop
 from inputdesign_cli.plant.polynomial_model import PolynomialModel as PolynomialModel
+from inputdesign_cli.plant.reparametrised import Reparametrised as Reparametrised, Words as Words
 from inputdesign_cli.plant.sampled_loop import SampledLoop as SampledLoop
 from inputdesign_cli.plant.sampled_model import SampledModel as SampledModel
 from inputdesign_cli.plant.sampling import hold_entries as hold_entries, zero_order_hold as zero_order_hold

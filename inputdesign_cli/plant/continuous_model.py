@@ -1,20 +1,21 @@
-"""Transfer matrices in s.
+"""Transfer matrices in s, with dead times.
 
-[mohan-spectral], (1)-(2): G_ij = sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are monic.
+[mohan-spectral], (1)-(2): G_ij = e^(-tau_ij s) sum_k b_ij^(k) s^k / sum_k a_ij^(k) s^k; the denominators are
+monic, and dG/dtau = -s G.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import polynomial as ascending
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.plant.held import polynomial_roots
+from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
 from inputdesign_cli.plant.intersample import Intersample
-from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, WhiteNoise, entry_label
+from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised, WhiteNoise, entry_label
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.polynomial_model import Rows
 
@@ -27,21 +28,33 @@ class ContinuousModel(Parametrised, WhiteNoise):
     monic. With `common` all entries share one denominator and its parameters.
 
     Parameters are named after their power of s: `b0[2,1]` is the constant of the numerator of entry
-    (2, 1), `a1[2,1]` the coefficient of s in its denominator; `a1` of a common one, and without
-    brackets for one input and output. Numerator coefficients are free up to the highest nonzero one; an
-    entry that is zero has no parameters.
+    (2, 1), `a1[2,1]` the coefficient of s in its denominator, `delay[2,1]` its dead time; `a1` and `delay`
+    of common ones, and without brackets for one input and output. Numerator coefficients are free up to the
+    highest nonzero one; an entry that is zero has no parameters.
+
+    `delay` holds a list of one dead time for each entry, an empty list for entries that act at once; it is
+    empty where all do.
     """
 
     numerator: Rows
     denominator: Rows
     covariance: Array
     common: bool = False
+    delay: Rows = ()
+    common_delay: bool = False
 
     continuous = True
 
     @classmethod
     def monic(
-        cls, numerator: Rows, denominator: Rows, covariance: Array, *, common: bool = False
+        cls,
+        numerator: Rows,
+        denominator: Rows,
+        covariance: Array,
+        *,
+        common: bool = False,
+        delay: Rows = (),
+        common_delay: bool = False,
     ) -> ContinuousModel:
         """From any coefficients: trailing zeros dropped, each entry divided by its leading coefficient."""
         low, high = [], []
@@ -54,7 +67,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
                     for t, b in zip(top, bottoms, strict=True)
                 )
             )
-        return cls(tuple(low), tuple(high), covariance, common)
+        return cls(tuple(low), tuple(high), covariance, common, delay, common_delay)
 
     @property
     def outputs(self) -> int:
@@ -74,7 +87,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Numerator coefficients entry by entry, then those of the denominators."""
+        """Numerator coefficients entry by entry, then those of the denominators, then dead times."""
         single = self.outputs == self.inputs == 1
         found = [
             Parameter("b", power, ((i, j),), entry_label(i, j, single=single), float(value))
@@ -89,20 +102,35 @@ class ContinuousModel(Parametrised, WhiteNoise):
                 Parameter("a", power, places, label, float(value))
                 for power, value in enumerate(self.denominator[i][j][:-1])
             ]
+        late = [place for place in self.active if self._delays(place).size]
+        together = self.common_delay and late
+        for places in [tuple(late)] if together else [(place,) for place in late]:
+            label = "" if self.common_delay else entry_label(*places[0], single=single)
+            found.append(Parameter(DELAY, 0, places, label, self.dead_time(*places[0])))
         return tuple(found)
+
+    def dead_time(self, output: int, input: int) -> float:
+        """Of an entry."""
+        return float(np.sum(self._delays((output, input))))
+
+    def _delays(self, place: tuple[int, int]) -> Array:
+        """A list of the dead time of an entry, or of none."""
+        return self.delay[place[0]][place[1]] if self.delay else np.zeros(0)
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> ContinuousModel:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
-        above = [[entry.copy() for entry in row] for row in self.numerator]
-        below = [[entry.copy() for entry in row] for row in self.denominator]
+        given = {"b": self.numerator, "a": self.denominator, DELAY: self.delay}
+        tables = {letter: [[e.copy() for e in row] for row in rows] for letter, rows in given.items()}
         for parameter, value in zip(self.parameters, np.asarray(theta, dtype=float), strict=True):
             for i, j in parameter.places:
-                (above if parameter.letter == "b" else below)[i][j][parameter.power] = value
-        return ContinuousModel(
-            tuple(map(tuple, above)),
-            tuple(map(tuple, below)),
-            self.covariance if covariance is None else covariance,
-            self.common,
+                tables[parameter.letter][i][j][parameter.power] = value
+        above, below, delay = (tuple(map(tuple, tables[letter])) for letter in ("b", "a", DELAY))
+        return replace(
+            self,
+            numerator=above,
+            denominator=below,
+            delay=delay,
+            covariance=self.covariance if covariance is None else covariance,
         )
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
@@ -113,9 +141,15 @@ class ContinuousModel(Parametrised, WhiteNoise):
         """What samples u (.., n, r) cause at the outputs (.., n, p), from rest."""
         y = np.zeros((*u.shape[:-1], self.outputs))
         for i, j in self.active:
-            entry = intersample.entry(self.numerator[i][j], self.denominator[i][j])
-            y[..., i] += intersample.caused(entry, u[..., j])
+            y[..., i] += intersample.caused(self.held(i, j, intersample.sample_time), u[..., j])
         return y
+
+    def held(self, output: int, input: int, sample_time: float) -> HeldEntry:
+        """One entry as samples drive it."""
+        rows = (self.numerator, self.denominator)
+        above, below = (part[output][input] for part in rows)
+        late = self._delays((output, input))
+        return HeldEntry.of(above, below, sample_time, float(late[0]) if late.size else None)
 
     @cached_property
     def poles(self) -> ComplexArray:
@@ -134,28 +168,36 @@ class ContinuousModel(Parametrised, WhiteNoise):
             np.concatenate([polynomial_roots(p[output][input]) for p in (self.numerator, self.denominator)])
         )
 
-    def is_fraction(self, output: int, input: int) -> bool:
-        """Whether numerator and denominator of an entry are affine in theta: always."""
-        return True
+    @property
+    def memory(self) -> float:
+        """The longest dead time."""
+        return max((self.dead_time(i, j) for i, j in self.active), default=0.0)
+
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): its dead time."""
+        place = (output, input)
+        return np.array([p.letter == DELAY and place in p.places for p in self.parameters], dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as numerator over denominator, gradients (n, k)."""
+        """One entry of G as numerator over denominator, gradients (n, k); the numerator has the dead time."""
         s = 1j * np.asarray(w, dtype=float)
         above = np.zeros((s.size, len(self.parameters)), dtype=complex)
         below = np.zeros_like(above)
+        late = self._late(s, output, input)
         for index, parameter in enumerate(self.parameters):
-            if (output, input) in parameter.places:
+            if (output, input) in parameter.places and parameter.letter != DELAY:
                 gradient = above if parameter.letter == "b" else below
                 gradient[:, index] = s**parameter.power
-        numerator = np.asarray(ascending.polyval(s, self.numerator[output][input]), dtype=complex)
-        return Fraction(numerator, self._below(s, output, input), above, below)
+        numerator = late * ascending.polyval(s, self.numerator[output][input])
+        return Fraction(numerator, self._below(s, output, input), late[:, None] * above, below)
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
         s = 1j * np.asarray(w, dtype=float)
         G = np.zeros((s.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
-            G[:, i, j] = ascending.polyval(s, self.numerator[i][j]) / self._below(s, i, j)
+            above = self._late(s, i, j) * ascending.polyval(s, self.numerator[i][j])
+            G[:, i, j] = above / self._below(s, i, j)
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
@@ -165,11 +207,17 @@ class ContinuousModel(Parametrised, WhiteNoise):
         for index, parameter in enumerate(self.parameters):
             for i, j in parameter.places:
                 below = self._below(s, i, j)
-                factor = 1.0 / below
+                factor = self._late(s, i, j) / below
                 if parameter.letter == "a":
                     factor = -ascending.polyval(s, self.numerator[i][j]) * factor / below
+                if parameter.letter == DELAY:
+                    factor = -s * ascending.polyval(s, self.numerator[i][j]) * factor
                 gradient[:, index, i, j] = factor * s**parameter.power
         return gradient
+
+    def _late(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
+        """What the dead time of an entry does to it."""
+        return np.asarray(np.exp(-s * self.dead_time(i, j)), dtype=complex)
 
     def _below(self, s: ComplexArray, i: int, j: int) -> ComplexArray:
         return np.asarray(ascending.polyval(s, self.denominator[i][j]), dtype=complex)

@@ -14,6 +14,8 @@ _ZOOM_POINTS = 8
 _ZOOM_STEPS = 6
 # A peak between two grid points may stand this much higher than both.
 _SLACK = 0.05
+# Values that differ by less are those of a function that is flat there.
+_FLAT = 1e-12
 
 
 def logarithmic_distance(roots: ArrayLike) -> ComplexArray:
@@ -62,6 +64,8 @@ def local_maxima(
     bracket is narrowed by repeated sampling, all at once. Only continuity is asked for (tables have
     kinks). Maxima with values <= `above` are left out.
 
+    A maximum that only rounding tells from the value at an end of the grid is at that end.
+
     Returns:
         Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
     """
@@ -86,6 +90,11 @@ def local_maxima(
         best_value = np.where(better, found[rows, top], best_value)
         width = (right - left) / (_ZOOM_POINTS + 1)
         left, right = np.maximum(left, best - width), np.minimum(right, best + width)
+    for end, inner in ((0, 1), (-1, -2)):
+        level = float(function(grid[[end]])[0])
+        beside = np.abs(best - grid[end]) < np.abs(grid[inner] - grid[end])
+        flat = beside & (np.abs(best_value - level) <= _FLAT * np.abs(best_value))
+        best, best_value = np.where(flat, grid[end], best), np.where(flat, level, best_value)
     kept = best_value > above
     return best[kept], best_value[kept]
 

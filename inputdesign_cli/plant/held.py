@@ -2,6 +2,15 @@
 
 Both come from one matrix exponential ([van-loan-1978]). The same states serve samples that are not held but
 interpolated within their band.
+
+A dead time is d whole samples and a fraction nu of one. During a sample the plant sees the older input for
+the time nu and then the newer one, so that with Gamma(t) the integral of e^(A s) b over [0, t]
+
+    x(k + 1) = e^(A h) x(k) + Gamma(h - nu) u(k - d) + (Gamma(h) - Gamma(h - nu)) u(k - d - 1) ,
+
+which is exact for any fraction (the modified z-transform of [jury-1964]). The derivative with respect to the
+dead time is driven by e^(A (h - nu)) b (u(k - d - 1) - u(k - d)). At a boundary between samples it is that
+towards longer dead times: G has a kink there if its relative degree is one.
 """
 
 from __future__ import annotations
@@ -13,15 +22,22 @@ import numpy as np
 import scipy.linalg
 from numpy.polynomial import polynomial as ascending
 
+from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # What is left of a state, far below rounding.
 _FORGOTTEN = 1e-20
+# A dead time this near a boundary between samples, in samples, lies on it.
+_ON_BOUNDARY = 1e-9
 
 
 @dataclass(frozen=True)
 class HeldEntry:
-    """b / a behind a hold, as rows on the sampled states (1, s, .., s^{n-1}) / a and the same over a^2.
+    """e^(-delay s) b / a behind a hold, as rows on what samples cause.
+
+    That is, column by column: the states (1, s, .., s^{n-1}) / a and the same over a^2; the delayed input,
+    where b has the degree of a; and where there is a `delay` (which may be zero), the derivatives of the
+    first n states, and of the input, with respect to it.
 
     The unit of time is the geometric mean of the time constants, which keeps the companion form tame;
     `unit` is what it is in the time of the spec, so that s = s' unit.
@@ -30,12 +46,16 @@ class HeldEntry:
     numerator: Array  # ascending in s, padded to the length of the denominator
     denominator: Array
     unit: float
-    transition: Array
-    entry: Array
+    sample_time: float
+    system: Array  # [A b; 0 0] in its own unit of time
+    delay: float | None
+    biproper: bool  # whether the delayed input itself is among the columns
 
     @classmethod
-    def of(cls, numerator: Array, denominator: Array, sample_time: float) -> HeldEntry:
-        """b / a, ascending in s, held over `sample_time`."""
+    def of(
+        cls, numerator: Array, denominator: Array, sample_time: float, delay: float | None = None
+    ) -> HeldEntry:
+        """b / a, ascending in s, held over `sample_time` after a dead time."""
         n = denominator.size - 1
         padded = np.zeros(n + 1)
         padded[: numerator.size] = numerator
@@ -50,8 +70,7 @@ class HeldEntry:
         if n:
             system[2 * n - 1, 0] = 1.0  # the second copy is driven by 1 / a
             system[n - 1, 2 * n] = 1.0
-        held = scipy.linalg.expm(system * (unit * sample_time))
-        return cls(padded, denominator, unit, held[: 2 * n, : 2 * n], held[: 2 * n, 2 * n])
+        return cls(padded, denominator, unit, sample_time, system, delay, numerator.size == n + 1)
 
     @property
     def order(self) -> int:
@@ -60,26 +79,97 @@ class HeldEntry:
 
     @property
     def direct(self) -> float:
-        """What acts without delay: b / a at infinite frequency."""
+        """What acts without delay but the dead time: b / a at infinite frequency."""
         return float(self.numerator[-1])
 
     @cached_property
-    def gain(self) -> Array:
-        """(2 order,): the row of what acts with a delay."""
-        return self.row(self.numerator - self.direct * self.denominator, 1)
+    def transition(self) -> Array:
+        """(2 order, 2 order): of the states over one sample."""
+        return self._held[: 2 * self.order, : 2 * self.order]
 
-    def states(self, z: ComplexArray) -> ComplexArray:
-        """(n, 2 order): the states at points z of the unit circle.
+    @cached_property
+    def entries(self) -> Array:
+        """(2 order, 2): how u(k - lag) and u(k - lag - 1) enter the states."""
+        n = 2 * self.order
+        whole, early = self._held[:n, n], self._after_fraction[:n, n]
+        return np.stack([early, whole - early], axis=1)
+
+    @property
+    def lag(self) -> int:
+        """d, the whole samples of the dead time."""
+        return self._split[0]
+
+    @property
+    def direct_lag(self) -> int:
+        """The samples by which what acts at once is late: it is not there before the fraction is over."""
+        return self.lag + (self._fraction > 0.0)
+
+    @cached_property
+    def _split(self) -> tuple[int, float]:
+        """Whole samples of the dead time, and what is left of it in the time of the spec."""
+        samples = (self.delay or 0.0) / self.sample_time
+        whole = int(np.floor(samples + _ON_BOUNDARY))
+        left = samples - whole
+        return whole, left * self.sample_time if left > _ON_BOUNDARY else 0.0
+
+    @property
+    def _fraction(self) -> float:
+        return self._split[1]
+
+    def _exponential(self, time: float) -> Array:
+        return np.asarray(scipy.linalg.expm(self.system * (self.unit * time)))
+
+    @cached_property
+    def _held(self) -> Array:
+        return self._exponential(self.sample_time)
+
+    @cached_property
+    def _pulse(self) -> Array:
+        """(order,): how u(k - d - 1) - u(k - d) enters the derivatives of the first states."""
+        n = self.order
+        return np.asarray(self.unit * self._after_fraction[:n, n - 1])
+
+    @cached_property
+    def _after_fraction(self) -> Array:
+        """The exponential over what is left of a sample after the fraction."""
+        return self._exponential(self.sample_time - self._fraction) if self._fraction else self._held
+
+    @cached_property
+    def gain(self) -> Array:
+        """The row of the output."""
+        row = self.row(self.numerator - self.direct * self.denominator, 1)
+        if self.biproper:
+            row[2 * self.order] = self.direct
+        return row
+
+    def responses(self, z: ComplexArray) -> ComplexArray:
+        """(m, columns): what held samples cause, at points z of the unit circle."""
+        late = z ** -float(self.lag)
+        entries = self.entries if self._fraction else self.entries[:, :1]
+        driven = entries.T[:1] + entries.T[1:] / z[:, None] if self._fraction else entries.T
+        parts: list[ComplexArray | Array] = [late[:, None] * self._through(driven, z)]
+        if self.biproper:
+            parts.append(z[:, None] ** -float(self.direct_lag))
+        if self.delay is not None:
+            n = self.order
+            pulse = np.concatenate([self._pulse, np.zeros(n)])[None]
+            parts.append((late * (1.0 / z - 1.0))[:, None] * self._through(pulse, z)[:, :n])
+            if self.biproper:
+                parts.append(np.zeros((z.size, 1)))
+        return np.concatenate(parts, axis=1).astype(complex)
+
+    def _through(self, driven: ComplexArray | Array, z: ComplexArray) -> ComplexArray:
+        """(m, 2 order): the states that inputs (m or 1, 2 order) drive, at points z.
 
         By back-substitution in Schur's triangular form, for all points at once.
         """
         if not self.order:
             return np.zeros((z.size, 0), dtype=complex)
         triangle, basis = self._schur
-        driven = basis.conj().T @ self.entry
-        modes = np.zeros((driven.size, z.size), dtype=complex)
-        for row in reversed(range(driven.size)):
-            above = driven[row] + triangle[row, row + 1 :] @ modes[row + 1 :]
+        into = basis.conj().T @ driven.T
+        modes = np.zeros((len(into), z.size), dtype=complex)
+        for row in reversed(range(len(into))):
+            above = into[row] + triangle[row, row + 1 :] @ modes[row + 1 :]
             modes[row] = above / (z - triangle[row, row])
         return np.asarray((basis @ modes).T, dtype=complex)
 
@@ -89,38 +179,74 @@ class HeldEntry:
         triangle, basis = scipy.linalg.schur(self.transition, output="complex")
         return triangle, basis
 
-    def interpolated_states(self, w: Array) -> ComplexArray:
-        """(n, 2 order): the states at frequencies w of the continuous entry, without a hold."""
+    def interpolated(self, w: Array) -> ComplexArray:
+        """(m, columns): what the interpolation of samples causes, at frequencies w, without a hold."""
         s = 1j * w[:, None] / self.unit
         scaled = self.denominator * self.unit ** (np.arange(self.order + 1.0) - self.order)
         below = ascending.polyval(s, scaled)
         chain = s ** np.arange(self.order) / below
-        return np.concatenate([chain, chain / below], axis=1)
+        late = np.exp(-1j * w * (self.delay or 0.0))[:, None]
+        parts = [late * chain, late * chain / below, *([late] if self.biproper else [])]
+        if self.delay is not None:
+            slope = -1j * w[:, None] * late
+            parts += [slope * chain, *([slope] if self.biproper else [])]
+        return np.concatenate(parts, axis=1)
 
-    def forgetting(self, states: ComplexArray, z: ComplexArray, samples: int) -> ComplexArray:
-        """States (n, 2 order) at points z whose memory ends after so many samples.
+    def forgetting(self, responses: ComplexArray, z: ComplexArray, samples: int) -> ComplexArray:
+        """Responses (m, columns) at points z whose memory ends after so many samples.
 
         Exact in a record that is no longer, whatever the poles: there is nothing older to remember.
         """
-        lost = np.linalg.matrix_power(self.transition, samples)
+        n = self.order
+        left = samples - (0 if self.delay is None else self.lag + 1)
+        if left <= 0:  # nothing arrives before the record ends
+            return np.zeros_like(responses)
+        lost = np.linalg.matrix_power(self.transition, left)
         if np.all(np.abs(lost) < _FORGOTTEN):
-            return states
-        return np.asarray(states - z[:, None] ** -float(samples) * (states @ lost.T), dtype=complex)
+            return responses
+        kept, fade = responses.copy(), z[:, None] ** -float(left)
+        blocks = [(slice(0, 2 * n), lost)]
+        if self.delay is not None:
+            start = 2 * n + self.biproper
+            blocks.append((slice(start, start + n), lost[:n, :n]))
+        for block, matrix in blocks:
+            kept[:, block] -= fade * (responses[:, block] @ matrix.T)
+        return kept
 
-    def gradient(self, letter: str, power: int) -> tuple[float, Array]:
-        """Direct term and row of the gradient with respect to one coefficient."""
+    def gradient(self, letter: str, power: int) -> Array:
+        """The row of the gradient with respect to one coefficient, or to the dead time."""
+        if letter == DELAY:
+            return self._late_gain
         above = np.zeros(power + 1)
         above[power] = 1.0
         if letter == "b":
-            if power == self.order:
-                return 1.0, self.row(above - self.denominator, 1)
-            return 0.0, self.row(above, 1)
+            if power < self.order:
+                return self.row(above, 1)
+            row = self.row(above - self.denominator, 1)
+            row[2 * self.order] = 1.0
+            return row
         whole, rest = ascending.polydiv(ascending.polymul(above, self.numerator), self.denominator)
-        return 0.0, -self.row(np.asarray(whole), 1) - self.row(np.asarray(rest), 2)
+        return -self.row(np.asarray(whole), 1) - self.row(np.asarray(rest), 2)
+
+    @property
+    def _late_gain(self) -> Array:
+        """The row of the output, on the derivatives with respect to the dead time."""
+        n, row = self.order, np.zeros(self.columns)
+        start = 2 * n + self.biproper
+        row[start : start + n] = self.gain[:n]
+        if self.biproper:
+            row[-1] = self.direct
+        return row
+
+    @property
+    def columns(self) -> int:
+        """Number of columns of the responses."""
+        once = self.order + self.biproper
+        return self.order + once + (0 if self.delay is None else once)
 
     def row(self, coefficients: Array, copy: int) -> Array:
         """The row that reads coefficients(s) / a^copy off the states; powers of s carry their unit."""
-        row = np.zeros(2 * self.order)
+        row = np.zeros(self.columns)
         trimmed = np.asarray(coefficients, dtype=float)[: self.order]
         powers = np.arange(trimmed.size) - copy * self.order
         start = (copy - 1) * self.order
@@ -128,17 +254,27 @@ class HeldEntry:
         return row
 
     @cached_property
-    def roots(self) -> ComplexArray:
-        """Poles and zeros in z."""
+    def sampled(self) -> tuple[Array, Array]:
+        """Numerator and denominator in q^-1, ascending: of the entry behind the hold."""
         n = self.order
-        if not n:
+        below = np.asarray(np.poly(self.transition[:n, :n]) if n else np.ones(1), dtype=float)
+        above = np.zeros(self.lag + n + 2)
+        for late, entry in enumerate(self.entries[:n].T):
+            markov, state = np.zeros(n + 1), entry
+            for k in range(1, n + 1):
+                markov[k], state = self.gain[:n] @ state, self.transition[:n, :n] @ state
+            above[self.lag + late : self.lag + late + n + 1] += np.convolve(below, markov)[: n + 1]
+        above[self.direct_lag : self.direct_lag + n + 1] += self.direct * below
+        return np.trim_zeros(above, "b"), below
+
+    @cached_property
+    def roots(self) -> ComplexArray:
+        """Poles and zeros in z, those at the origin left out."""
+        if not self.order:
             return np.zeros(0, dtype=complex)
-        A, b, c = self.transition[:n, :n], self.entry[:n], self.gain[:n]
-        bottom = np.poly(A)
-        top = np.poly(A - np.outer(b, c)) + (self.direct - 1.0) * bottom
-        significant = np.abs(top) > 1e-12 * np.abs(top).max()
-        top = top[int(np.argmax(significant)) :]
-        return np.concatenate([np.linalg.eigvals(A), np.roots(top)]).astype(complex)
+        above, below = self.sampled
+        above = above[int(np.argmax(np.abs(above) > 1e-12 * np.abs(above).max())) :]
+        return np.concatenate([np.roots(below), np.roots(above)]).astype(complex)
 
 
 def polynomial_roots(coefficients: Array) -> ComplexArray:

@@ -25,12 +25,8 @@ class Intersample:
     sample_time: float
     hold: bool
 
-    def entry(self, numerator: Array, denominator: Array) -> HeldEntry:
-        """A transfer function in s, ascending coefficients, at these instants."""
-        return HeldEntry.of(numerator, denominator, self.sample_time)
-
-    def states(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
-        """The states (.., N, 2 order) of an entry that samples (.., N) drive from rest.
+    def responses(self, entry: HeldEntry, signal: Array, *, hold: bool) -> NDArray[np.float64]:
+        """The columns (.., N, columns) of an entry that samples (.., N) drive from rest.
 
         Measured outputs are never held, whatever the input is.
         """
@@ -38,13 +34,12 @@ class Intersample:
         length = 2 * scipy.fft.next_fast_len(samples, real=True)
         angles = 2.0 * np.pi * np.arange(length // 2 + 1) / length
         z = np.exp(1j * angles)
-        states = entry.states(z) if hold else entry.interpolated_states(angles / self.sample_time)
-        states = entry.forgetting(states, z, samples)
+        columns = entry.responses(z) if hold else entry.interpolated(angles / self.sample_time)
+        columns = entry.forgetting(columns, z, samples)
         transform = scipy.fft.rfft(signal, length, axis=-1)
-        driven = scipy.fft.irfft(transform[..., None] * states, length, axis=-2)
+        driven = scipy.fft.irfft(transform[..., None] * columns, length, axis=-2)
         return np.asarray(driven[..., :samples, :])
 
     def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
         """The output (.., N) of an entry that samples u (.., N) drive."""
-        driven = self.states(entry, u, hold=self.hold)
-        return np.asarray(entry.direct * u + driven @ entry.gain)
+        return np.asarray(self.responses(entry, u, hold=self.hold) @ entry.gain)

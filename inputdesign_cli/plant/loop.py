@@ -89,6 +89,11 @@ class Loop(ABC):
         """Poles of all that the excitation and the noise cause, as points of the frequency plane."""
         return logarithmic_distance(np.concatenate([self.closed_poles, self.predictor_poles]))
 
+    @property
+    def memory(self) -> float:
+        """How long, in samples, signals matter beyond what the poles remember."""
+        return self.model.memory + self.controller.memory
+
     def check_stability(self) -> None:
         """Raise `SpecError` unless the loop is well posed and internally stable.
 

@@ -29,7 +29,9 @@ class Model(Protocol):
     plane are frequency + j damping (see `logarithmic_distance`).
     """
 
-    continuous: bool
+    @property
+    def continuous(self) -> bool:
+        """Whether frequencies are in rad per time unit."""
 
     @property
     def inputs(self) -> int:
@@ -62,11 +64,15 @@ class Model(Protocol):
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Poles and zeros of one entry of G, as points of the frequency plane."""
 
-    def is_fraction(self, output: int, input: int) -> bool:
-        """Whether numerator and denominator of an entry of G are affine in theta."""
+    @property
+    def memory(self) -> float:
+        """How long, in samples or in time units, signals matter beyond what the poles remember."""
+
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): the parameters in which numerator and denominator of an entry of G are not affine."""
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as such a fraction, where `is_fraction`."""
+        """One entry of G as such a fraction, where no free parameter bends it."""
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
@@ -98,6 +104,10 @@ class Model(Protocol):
         """
 
 
+DELAY = "delay"
+"""The letter of a dead time, which has no powers."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A coefficient: its polynomial, its power, and where it acts; a common one acts in several places."""
@@ -110,8 +120,8 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """Letter, power and channels, as `b1` or `f2[1,2]`."""
-        return f"{self.letter}{self.power}{self.label}"
+        """Letter, power and channels, as `b1`, `f2[1,2]` or `delay[1,2]`."""
+        return f"{self.letter}{'' if self.letter == DELAY else self.power}{self.label}"
 
 
 def entry_label(output: int, input: int, *, single: bool) -> str:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.loop import Loop, close_loop
 from inputdesign_cli.plant.polynomial import (
     Array,
@@ -95,9 +95,9 @@ class PolynomialLoop(Loop):
         m, samples = self.model, r.shape[-2]
         right = np.empty((*r.shape[:-1], m.outputs + m.inputs))
         for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):
-            right[..., i] = scipy.signal.lfilter(np.convolve(self._others(i), c), d, e[..., i])
+            right[..., i] = filtered(np.convolve(self._others(i), c), d, e[..., i])
         for j, q in enumerate(self.controller.denominator):
-            right[..., m.outputs + j] = scipy.signal.lfilter(q, [1.0], r[..., j])
+            right[..., m.outputs + j] = filtered(q, [1.0], r[..., j])
         if right.shape[-1] == 2:
             return self._single(right[..., :1], right[..., 1:])
         inverse = np.linalg.inv(self._left[..., 0])
@@ -118,8 +118,8 @@ class PolynomialLoop(Loop):
         determinant = np.convolve(R, Q) - np.convolve(minus_N, P)
 
         def solved(a: Array, x: Array, b: Array, z: Array) -> Array:
-            above = scipy.signal.lfilter(a, [1.0], x, axis=-2) - scipy.signal.lfilter(b, [1.0], z, axis=-2)
-            return np.asarray(scipy.signal.lfilter([1.0], determinant, above, axis=-2))
+            above = filtered(a, [1.0], x, axis=-2) - filtered(b, [1.0], z, axis=-2)
+            return np.asarray(filtered([1.0], determinant, above, axis=-2))
 
         return solved(Q, top, minus_N, bottom), solved(R, bottom, P, top)
 

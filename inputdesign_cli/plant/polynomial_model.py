@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label
 from inputdesign_cli.plant.polynomial import (
@@ -119,6 +119,12 @@ class PolynomialModel(Parametrised):
         places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
         return tuple((i, j) for i, j in places if np.any(self.B[i][j]))
 
+    @property
+    def memory(self) -> float:
+        """The longest polynomials in a row, in samples: what they filter is forgotten after that."""
+        rows = (self.A, self.C, self.D, *self.B, *self.F)
+        return float(sum(max(p.size for p in row) for row in rows))
+
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         """(k,): the parameters on which G depends."""
@@ -158,12 +164,15 @@ class PolynomialModel(Parametrised):
             H[:, i, i] = evaluate(c, q) / (evaluate(a, q) * evaluate(d, q))
         return H
 
-    def is_fraction(self, output: int, input: int) -> bool:
-        """Whether an entry is a fraction of two polynomials that are affine in theta."""
-        return len(self._row(self.A, output)) == 1 or len(self.F[output][input]) == 1
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): those of A and F of the entry, where both stand in its denominator."""
+        both = len(self._row(self.A, output)) > 1 and len(self.F[output][input]) > 1
+        return np.array(
+            [both and p.letter in "af" and (output, input) in p.places for p in self.parameters], dtype=bool
+        )
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
-        """One entry of G as such a fraction, gradients (n, k), where `is_fraction`."""
+        """One entry of G as such a fraction, gradients (n, k), where none is bent."""
         q = unit_circle(w)
         above = np.zeros((q.size, len(self.parameters)), dtype=complex)
         below = np.zeros_like(above)
@@ -264,10 +273,10 @@ class PolynomialModel(Parametrised):
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
         y, v = np.zeros((*u.shape[:-1], self.outputs)), np.empty(e.shape)
         for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
-            v[..., i] = scipy.signal.lfilter(c, np.convolve(a, d), e[..., i])
+            v[..., i] = filtered(c, np.convolve(a, d), e[..., i])
             for j, (b, f) in enumerate(zip(self.B[i], self.F[i], strict=True)):
                 if np.any(b):
-                    y[..., i] += scipy.signal.lfilter(b, np.convolve(a, f), u[..., j])
+                    y[..., i] += filtered(b, np.convolve(a, f), u[..., j])
         return y, v
 
     @property

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.intersample import Intersample
-from inputdesign_cli.plant.model import Fraction, WhiteNoise
+from inputdesign_cli.plant.model import Fraction, Parameter, WhiteNoise
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import StateSpace
 
@@ -46,6 +46,11 @@ class SampledModel(WhiteNoise):
         return self.continuous_plant.covariance
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The k parameters, those of the plant in s."""
+        return self.continuous_plant.parameters
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the k parameters."""
         return self.continuous_plant.names
@@ -58,10 +63,7 @@ class SampledModel(WhiteNoise):
     @cached_property
     def _entries(self) -> dict[tuple[int, int], HeldEntry]:
         plant = self.continuous_plant
-        return {
-            (i, j): HeldEntry.of(plant.numerator[i][j], plant.denominator[i][j], self.sample_time)
-            for i, j in plant.active
-        }
+        return {(i, j): plant.held(i, j, self.sample_time) for i, j in plant.active}
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> SampledModel:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
@@ -78,15 +80,37 @@ class SampledModel(WhiteNoise):
 
     @cached_property
     def realisation(self) -> StateSpace:
-        """From inputs to outputs, an entry's states beside those of the others."""
-        direct = np.zeros((self.outputs, self.inputs))
-        blocks = []
+        """From inputs to outputs: the past of each input, then the states of entry after entry."""
+        lags = [(j, entry.direct_lag) for (_, j), entry in self._entries.items()]
+        past = [max((lag for other, lag in lags if other == j), default=0) for j in range(self.inputs)]
+        first = np.concatenate([[0], np.cumsum(past)]).astype(int)
+        orders = [entry.order for entry in self._entries.values()]
+        size = int(first[-1]) + sum(orders)
+        A, B = np.zeros((size, size)), np.zeros((size, self.inputs))
+        C, D = np.zeros((self.outputs, size)), np.zeros((self.outputs, self.inputs))
+        for j, length in enumerate(past):
+            A[first[j] : first[j + 1], first[j] : first[j + 1]] = np.eye(length, k=-1)
+            if length:
+                B[first[j], j] = 1.0
+
+        def read(into: Array, at_once: Array, j: int, lag: int, column: Array) -> None:
+            """Let a column read u_j(k - lag), off the past or off the input itself."""
+            if lag:
+                into[:, first[j] + lag - 1] += column
+            else:
+                at_once[:, j] += column
+
+        start = int(first[-1])
         for (i, j), entry in self._entries.items():
-            n = entry.order
-            B, C = np.zeros((n, self.inputs)), np.zeros((self.outputs, n))
-            B[:, j], C[i], direct[i, j] = entry.entry[:n], entry.gain[:n], entry.direct
-            blocks.append((entry.transition[:n, :n], B, C))
-        return StateSpace.of(blocks, direct)
+            own = slice(start, start + entry.order)
+            start += entry.order
+            A[own, own], C[i, own] = entry.transition[: entry.order, : entry.order], entry.gain[: entry.order]
+            early, late = entry.entries[: entry.order].T
+            read(A[own], B[own], j, entry.lag, early)
+            if np.any(late):
+                read(A[own], B[own], j, entry.lag + 1, late)
+            read(C[i : i + 1], D[i : i + 1], j, entry.direct_lag, np.array([entry.direct]))
+        return StateSpace(A, B, C, D)
 
     @cached_property
     def singularities(self) -> ComplexArray:
@@ -98,9 +122,14 @@ class SampledModel(WhiteNoise):
         entry = self._entries.get((output, input))
         return np.zeros(0, dtype=complex) if entry is None else logarithmic_distance(entry.roots)
 
-    def is_fraction(self, output: int, input: int) -> bool:
-        """Never: sampled coefficients depend on those of s through an exponential."""
-        return False
+    @property
+    def memory(self) -> float:
+        """The longest dead time, in samples, and one for what is left of it."""
+        return max((entry.lag + 1.0 for entry in self._entries.values() if entry.delay), default=0.0)
+
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): all, for sampled coefficients depend on those of s through an exponential."""
+        return np.ones(self.theta.size, dtype=bool)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
         """There is none."""
@@ -111,17 +140,16 @@ class SampledModel(WhiteNoise):
         z = np.exp(1j * np.asarray(w))
         G = np.zeros((z.size, self.outputs, self.inputs), dtype=complex)
         for (i, j), entry in self._entries.items():
-            G[:, i, j] = entry.direct + entry.states(z) @ entry.gain
+            G[:, i, j] = entry.responses(z) @ entry.gain
         return G
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
         z = np.exp(1j * np.asarray(w))
-        parameters = self.continuous_plant.parameters
-        gradient = np.zeros((z.size, len(parameters), self.outputs, self.inputs), dtype=complex)
-        states = {place: entry.states(z) for place, entry in self._entries.items()}
-        for index, parameter in enumerate(parameters):
+        gradient = np.zeros((z.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        responses = {place: entry.responses(z) for place, entry in self._entries.items()}
+        for index, parameter in enumerate(self.parameters):
             for place in parameter.places:
-                direct, row = self._entries[place].gradient(parameter.letter, parameter.power)
-                gradient[:, index, place[0], place[1]] = direct + states[place] @ row
+                row = self._entries[place].gradient(parameter.letter, parameter.power)
+                gradient[:, index, place[0], place[1]] = responses[place] @ row
         return gradient

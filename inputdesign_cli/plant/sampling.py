@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.signal
 
+from inputdesign_cli.plant.held import HeldEntry
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.plant.transfer import Rational
 
@@ -18,6 +18,8 @@ def zero_order_hold(numerator: Sequence[float], denominator: Sequence[float], pe
     """
     if len(denominator) == 1:
         return Rational(np.array([numerator[-1] / denominator[0]]))
+    import scipy.signal  # only now: see `plant.filtering`
+
     # scipy takes coefficients below 1e-14 for zeros, so it gets a numerator of order one.
     given = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
     gain = float(np.abs(given).max(initial=0.0))
@@ -32,11 +34,27 @@ def hold_entries(
     numerators: Sequence[Sequence[Sequence[float]]],
     denominators: Sequence[Sequence[Sequence[float]]],
     period: float,
+    delays: Sequence[Sequence[float]],
 ) -> tuple[Rows, Rows]:
-    """The same for every entry of a matrix: numerators and denominators in q^-1, ascending."""
+    """The same for every entry of a matrix: numerators and denominators in q^-1, ascending.
+
+    Args:
+        delays: the dead times of the entries.
+    """
     held = [
-        [zero_order_hold(above, below, period) for above, below in zip(*rows, strict=True)]
-        for rows in zip(numerators, denominators, strict=True)
+        [_held(above, below, period, late) for above, below, late in zip(*rows, strict=True)]
+        for rows in zip(numerators, denominators, delays, strict=True)
     ]
     above = tuple(tuple(entry.numerator for entry in row) for row in held)
     return above, tuple(tuple(entry.denominator_polynomial for entry in row) for row in held)
+
+
+def _held(above: Sequence[float], below: Sequence[float], period: float, delay: float) -> Rational:
+    """One entry, with its dead time."""
+    if not delay:
+        return zero_order_hold(above, below, period)
+    low, high = (np.trim_zeros(np.array(p[::-1], dtype=float), "b") for p in (above, below))
+    if not low.size:
+        return Rational(np.zeros(1))
+    numerator, denominator = HeldEntry.of(low / high[-1], high / high[-1], period, delay).sampled
+    return Rational(numerator, (denominator,))

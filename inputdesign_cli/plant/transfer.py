@@ -184,6 +184,11 @@ class TransferMatrix:
         """Poles in z."""
         return join_roots(roots_in_z(factor) for row in self.factors for factor in row)
 
+    @property
+    def memory(self) -> float:
+        """The longest polynomial, in samples."""
+        return float(max([self.numerator.shape[-1], *(d.size for d in self.denominator)]))
+
     @cached_property
     def delay(self) -> int:
         """The number of samples by which every entry is delayed."""

@@ -38,6 +38,8 @@ _CAPTIONS = {
     "directions": "The gains of the plant, and how the design shares its power among their directions.",
     "moments": "The second moments of the regressors.",
     "error": "The mean squared error against the energy of the regressors, bias and variance apart.",
+    "frequency_response": "What the data say of G without a model, with the range that holds |G| with 95 % "
+    "at each frequency, beside the model: where the model leaves the range, it is wrong there.",
     "loss": "The loss in simulated experiments.",
 }
 
@@ -119,6 +121,8 @@ def _bound(table: Mapping[str, Array], result: Result) -> Drawn | None:
         table.get("r_u_white"),
         active,
         table.get("r_u_record"),
+        # Beside a design the figure of the data is one of its own.
+        label="data" if "identification" in result and "objective" not in result else "design",
     )
     curves = BoundCurves((panel,))
     if panel.r_adm is None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from inputdesign_cli.report.numbers import Fact, listed, shown, spoken
 from inputdesign_cli.runs.objectives import objective
-from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.results import Json, Result
 
 # What is said of an excitation that was given, by the status of the result.
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
@@ -34,6 +34,15 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
         yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+    if "confidence" in error:
+        told = error["confidence"]
+        low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
+        yield (
+            "confidence",
+            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} simulated estimates meet it",
+            f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
+            f"not {error['alpha']:.4g}",
+        )
     if "mean_squared_error" in result:
         error = result["mean_squared_error"]
         parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"
@@ -94,8 +103,25 @@ def _signal(result: Result) -> Iterator[str]:
         error = "worst_ratio" in result.get("model_error", {})
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
         yield f"{ratio} at most {signal['worst_ratio']:.4g} with these samples"
-    more = signal.get("extra_power", 0.0)
-    if abs(more) >= 5e-5:
-        yield f"costs {abs(100 * more):.3g} % {'more' if more > 0 else 'less'} than the design"
     if "criterion" in signal:
         yield f"criterion {signal['criterion']:.6g} with these samples"
+    yield from _beside_the_design(result.get("objective", {}), signal)
+
+
+def _beside_the_design(found: Mapping[str, Json], signal: Mapping[str, Json]) -> Iterator[str]:
+    """What the samples buy less, where the best was asked for, or what else they cost."""
+    if "efficiency" in signal or found.get("kind") == "accuracy_factor":
+        less = 1.0 - signal.get("efficiency", 1.0)
+        if "worst_ratio" in signal:
+            less = 1.0 - found["value"] / signal["worst_ratio"]
+        if less >= 5e-4:
+            yield f"{100 * less:.3g} % less accuracy than the design"
+        return
+    more = signal.get("extra_power", 0.0)
+    if abs(more) < 5e-5:
+        return
+    aside = f"{abs(100 * more):.3g} % {'above' if more > 0 else 'below'} that of the design"
+    if signal.get("worst_ratio", 2.0) <= 1.0 + 1e-6:
+        yield f"the power that they need for the accuracy costs {aside}"
+    else:
+        yield f"their power costs {aside}"

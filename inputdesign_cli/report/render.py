@@ -56,4 +56,4 @@ def _filled(
         source = directory.name or directory.resolve().name
         return page.render(version=__version__, source=source, record=record, digest=digest, **content)
     except _BROKEN as error:
-        raise unreadable(directory / record, f"{type(error).__name__}: {error}") from error
+        raise unreadable(directory / record, "its entries are not what idesign writes") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.runs.objectives import objective
+from inputdesign_cli.runs.record import RESULT, unreadable
 from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.run_directory import read_run
 
@@ -30,20 +32,40 @@ _SECTIONS = (
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),
 )
-_OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound")
+_OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound", "frequency_response")
 _OF_RUNS = ("errors_", "cloud_", "disturbance_")
 _NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "made_from"})
 _MOST_ENTRIES = 16
-_COMMANDS = {
-    "assess": "idesign assess spec.yaml DATA",
-    "identify": "idesign identify DATA --spec spec.yaml",
-    **{verb: f"idesign {verb} spec.yaml" for verb in ("simulate", "solve", "analyse")},
+# What these fields of a result are, where it has them: somebody else may have written it.
+_FIELDS = {
+    str: (("title", "status"), "a text"),
+    list: (("requirements", "limits", "notes", "made_from"), "a list"),
+    dict: (
+        (
+            "objective",
+            "power",
+            "model_error",
+            "information",
+            "baseline",
+            "signal",
+            "solver",
+            "timing_s",
+            "environment",
+            "identification",
+            "assessment",
+            "simulation",
+            "moments",
+            "mean_squared_error",
+        ),
+        "a mapping",
+    ),
 }
 
 
 def run_page(run: Path) -> dict[str, Json]:
     """The content of the template for a run. Raises `DataError` as `read_run` does."""
     result = read_run(run)
+    _check_fields(run, result)
     verb = _verb(result)
     text = read_regular(run / "spec.yaml").decode()
     try:
@@ -76,8 +98,8 @@ def run_page(run: Path) -> dict[str, Json]:
         "simulated_runs": result.get("simulation", {}).get("runs"),
         "run_charts": runs,
         "assumptions": assumptions(question, result),
-        "command": _COMMANDS[verb],
-        "files": [],
+        "command": _command(verb, result),
+        "files": _data_files(result),
         "spec": text,
         "provenance": provenance(
             result.get("environment", {}),
@@ -91,6 +113,14 @@ def run_page(run: Path) -> dict[str, Json]:
     }
 
 
+def _check_fields(run: Path, result: Result) -> None:
+    """Raise `DataError` (`run-unreadable`) that names the first field which is not of its kind."""
+    for kind, (names, called) in _FIELDS.items():
+        for name in names:
+            if not isinstance(result.get(name, kind()), kind):
+                raise unreadable(run / RESULT, f'"{name}" is not {called}')
+
+
 def _verb(result: Result) -> str:
     if "assessment" in result:
         return "assess"
@@ -99,6 +129,25 @@ def _verb(result: Result) -> str:
     if result.get("simulation"):
         return "simulate"
     return "solve" if "objective" in result else "analyse"
+
+
+def _data_files(result: Result) -> list[str]:
+    """The names of the records that the run was made from."""
+    return [Path(str(name)).name for name in result.get("made_from", [])[1:]]
+
+
+def _command(verb: str, result: Result) -> str:
+    """What makes the run again, with the names of the data and what was taken away from them."""
+    if verb not in ("assess", "identify"):
+        return f"idesign {verb} spec.yaml"
+    data, found = _data_files(result) or ["DATA"], result["identification"]
+    words = [verb, "spec.yaml", *data] if verb == "assess" else [verb, *data, "--spec", "spec.yaml"]
+    if found.get("means_removed"):
+        words.append("--remove-means")
+    elif found.get("operating_point"):
+        levels = [f"{name}={float(level)!r}" for name, level in found["operating_point"].items()]
+        words += ["--operating-point", ",".join(levels)]
+    return shlex.join(["idesign", *words])
 
 
 def _answer(result: Result) -> str:

@@ -60,7 +60,8 @@ def _begun(target: Path, held: ExitStack) -> Path:
             if held.enter_context(_locked(work)):
                 return work
         except (FileExistsError, FileNotFoundError):
-            if time.monotonic() > due:
+            # Neither a link nor a file of that name goes away by waiting.
+            if time.monotonic() > due or (os.path.lexists(work) and not _is_folder(work)):
                 raise
 
 

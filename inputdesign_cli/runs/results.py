@@ -87,6 +87,24 @@ class BoundCurves(Curves):
 
 
 @dataclass(frozen=True)
+class ResponsePanel:
+    """|G| of one entry from data alone, the radius of its confidence disc, and |G| of a model; all (n,)."""
+
+    frequency: Array
+    G_abs: Array
+    radius: Array
+    model_abs: Array
+    entry: tuple[int, int] | None = None  # as of `BoundPanel`
+
+
+@dataclass(frozen=True)
+class ResponseCurves(Curves):
+    """The frequency response without a model beside that of a model, entry by entry."""
+
+    panels: tuple[ResponsePanel, ...]
+
+
+@dataclass(frozen=True)
 class OptimalityCurves(Curves):
     """The equivalence-theorem ratio over frequency: at most one everywhere, one on the support."""
 

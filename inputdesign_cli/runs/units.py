@@ -36,6 +36,10 @@ class Units:
         """The unit of frequencies, for sentences: rad/s."""
         return f"rad/{self.time_unit}"
 
+    def named(self, w: float) -> str:
+        """A frequency of an experiment for a sentence, in the user's unit: 0.15 rad/s."""
+        return f"{w / self.frequency:.4g} {self.per_time}"
+
     @property
     def frequency_header(self) -> str:
         """The header of a column of frequencies: frequency_rad_per_s."""

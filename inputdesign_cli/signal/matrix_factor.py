@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -32,6 +31,8 @@ class MatrixFactor:
 
     def filtered(self, samples: int, rng: np.random.Generator) -> Array:
         """(samples, n): stationary noise through the taps."""
+        import scipy.signal  # only now: see `plant.filtering`
+
         n = self.taps.shape[1]
         drive = rng.standard_normal((n, samples + self.taps.shape[0] - 1))
         out = np.zeros((samples, n))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
 
 from inputdesign_cli.plant.polynomial import Array
 
@@ -17,6 +16,8 @@ def pseudo_random(bits: int, samples: int, rng: np.random.Generator) -> Array:
     state = rng.integers(0, 2, bits)
     if not state.any():
         state[0] = 1
+    import scipy.signal  # only now: see `plant.filtering`
+
     length = min(samples, 2**bits - 1)
     sequence, _ = scipy.signal.max_len_seq(bits, state=state, length=length)
     return np.resize(2.0 * sequence - 1.0, samples)

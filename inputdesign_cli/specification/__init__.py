@@ -1,6 +1,7 @@
 """Specifications: YAML in, frozen and validated objects out, every diagnostic with its line."""
 
 from inputdesign_cli.specification.loading import load_spec, parse_spec
+from inputdesign_cli.specification.model_file import load_estimate
 from inputdesign_cli.specification.models.accuracy import ModelError
 from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
@@ -22,6 +23,7 @@ __all__ = [
     "SpecTemplate",
     "Sweep",
     "json_schema",
+    "load_estimate",
     "load_spec",
     "parse_spec",
     "read_template",

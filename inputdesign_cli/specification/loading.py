@@ -121,6 +121,8 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
     that was taken out, or with what contains it, is a consequence and is not reported.
     """
     data = copy.deepcopy(tree.data)
+    if not design:
+        _estimated_noise(data)
     told: list[PathDiagnostic] = []
     broken = set(tree.broken)
     for path in _empty(data, ()):
@@ -147,13 +149,20 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
     return None, told
 
 
+def _estimated_noise(data: dict[str, Plain]) -> None:
+    """The variance of the noise may be left out where it is to be estimated."""
+    noise = data.setdefault("noise", {})
+    if isinstance(noise, dict):
+        noise.setdefault("variance", 1.0)
+
+
 def _consequence(found: PathDiagnostic, broken: set[Path], attempt: int) -> bool:
     """Whether this follows from what was taken out before.
 
     What was taken out may have told which kind of plant or spectrum this is, so later attempts say nothing
-    about keys: what is missing or too much was said by the first.
+    about keys and names: what is missing or too much was said by the first.
     """
-    if attempt > 0 and found.code in ("unknown-key", "unsuitable-key"):
+    if attempt > 0 and found.code in ("unknown-key", "unsuitable-key", "unknown-name", "unused-parameter"):
         return True
     if found.keys:
         return any(related((*found.path, key), broken) for key in found.keys)

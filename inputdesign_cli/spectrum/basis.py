@@ -13,6 +13,8 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # From frequencies (n,) to values (n, ..) of one input, or Hermitian matrices (n, .., r, r) of several.
 Density = Callable[[Array], NDArray]
+# F (n, k, p, r) of a density of products, Re F_l^* F_m made symmetric in l and m: a shorter way to integrals.
+Factor = Callable[[Array], NDArray]
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class Face:
     columns: Array
     kind: Literal["nonnegative", "psd"]
     order: int
-    generators: Array
+    generators: NDArray
 
 
 @dataclass(frozen=True)
@@ -126,8 +128,16 @@ class Basis(Protocol):
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
-        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function."""
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
+        """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each basis function.
+
+        Where the density has a `factor`, families of several inputs need not form it.
+        """
+
+    def beyond(self, number: int) -> Basis:
+        """The basis functions after the first ones, for families that grow."""
 
     def coarser(self) -> Sequence[Basis]:
         """Smaller families to design first, from coarse to fine; x of each is the head of x of the next."""
@@ -177,6 +187,10 @@ class DensityFamily:
     def moving_average(self, x: Array) -> Array | None:
         """None: no finite one."""
         return None
+
+    def beyond(self, number: int) -> Self:
+        """None: such a family does not grow."""
+        raise ValueError("a family with a density does not grow")
 
     def in_units(self, units: Array) -> Self:
         """Itself: units do not matter."""

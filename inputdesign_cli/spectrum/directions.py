@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from inputdesign_cli.information import Quadrature
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, Functional
+from inputdesign_cli.spectrum.basis import Density, Factor, Functional
 
 _NODES_AT_ONCE = 256
 _SINGULAR = 1e-13
+_ROUNDING = 1e-15
 
 
 def matrices(density: NDArray) -> NDArray:
@@ -20,8 +21,12 @@ def matrices(density: NDArray) -> NDArray:
     return density[:, None, None] if density.ndim == 1 else density
 
 
-def weighted_sums(table: NDArray, density: Density, rule: Quadrature, inputs: int) -> NDArray:
+def weighted_sums(
+    table: NDArray, density: Density, rule: Quadrature, inputs: int, factor: Factor | None = None
+) -> NDArray:
     """sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r), a part of the nodes at a time."""
+    if factor is not None and inputs > 1:
+        return _summed_products(table, factor, rule)
     total: NDArray | float = 0.0
     for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
         part = slice(start, start + _NODES_AT_ONCE)
@@ -31,6 +36,29 @@ def weighted_sums(table: NDArray, density: Density, rule: Quadrature, inputs: in
         weighted = table[part] * rule.weights[part, None]
         total = total + np.tensordot(weighted, values, axes=(0, 0))
     return np.asarray(total)
+
+
+def _summed_products(table: NDArray, factor: Factor, rule: Quadrature) -> NDArray:
+    """The sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
+
+    Of an output only the parameters and inputs that matter to it take part.
+    """
+    half: NDArray = np.zeros(0)
+    for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
+        part = slice(start, start + _NODES_AT_ONCE)
+        F, weighted = factor(rule.nodes[part]), table[part] * rule.weights[part, None]
+        n, k, p, r = F.shape
+        if not half.size:
+            half = np.zeros((table.shape[1], k * r, k * r), dtype=complex)
+        for output in range(p):
+            rows = F[:, :, output].reshape(n, k * r)
+            size = np.abs(rows).max(axis=0)
+            used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
+            rows = rows[:, used]
+            for sums, weights in zip(half, weighted.T, strict=True):
+                sums[np.ix_(used, used)] += (rows.conj() * weights[:, None]).T @ rows
+    both = half.reshape(-1, k, r, k, r).transpose(0, 1, 3, 2, 4)
+    return 0.5 * (both + both.swapaxes(1, 2))
 
 
 def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:

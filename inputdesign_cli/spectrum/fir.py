@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Functional, Pricing
+from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import directed_scale
 from inputdesign_cli.spectrum.svec import smat, svec_layout
 
 _FIRST_ORDER = 11  # spectra up to this order are designed whole, in one face
 _DIRECTIONS = 8
 _MOST_KEPT = 18
-_KEPT = 1e-10  # share of the largest eigenvalue below which a generator is dropped
+_KEPT = 1e-14  # share of the largest eigenvalue below which a generator is dropped
 _SINGULAR_PRICE = 1e-10
 
 
@@ -73,7 +73,9 @@ class FirBasis(DensityFamily):
         """(m + 1,): Phi at one frequency as a functional; one input has one direction."""
         return self.functions(np.array([frequency]))[0]
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
         """(m + 1, ...): (1 / 2 pi) integral of density(w) times each basis function."""
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Experiment, Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Functional, Pricing
+from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import weighted_sums
 
 
@@ -48,11 +48,13 @@ class FlatBasis(DensityFamily):
         """(1,): v^* Phi v inside the band, the same for every direction v of length one."""
         return np.array([self.level])
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
         """(1, ...): level times (1 / 2 pi) integral of the trace of the density."""
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
-            sums = weighted_sums(np.ones((rule.nodes.size, 1)), density, rule, self.inputs)
+            sums = weighted_sums(np.ones((rule.nodes.size, 1)), density, rule, self.inputs, factor)
             return self.level * np.trace(sums, axis1=-2, axis2=-1).real
 
         return integrate_band(moments, singularities, self.band)

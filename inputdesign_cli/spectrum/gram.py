@@ -22,7 +22,7 @@ _WHOLE = 28  # Gram matrices up to this order are designed whole, in one face
 _FIRST = 16
 _DIRECTIONS = 8
 _MOST_KEPT = 24
-_KEPT = 1e-10  # share of the largest eigenvalue below which a generator is dropped
+_KEPT = 1e-14  # share of the largest eigenvalue below which a generator is dropped
 _SINGULAR_PRICE = 1e-12
 
 

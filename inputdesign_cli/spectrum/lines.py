@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, Face, Functional, Pricing
+from inputdesign_cli.spectrum.basis import Density, Face, Factor, Functional, Pricing
 from inputdesign_cli.spectrum.directions import best_directions, directed_scale, first_directions, matrices
 
-_FIRST_LINES = 24
+_FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
 _MOST_NEW = 16
+# From so many atoms on, so many of the most power stay.
+_MOST_ATOMS, _KEPT_ATOMS = 320, 200
+_ATOMS_AT_ONCE = 256
 # Two atoms at one frequency are the same when their directions agree this closely.
 _SAME = 1e-12
 # An atom is in use from this share of the cost, and near another within this distance (band and turn).
@@ -52,7 +55,8 @@ class LinesBasis:
     def anywhere(cls, lo: float, hi: float, inputs: int) -> LinesBasis:
         """Free frequencies on [lo, hi], to begin with some spread linearly and logarithmically."""
         low = max(lo, 1e-3 * hi)
-        start = np.concatenate([np.linspace(low, hi, _FIRST_LINES), np.geomspace(low, hi, _FIRST_LINES)])
+        number = int(np.clip(_FIRST_ATOMS // (2 * inputs**2), _FEWEST_LINES, _FIRST_LINES))
+        start = np.concatenate([np.linspace(low, hi, number), np.geomspace(low, hi, number)])
         return replace(cls.at(np.unique(start), inputs), free=True)
 
     @classmethod
@@ -102,19 +106,42 @@ class LinesBasis:
         axes = (np.abs(self.directions) > 1.0 - _SAME).astype(float)
         return axes @ (powers / np.sum(axes, axis=0))
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
         """(L, ...): v^* D(w) v, what an atom of power one picks up."""
+        if factor is not None and self.inputs > 1:
+            return self._products(factor)
         values = density(self.frequencies)
         if self.inputs == 1:
             return values
         return np.einsum("na,n...ab,nb->n...", self.directions.conj(), values, self.directions).real
 
+    def _products(self, factor: Factor) -> NDArray[np.float64]:
+        """(L, k, k): Re (F v) (F v)^*, a part of the atoms at a time."""
+        found = []
+        for start in range(0, self.size, _ATOMS_AT_ONCE):
+            part = slice(start, start + _ATOMS_AT_ONCE)
+            w, where = np.unique(self.frequencies[part], return_inverse=True)
+            F = factor(w)[where.ravel()]
+            along = (F @ self.directions[part][:, None, :, None])[..., 0]
+            real = np.concatenate([along.real, along.imag], axis=2)
+            found.append(real @ real.swapaxes(1, 2))
+        return np.concatenate(found)
+
+    def beyond(self, number: int) -> LinesBasis:
+        """The atoms after the first ones."""
+        return replace(self, frequencies=self.frequencies[number:], directions=self.directions[number:])
+
     def first_face(self, price: Functional) -> Face:
         """All atoms, in units of their price."""
-        least = _FREE * price.vector.max()
-        return Face(
-            np.diag(1.0 / np.maximum(price.vector, least)), "nonnegative", self.size, self.frequencies
-        )
+        return self._face(np.arange(self.size), price.vector)
+
+    def _face(self, atoms: NDArray[np.intp], prices: Array) -> Face:
+        """These atoms, each in units of its price; the generators are their numbers."""
+        columns = np.zeros((self.size, atoms.size))
+        columns[atoms, np.arange(atoms.size)] = 1.0 / np.maximum(prices[atoms], _FREE * prices.max())
+        return Face(columns, "nonnegative", atoms.size, atoms)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
         """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction)."""
@@ -129,12 +156,23 @@ class LinesBasis:
         return Pricing(scale, np.column_stack([where[best], directions[best]]))
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
-        """The atoms so far and the new ones; x of the old basis is the head of x of the new."""
-        rows = [*directions, *self._around(y, directions)]
-        fresh = [row for row in rows if self._is_new(float(row[0].real), row[1:])]
-        if not fresh:
+        """The atoms so far and the new ones; x of the old basis is the head of x of the new.
+
+        Of very many atoms those of the least power leave the face. What pays of them comes back.
+        """
+        number = face.generators
+        power = np.zeros(self.size)
+        power[number[: y.size]] = y
+        rows = [*directions, *self._around(power, directions)]
+        known = [self._known(float(row[0].real), row[1:]) for row in rows]
+        fresh = [row for row, at in zip(rows, known, strict=True) if at is None]
+        back = np.setdiff1d([at for at in known if at is not None], number).astype(np.intp)
+        if not fresh and not back.size:
             return self, face
-        added = np.array(fresh)
+        kept = number
+        if number.size > _MOST_ATOMS:
+            kept = np.sort(number[np.argsort(-y)[:_KEPT_ATOMS]])
+        added = np.array(fresh).reshape(-1, 1 + self.inputs)
         grown = replace(
             self,
             frequencies=np.concatenate([self.frequencies, added[:, 0].real]),
@@ -142,7 +180,8 @@ class LinesBasis:
         )
         at = matrices(price.density(added[:, 0].real))
         costs = np.einsum("na,nab,nb->n", added[:, 1:].conj(), at, added[:, 1:]).real
-        return grown, grown.first_face(Functional(np.concatenate([price.vector, costs]), price.density))
+        atoms = np.concatenate([kept, back, np.arange(self.size, grown.size)])
+        return grown, grown._face(atoms, np.concatenate([price.vector, costs]))
 
     def _around(self, y: Array, atoms: NDArray) -> list[NDArray]:
         """Halfway from the nearest atom in use to each of the new ones, and as far beyond.
@@ -170,9 +209,11 @@ class LinesBasis:
                     found.append(np.concatenate([[at], turn / np.linalg.norm(turn)]))
         return found
 
-    def _is_new(self, frequency: float, direction: ComplexArray) -> bool:
-        near = np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300)
-        return not np.any(self._alike(self.directions[near], direction) > 1.0 - _SAME)
+    def _known(self, frequency: float, direction: ComplexArray) -> int | None:
+        """The number of the atom that this one is, if there is one."""
+        near = np.flatnonzero(np.abs(self.frequencies - frequency) <= 1e-10 * max(frequency, 1e-300))
+        same = near[self._alike(self.directions[near], direction) > 1.0 - _SAME]
+        return int(same[0]) if same.size else None
 
     def _alike(self, directions: ComplexArray, direction: ComplexArray) -> Array:
         """(n,): squared cosines between directions, in the units of the channels."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density
+from inputdesign_cli.spectrum.basis import Density, Factor
 from inputdesign_cli.spectrum.directions import weighted_sums
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import svec_layout, svec_length
@@ -56,13 +56,15 @@ class MatrixFirBasis(GramBasis):
         later = np.tensordot(turn, c[1:], axes=1)
         return c[0] + later + later.conj().swapaxes(1, 2)
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
         """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown."""
         lags = np.arange(self.order + 1)
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
             turn = np.exp(-1j * np.outer(rule.nodes, lags))
-            sums = weighted_sums(turn, density, rule, self.inputs).real
+            sums = weighted_sums(turn, density, rule, self.inputs, factor).real
             return self._functional(np.moveaxis(sums, (-2, -1), (1, 2)))
 
         return integrate(moments, singularities, highest_lag=self.order)

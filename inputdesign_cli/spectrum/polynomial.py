@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density
+from inputdesign_cli.spectrum.basis import Density, Factor
 from inputdesign_cli.spectrum.directions import weighted_sums
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import hmat, hvec, hvec_layout, smat, svec, svec_layout, svec_length
@@ -78,7 +78,9 @@ class PolynomialBasis(GramBasis):
         phi = 0.5 * np.einsum("na,aibj,nb->nij", p, S, p, optimize=True)
         return phi[:, 0, 0].real if r == 1 else phi.astype(complex)
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
         """(size, ...): (1 / 2 pi) integral over the band of tr(density(w) Phi(w)) for each unknown."""
         first, second = np.triu_indices(self.order + 1)
         place = np.zeros((self.order + 1, self.order + 1), dtype=np.intp)
@@ -89,7 +91,7 @@ class PolynomialBasis(GramBasis):
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
             p = self.functions(rule.nodes)
-            sums = weighted_sums(p[:, first] * p[:, second], density, rule, self.inputs)
+            sums = weighted_sums(p[:, first] * p[:, second], density, rule, self.inputs, factor)
             # The advanced indices are apart, so that their axis comes first: (size, ...).
             entries = np.moveaxis(sums, (-2, -1), (1, 2))[pairs, i, j]
             spread = (slice(None), *[None] * (entries.ndim - 1))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.spectrum.basis import Density, DensityFamily
+from inputdesign_cli.spectrum.basis import Density, DensityFamily, Factor
 from inputdesign_cli.spectrum.directions import weighted_sums
 
 
@@ -57,12 +57,14 @@ class TabulatedSpectrum(DensityFamily):
         mixed = (1 - part)[:, None, None] * self.phi[left] + part[:, None, None] * self.phi[right]
         return mixed * inside[:, None, None]
 
-    def integrals(self, density: Density, singularities: ComplexArray) -> NDArray[np.float64]:
+    def integrals(
+        self, density: Density, singularities: ComplexArray, factor: Factor | None = None
+    ) -> NDArray[np.float64]:
         """(1, ...): (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w."""
 
         def moments(rule: Quadrature) -> NDArray[np.float64]:
             r, phi = self.inputs, self._at(rule.nodes)
-            sums = weighted_sums(phi.reshape(-1, r * r), density, rule, r)
+            sums = weighted_sums(phi.reshape(-1, r * r), density, rule, r, factor)
             return np.einsum("ba...ab->...", sums.reshape(r, r, *sums.shape[1:])).real[None]
 
         band = (float(self.frequency[0]), float(self.frequency[-1]))

@@ -64,7 +64,7 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
     Raises:
         SpecError: what this version does not simulate, and all that `solve` raises.
     """
-    with _placed(spec):
+    with _placed(spec), time_limit(spec.solver.time_limit):
         return finite(build_task(spec).simulate(executor), most_extreme(spec.content))
 
 

@@ -1,7 +1,7 @@
 """Data -> does the real experiment meet the target, and if not, what is still to be done.
 
-A verdict holds for one estimate: that of the given records together, and the information of these records.
-Prior information without the estimate that it belongs to counts for designs only.
+A verdict holds for one estimate and its information: that of the given records together, and of the prior
+where the spec states the estimate that it belongs to. A prior without it counts for designs only.
 """
 
 from __future__ import annotations
@@ -16,23 +16,30 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
+from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.errors import IdesignError, bad_spec
+from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.identification import Identification, identification_results, identified, told
+from inputdesign_cli.tasks.identification import (
+    Identification,
+    Identified,
+    ModelQuestion,
+    identification_results,
+    identified,
+    told,
+)
 from inputdesign_cli.tasks.result.design import requirement_entry
-from inputdesign_cli.tasks.result.refutations import refutations, unsettled
+from inputdesign_cli.tasks.result.nominal import from_nominal
+from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
+from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
 _REACHED = 1e-6
 _MOST_EXPERIMENTS = 10**9
-_PRIOR = (
-    "experiment.prior does not count for this verdict: it is information without the estimate that it "
-    "belongs to; give the records of earlier experiments as further files"
-)
 Part = TypeVar("Part", Table, Curves)
 Verdict = Literal["met", "missed", "undecided"]
 
@@ -74,26 +81,43 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     identification = identification_results(task, found, started)
     listed: list[dict[str, Json]] = []
     if found.question is not None:
-        information, units = found.estimate.information, task.header.units
+        units, information = task.header.units, found.question.information
         listed = [requirement_entry(units, r, information) for r in found.question.requirements]
-    reasons = [*unsettled(found.estimate), *refutations(found.model, found.estimate)]
+    reasons = [
+        *unsettled(found.estimate),
+        *refutations(found.model, found.estimate),
+        *contradictions(found.estimate),
+    ]
     reasons += [found.unasked] if found.unasked else []
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
     verdict: Verdict = "undecided" if reasons else "met" if met else "missed"
     assessment: dict[str, Json] = {"met": verdict == "met", "requirements": listed}
     if reasons:
         assessment["undecided"] = reasons
-    if task.has_prior:
-        identification = _with_note(identification, _PRIOR)
-    judged = _judged(identification, verdict, assessment)
+    notes: list[str] = []
+    if found.question is not None:
+        assessment["nominal"], notes = _from_nominal(task, found, found.question)
+    judged = _with_notes(_judged(identification, verdict, assessment), notes)
+    if verdict == "undecided":
+        judged = _without_model(judged, task.header.units, found)
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
     try:
-        topped = found.question.top_up(information)
+        levels = {} if deviations.remove_means else found.deviations.operating_point
+        topped = _about(found.question.top_up(levels), levels)
     except IdesignError as error:
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))
-    needed = partial(_experiments, found.question.requirements, information)
+    needed = partial(_experiments, found.question)
     return Assessment(verdict, _topped_up(judged, topped, needed))
+
+
+def _about(topped: Results, levels: Mapping[str, float]) -> Results:
+    """The top-up with a note on what its record varies about."""
+    point = topped.result.get("signal", {}).get("operating_point")
+    if not levels or point is None:
+        return topped
+    told = ", ".join(f"u{j + 1} = {level:g}" for j, level in enumerate(point))
+    return _with_note(topped, f"signal.csv varies about the operating point, {told}")
 
 
 def _with_note(results: Results, note: str) -> Results:
@@ -107,12 +131,46 @@ def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Jso
     )
 
 
-def _experiments(requirements: Sequence[Requirement], data: Array, both: Array) -> int | None:
-    """How many experiments of information both - data (k, k) meet all after the data; None: too many."""
+def _without_model(judged: Results, units: Units, found: Identified) -> Results:
+    """The results with the frequency response of the data alone beside the model, where it can be had."""
+    data = found.data
+    response = frequency_response(data.u, data.y, data.r, lengths=data.lengths)
+    if response is None:
+        return judged
+    table, curves, told = response_of_data(units, found.model, response, by_reference=data.r is not None)
+    assessment = {**judged.result["assessment"], "frequency_response": told}
+    shown = replace(
+        judged,
+        result={**judged.result, "assessment": assessment},
+        tables={**judged.tables, "frequency_response": table},
+        curves={**judged.curves, "frequency_response": curves},
+    )
+    return _with_notes(shown, response_note(told))
+
+
+def _from_nominal(
+    task: Identification, found: Identified, question: ModelQuestion
+) -> tuple[dict[str, Json], list[str]]:
+    """How far the estimate is from the plant of the spec, and a note where that is far."""
+    errors = model_errors(question.requirements) or question.entries
+    information, estimate = question.information, found.estimate
+    return from_nominal(task.header.units, task.nominal, found.model, estimate, errors, information)
+
+
+def _with_notes(results: Results, notes: Sequence[str]) -> Results:
+    """The same with further notes."""
+    if not notes:
+        return results
+    return replace(results, result={**results.result, "notes": [*results.result.get("notes", []), *notes]})
+
+
+def _experiments(question: ModelQuestion, both: Array) -> int | None:
+    """How many experiments meet all after the data, with whom one has information (k, k); None: too many."""
+    data = question.information
+    more = question.experiment.whiten_matrix(both) - data
 
     def enough(times: int) -> bool:
-        information = data + times * (both - data)
-        return all(r.worst(information).ratio <= 1.0 + _REACHED for r in requirements)
+        return all(r.worst(data + times * more).ratio <= 1.0 + _REACHED for r in question.requirements)
 
     most = 2
     while not enough(most):

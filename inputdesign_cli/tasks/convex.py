@@ -11,12 +11,20 @@ from typing import Literal
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
+from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.designs import Design, Question, solve_design
+from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
+from inputdesign_cli.design.convex.designs import (
+    Design,
+    Question,
+    solve_design,
+    white_power,
+    whitened_problem,
+)
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.design.convex.textbook import solve_on_grid
-from inputdesign_cli.errors import InaccurateError, InfeasibleError
+from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
@@ -25,17 +33,28 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
+from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, covered, settled_alpha
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.other_spectra import power_that_fits
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, make_record, record_notes, redrawn
+from inputdesign_cli.tasks.record import (
+    RecordRequest,
+    designed_spectrum,
+    record_notes,
+    redrawn,
+    shortfall,
+    worst_ratio,
+)
+from inputdesign_cli.tasks.record_search import Made, fitting_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
+from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
+# A record that needs a larger alpha is made anew, this often at the most.
+_RECORDS = 4
 # A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
 _ALMOST = 100.0
 
@@ -54,7 +73,8 @@ class ConvexTask:
 
     `experiment` is of the length that the spec states (in `question` it has one sample where the length is
     sought). `alpha` sizes the confidence region of r_u, `most_samples` is the longest experiment allowed.
-    `unstated` are errors of the entries of G that have r_u where no requirement bounds it.
+    `unstated` are errors of the entries of G that have r_u where no requirement bounds it. `stated` are the
+    numbers of the spec that bound errors.
     """
 
     header: Header
@@ -62,13 +82,16 @@ class ConvexTask:
     experiment: Experiment
     cost: dict[PowerKind, Weight]
     alpha: float
+    calibration: Calibration | None
     tolerance: float
+    any_spectrum_tolerance: float
     most_samples: int | None
     ellipses: Pairs | None
     grid: GridMethod | None
     columns: FewColumns | None
     record: RecordRequest
     unstated: Sequence[ModelError]
+    stated: Sequence[StatedBound]
     simulation: Simulation
 
     def solve(self) -> Results:
@@ -99,15 +122,23 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        record = self._made(done)
+        try:
+            made = self._recorded(done)
+        except OutOfTimeError:
+            value = result["objective"]["value"]
+            raise out_of_time(f"the design is proved (value {value:.6g}), but not yet its record") from None
+        record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
         if record is not None:
-            result["signal"] = self._signal_entry(done, record)
-            tables["signal"], curves["signal"] = signal_curves(self.record, self.header.units, record)
-            files = other_files(self.record, self.header.units, record)
+            result["signal"] = self._signal_entry(done, made, record)
+            tables["signal"], curves["signal"] = signal_curves(made.request, self.header.units, record)
+            files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
-            notes = record_notes(self.record, done.experiment.samples, record)
+            notes = [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
+            known = self._known(done, record)
+            if record is not None and known is not None:
+                notes += shortfall(done.design, record, known)
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,
@@ -117,26 +148,37 @@ class ConvexTask:
         units = self.header.units
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
-            return Delivered(results, None, None)
-        found = done.design.result
-        generator = redrawn(self.record, done.design, record)
-        return Delivered(results, record.samples, Redrawn("design", generator, found.basis, found.x))
+            return Delivered(results, None, None, done.confidence.alpha)
+        found = made.design.result
+        generator = redrawn(made.request, made.design, record)
+        renewed = Redrawn("design", generator, found.basis, found.x)
+        return Delivered(results, record.samples, renewed, done.confidence.alpha)
 
-    def _made(self, done: Designed) -> Record | None:
-        """The record; where none is found within the limits on samples, the error names what would do.
+    def _recorded(self, done: Designed) -> Made:
+        """The record, and where the confidence is calibrated, one that keeps it by its own samples.
 
-        Raises:
-            InfeasibleError: `limits-too-tight`.
+        A record distributes its information otherwise than the design, so that it may need a larger alpha.
         """
-        try:
-            return make_record(self.record, done.design, done.experiment)
-        except InfeasibleError as missed:
-            power = power_that_fits(self.record, self.question, done.design, done.experiment)
-            if power is None:
-                raise
-            told = missed.diagnostics[0]
-            hint = f"with limits.input_power: {power:.4g} a record of this length does; or {told.hint}"
-            raise InfeasibleError(replace(told, hint=hint)) from missed
+        design, experiment, alpha = done.design, done.experiment, done.confidence.alpha
+        made = fitting_record(self.record, self.question, design, experiment)
+        if self.calibration is None:
+            return made
+        for _ in range(_RECORDS):
+            known = self._known(done, made.record)
+            if known is None or not (made.record and made.record.met):
+                return made
+            needed = self.calibration.alpha(bounded_errors(done.problem.requirements), known)
+            if needed <= alpha * (1.0 + SETTLED):
+                break
+            alpha = needed
+            stricter = tuple(with_alpha(design.problem.requirements, alpha))
+            design = replace(design, problem=replace(design.problem, requirements=stricter))
+            made = fitting_record(self.record, self.question.at_alpha(alpha), design, experiment)
+        known = self._known(done, made.record)
+        if made.record is None or known is None:
+            return made
+        ratio = worst_ratio(done.problem.requirements)(known)
+        return replace(made, record=replace(made.record, worst_ratio=ratio))
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.
@@ -144,6 +186,34 @@ class ConvexTask:
         Raises:
             InfeasibleError, InaccurateError: see `solve`.
         """
+        if self.calibration is None:
+            return self._designed(Confidence(self.alpha, self.alpha))
+        calibration, found = self.calibration, dict[float, tuple[Designed, dict[str, Json]]]()
+
+        def needed(alpha: float) -> float:
+            at = replace(self, question=self.question.at_alpha(alpha))
+            found[alpha] = at._designed(Confidence(alpha, self.alpha))
+            done = found[alpha][0]
+            return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
+
+        alpha = settled_alpha(needed, self._first_alpha(calibration))
+        done, how = found[alpha]
+        coverage = calibration.coverage(bounded_errors(done.problem.requirements), done.information)
+        confidence = Confidence(alpha, self.alpha, calibration.probability, coverage)
+        return replace(done, confidence=confidence), {**how, "designs": len(found)}
+
+    def _first_alpha(self, calibration: Calibration) -> float:
+        """That of white excitation where the least cost is sought, lest the first design be out of reach."""
+        question = self.question
+        power = white_power(question) if question.goal == "cost" else 0.0
+        if power == 0.0:
+            return self.alpha
+        flat = replace(question, basis=flat_basis(self.experiment))
+        problem = whitened_problem(flat, np.full(self.experiment.inputs, power / self.experiment.inputs))
+        errors = bounded_errors(problem.requirements)
+        return calibration.alpha(errors, problem.information(np.array([power])))
+
+    def _designed(self, confidence: Confidence) -> tuple[Designed, dict[str, Json]]:
         design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
         if self.columns is not None:
             design, climbed = restrict_columns(self.columns, design)
@@ -151,13 +221,15 @@ class ConvexTask:
         experiment = design.problem.experiment
         if design.problem.goal == "samples":
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
-        return Designed(self.header, self.question, design, experiment, self.cost, self.alpha), how
+        return Designed(self.header, self.question, design, experiment, self.cost, confidence), how
 
     def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
         try:
-            design = solve_design(self.question, tolerance=self.tolerance)
+            design = solve_design(
+                self.question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+            )
         except UnreachableError as unreachable:
-            raise explain(self.header.units, self.question, unreachable) from unreachable
+            raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
         found = design.result
         if found.gap > _ALMOST * self.tolerance:
             raise InaccurateError.because(
@@ -205,25 +277,37 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
-        raise InfeasibleError.because(
-            "too-long",
-            f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
-            f"no fewer than {least}), but limits.samples is {most}",
-            hint="allow more samples or more power, or ask for less accuracy",
-            key="limits.samples",
+        longest = replace(self.question, experiment=replace(self.experiment, samples=most), goal="factor")
+        best = solve_design(longest, tolerance=self.tolerance)
+        problem = best.problem.on(best.result.basis)
+        bought = Bought(self.header.units, self.stated, self.question.limits, problem, best.result)
+        raise InfeasibleError(
+            Diagnostic(
+                "too-long",
+                f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
+                f"no fewer than {least}), but limits.samples is {most}; with these {bought.sentence}",
+                "allow more samples or more power, or ask for less accuracy",
+                "limits.samples",
+                details=bought.details,
+            )
         )
 
-    def _signal_entry(self, done: Designed, record: Record) -> dict[str, Json]:
-        design = done.design
-        return signal_entry(
-            self.record,
+    def _signal_entry(self, done: Designed, made: Made, record: Record) -> dict[str, Json]:
+        design = made.design
+        entry = signal_entry(
+            made.request,
             self.header.units,
             done.experiment,
             record,
             design.problem.requirements,
-            designed=design.result.information,
-            spectrum=designed_spectrum(self.record, design, done.experiment.inputs),
+            designed=done.information if design is done.design else design.result.information,
+            spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
+        known = self._known(done, record)
+        if self.calibration is not None and known is not None:
+            coverage = self.calibration.coverage(bounded_errors(done.problem.requirements), known)
+            entry["confidence"] = covered(coverage)
+        return entry | made.entry
 
     def _illustrations(
         self, done: Designed, record: Record | None
@@ -247,7 +331,7 @@ class ConvexTask:
             tables["bound"], curves["bound"] = bound_curves(
                 units,
                 errors or unstated,
-                found.information,
+                done.information,
                 white=white,
                 record=self._known(done, record),
                 stated=bool(errors),
@@ -257,7 +341,7 @@ class ConvexTask:
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
         shown = white if problem.needs_definite else None
-        ellipses = experiment_ellipses(done.experiment, found.information, shown, self.ellipses)
+        ellipses = experiment_ellipses(done.experiment, done.information, shown, self.ellipses)
         if ellipses is not None:
             curves["ellipses"] = ellipses
         return tables, curves

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
+from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.design.convex.problem import RequirementFactory, Weight, weighted_sum
 from inputdesign_cli.errors import bad_spec
@@ -20,6 +21,7 @@ from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, record_notes, worst_ratio
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
@@ -97,6 +99,7 @@ class GivenTask:
     excitation: GivenExcitation
     cost: dict[PowerKind, Weight]
     alpha: float
+    calibration: Calibration | None
     limits: StatedLimits
     record: RecordRequest
     ellipses: Pairs | None
@@ -127,10 +130,12 @@ class GivenTask:
         information = excitation.information(experiment)
         _check_excites(experiment, information)
         requirements = [make(experiment) for make in self.requirements]
+        confidence = Confidence.of(self.calibration, requirements, information, self.alpha)
+        requirements = with_alpha(requirements, confidence.alpha)
         cost = weighted_sum(self.cost, excitation.power)
         level = cost / weighted_sum(self.cost, GivenExcitation.even(raw, 1.0).power)
         white = GivenExcitation.even(raw, level).information(experiment)
-        result = self._result(experiment, requirements, information)
+        result = self._result(experiment, requirements, information, confidence)
         result |= {"cost": cost, "power": excitation.power, "spectrum": self._spectrum_entry()}
         result["baseline"] = {"white": {"cost": cost, "excitation_power": level}}
         tables: dict[str, Table] = {}
@@ -164,11 +169,15 @@ class GivenTask:
         result["timing_s"] = {"analysis": time.perf_counter() - started}
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
-            return Delivered(results, None, None)
-        return Delivered(results, record.samples, self._renewed(len(record.samples)))
+            return Delivered(results, None, None, confidence.alpha)
+        return Delivered(results, record.samples, self._renewed(len(record.samples)), confidence.alpha)
 
     def _result(
-        self, experiment: Experiment, requirements: Sequence[Requirement], information: Array
+        self,
+        experiment: Experiment,
+        requirements: Sequence[Requirement],
+        information: Array,
+        confidence: Confidence,
     ) -> dict[str, Json]:
         met = all(worst(r.violations(information)).ratio <= 1.0 + _ROUNDING for r in requirements)
         result: dict[str, Json] = {
@@ -179,7 +188,8 @@ class GivenTask:
             "information": information_entry(experiment, information),
         }
         nowhere = np.zeros(0)
-        return result | requirements_entry(self.header.units, self.alpha, requirements, information, nowhere)
+        units = self.header.units
+        return result | requirements_entry(units, confidence, requirements, information, nowhere)
 
     def _spectrum_entry(self) -> dict[str, Json]:
         excitation, units = self.excitation, self.header.units

@@ -7,9 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from inputdesign_cli.accuracy import ModelError, Requirement
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.identification import Estimate, identify as estimate_model
+from inputdesign_cli.identification import Earlier, Estimate, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -17,8 +19,14 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
-from inputdesign_cli.tasks.result.estimates import estimate_result, identification_notes, model_text
+from inputdesign_cli.tasks.result.estimates import (
+    estimate_result,
+    identification_notes,
+    model_text,
+    prior_notes,
+)
 
 
 @dataclass(frozen=True)
@@ -26,19 +34,24 @@ class ModelQuestion:
     """What a spec asks, at one model.
 
     Attributes:
-        experiment: with that model, the loop and the prior information, in raw parameters.
-        alpha: of the model error, see the contract.
-        requirements: all that is asked, in raw parameters.
+        experiment: with that model and the loop, in the coordinates of the data: their information is I.
+        confidence: the size of the confidence region of r_u.
+        requirements: all that is asked, in these coordinates.
         entries: what has r_u of every entry of G where no requirement has it.
-        top_up: designs what makes up for what data of information (k, k) leave to be wished for; None where
-            the spec designs nothing.
+        top_up: designs what makes up for what the data leave to be wished for, with a record about the
+            levels of the inputs by name; None where the spec designs nothing.
     """
 
     experiment: Experiment
-    alpha: float
+    confidence: Confidence
     requirements: Sequence[Requirement]
     entries: Sequence[ModelError]
-    top_up: Callable[[Array], Results] | None
+    top_up: Callable[[Mapping[str, float]], Results] | None
+
+    @property
+    def information(self) -> Array:
+        """(k, k): that of the data."""
+        return np.eye(self.experiment.size)
 
 
 @dataclass(frozen=True)
@@ -49,17 +62,19 @@ class Identification:
         nominal: the structure; its parameters are one of the starts.
         assessable: whether any accuracy is asked for that data could meet or miss.
         operating_point: by channel, what the spec says that signals vary about.
+        earlier: the prior as an estimate, which counts along; None where it has no values.
         has_prior: whether it states prior information.
-        at: the question of the spec at another model with the given number of samples; the text names the
-            source of that model in diagnostics.
+        at: the question of the spec at another model with the given number of samples, the factor (k, k) of
+            whose information sets the coordinates; the text names the source of that model in diagnostics.
     """
 
     header: Header
     nominal: Model
     assessable: bool
     operating_point: Mapping[str, float]
+    earlier: Earlier | None
     has_prior: bool
-    at: Callable[[Model, int, str], ModelQuestion]
+    at: Callable[[Model, int, Array, str], ModelQuestion]
 
 
 @dataclass(frozen=True)
@@ -69,6 +84,7 @@ class Identified:
     estimate: Estimate
     model: Model
     data: Data
+    deviations: Preparation
     question: ModelQuestion | None
     unasked: str = ""
 
@@ -81,7 +97,8 @@ def identified(task: Identification, paths: Sequence[Path], preparation: Prepara
     """
     units, nominal = task.header.units, task.nominal
     known = {**task.operating_point, **preparation.operating_point}
-    data = read_data(paths, units, replace(preparation, operating_point=known))
+    taken = replace(preparation, operating_point=known)
+    data = read_data(paths, units, taken)
     with blaming_columns(paths[0]):
         estimate = estimate_model(
             nominal,
@@ -91,13 +108,14 @@ def identified(task: Identification, paths: Sequence[Path], preparation: Prepara
             start=nominal.theta,
             feedback=units.closed_loop,
             lengths=data.lengths,
+            earlier=task.earlier,
         )
     model = nominal.at(estimate.theta, estimate.noise)
     try:
-        question = task.at(model, len(data.y), f"{paths[0].name} (estimate)")
+        question = task.at(model, len(data.y), estimate.factor, f"{paths[0].name} (estimate)")
     except IdesignError as error:
-        return Identified(estimate, model, data, None, told(error))
-    return Identified(estimate, model, data, question)
+        return Identified(estimate, model, data, taken, None, told(error))
+    return Identified(estimate, model, data, taken, question)
 
 
 def told(error: IdesignError) -> str:
@@ -113,15 +131,20 @@ def identification_results(task: Identification, found: Identified, started: flo
     """
     header, question, estimate = task.header, found.question, found.estimate
     result = estimate_result(header.title, estimate)
+    if found.deviations.remove_means:
+        result["identification"]["means_removed"] = True
+    elif found.deviations.operating_point:
+        result["identification"]["operating_point"] = dict(found.deviations.operating_point)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
+    notes += prior_notes(estimate, stated=task.has_prior)
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
     else:
         tables["bound"], curves["bound"], worst = bound_of_data(
-            header.units, question.requirements, question.entries, estimate.information
+            header.units, question.requirements, question.entries, question.information
         )
-        result["model_error"] = {"alpha": question.alpha, **worst}
+        result["model_error"] = {"alpha": question.confidence.alpha, **question.confidence.entry, **worst}
     if notes:
         result["notes"] = notes
     result["timing_s"] = {"identification": time.perf_counter() - started}

@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.design.convex.problem import Problem, Weight, weights_of
+from inputdesign_cli.design.convex.problem import Weight, weights_of
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
@@ -23,12 +23,12 @@ from inputdesign_cli.signal import (
     best_record,
     limited_responses,
 )
-from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.shortest_record import shortest_record
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
+_FALLS_SHORT = 5e-3
 _NO_RECORD = (
     "there is no record: it would have {} samples, and at most {} are computed for this model; "
     "signal.samples sets a shorter one"
@@ -66,6 +66,8 @@ class RecordRequest:
         most_samples: the longest experiment, where one is looked for.
         longest: samples of the longest record that is computed at all.
         limit_keys: of the spec, for what limits single samples.
+        stated_method: whether the spec states the kind of signal.
+        others: kinds of signals that may stand in for one that does not fit.
     """
 
     settings: SignalSettings
@@ -78,12 +80,19 @@ class RecordRequest:
     most_samples: int | None = None
     longest: int = 2**20
     limit_keys: tuple[str, ...] = ()
+    stated_method: bool = False
+    others: tuple[SignalSettings, ...] = ()
     delivery: Delivery = Delivery()
 
     def length(self, experiment: int) -> int:
         """Samples of the record of an experiment of so many: whole periods of held values."""
         block = self.settings.block
         return -(-(self.samples or experiment) // block) * block
+
+    @property
+    def searched(self) -> bool:
+        """Whether a record that misses the accuracy is not an answer, so that others are looked for."""
+        return self.bounds.hard and self.settings.level is None
 
     def feasible(self, experiment: int, least: int) -> bool:
         """Whether a record of this length is computed, with at least so many values a period."""
@@ -117,7 +126,7 @@ def make_record(
         _score(problem.requirements),
         meets=problem.goal != "factor" and request.meets,
         cost=request.cost,
-        designed=_cost(problem, design.result.basis, design.result.x, request.cost),
+        designed=design_cost(design, request.cost),
     )
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
@@ -130,7 +139,7 @@ def make_record(
         return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
 
     record = made(samples)
-    if record.met or settings.level is not None or not (bounds.hard and longer):
+    if record.met or not (request.searched and longer):
         return record
     allowed = request.most_samples if problem.goal == "samples" and request.samples is None else 0
     return shortest_record(record, settings.block, made, allowed, request.longest, request.limit_keys)
@@ -216,6 +225,28 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
     return notes
 
 
+def shortfall(design: Design, record: Record, information: Array) -> list[str]:
+    """What a record of the best accuracy misses: the accuracy that the design has, and what else is required.
+
+    Args:
+        information: (k, k) of the record.
+    """
+    problem, notes = design.problem, []
+    best = float(np.sqrt(design.result.objective))
+    if problem.goal == "factor" and problem.stated_criterion is None:
+        more = record.worst_ratio / best - 1.0
+        if more > _FALLS_SHORT:
+            notes.append(
+                f"the record reaches {record.worst_ratio:.4g} times the admissible error, the design "
+                f"{best:.4g}: {100 * more:.3g} % more, by its length or by the limits on single samples"
+            )
+    missed = worst_ratio(problem.side)(information)
+    if missed > 1.0 + _FALLS_SHORT:
+        names = " and ".join(dict.fromkeys(requirement.name for requirement in problem.side))
+        notes.append(f"the record misses {names}, which the design meets: its worst ratio is {missed:.4g}")
+    return notes
+
+
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
     """What ranks records: a criterion by itself, to be large, other requirements by their worst ratio."""
     criterion = criterion_of(requirements)
@@ -224,6 +255,7 @@ def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:
     return lambda information: -criterion.level(information)
 
 
-def _cost(problem: Problem, basis: Basis, x: Array, weights: Mapping[PowerKind, Weight]) -> float:
-    at = problem.on(basis)
+def design_cost(design: Design, weights: Mapping[PowerKind, Weight]) -> float:
+    """What the powers of a design cost at these weights."""
+    at, x = design.problem.on(design.result.basis), design.result.x
     return sum(weight * at.power(kind, channel).at(x) for kind, channel, weight in weights_of(weights))

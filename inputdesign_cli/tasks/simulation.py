@@ -9,11 +9,13 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
@@ -67,7 +69,7 @@ class Simulation:
         renewed: whether each run realises the spectrum anew.
         compare: what else is tried at equal power: signals of a flat spectrum over the band, of these kinds.
         cost: weights of the powers of an excitation.
-        entries, alpha: see `ModelQuestion`.
+        entries: see `ModelQuestion`.
     """
 
     units: Units
@@ -79,7 +81,6 @@ class Simulation:
     compare: Sequence[Method]
     cost: Mapping[PowerKind, Weight]
     entries: Sequence[ModelError]
-    alpha: float
 
 
 @dataclass(frozen=True)
@@ -90,11 +91,13 @@ class Delivered:
         results: what has been computed so far.
         record: (n, r), about its operating point; None if no excitation is needed.
         renewed: realises the spectrum anew in each run; None for a record that was given.
+        alpha: of r_u, see the contract.
     """
 
     results: Results
     record: Array | None
     renewed: Excitation | None
+    alpha: float
 
 
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
@@ -106,6 +109,11 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     Raises:
         SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
     """
+    with time_limit(inf):  # that of the solver is for the design
+        return _simulated(plan, delivered, executor)
+
+
+def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None) -> Results:
     started = time.perf_counter()
     units, results = plan.units, delivered.results
     if delivered.record is None:
@@ -120,7 +128,7 @@ def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None =
     result = dict(results.result)
     true = nominal if plan.truth is None else plan.truth.experiment(nominal, result["power"]["output"])
     study = Study(nominal, true, plan.runs, plan.seed, units.step)
-    predicted = _predicted(plan, results, excitations[0].information(nominal))
+    predicted = _predicted(plan, delivered, excitations[0].information(nominal))
     inputs: dict[str, Json] = {}
     curves: dict[str, Curves] = {}
     tables: dict[str, Table] = {}
@@ -184,9 +192,9 @@ def _flat(plan: Simulation, kind: Method, name: str, power: float, samples: int)
     return Redrawn.flat(name, kind, powers, band, samples, plan.units.step)
 
 
-def _predicted(plan: Simulation, results: Results, information: Array) -> PredictedError:
+def _predicted(plan: Simulation, delivered: Delivered, information: Array) -> PredictedError:
     """What bound.csv says; where there is none, the r_u that the `information` gives."""
-    bound = results.curves.get("bound")
+    bound = delivered.results.curves.get("bound")
     if not isinstance(bound, BoundCurves):
         _, bound = bound_curves(plan.units, plan.entries, information, stated=False)
     panels = bound.panels
@@ -197,6 +205,6 @@ def _predicted(plan: Simulation, results: Results, information: Array) -> Predic
         w=np.concatenate([panel.frequency for panel in panels]) * plan.units.frequency,
         r_u=np.concatenate([panel.r_u for panel in panels]),
         r_adm=np.concatenate(admissible) if admissible else None,
-        alpha=plan.alpha,
+        alpha=delivered.alpha,
         entries=np.repeat(np.array(places), sizes, axis=0) if places else None,
     )

@@ -126,3 +126,62 @@ def test_blocks_have_the_right_sizes():
         for block in cut.blocks(K):
             assert block.information.shape == (block.constant.size, svec_length(K))
             assert block.auxiliary.shape[0] == block.constant.size
+
+
+CONCAVE = [name for name, (cut, _) in CUTS.items() if cut.concave is not None]
+
+
+@pytest.mark.parametrize("name", CONCAVE)
+def test_concave_functions_are_the_set(name, rng):
+    """g is of degree one, and reaches one where M reaches the set."""
+    cut, definition = CUTS[name]
+    M = random_matrix(rng)
+    value, gradient = cut.concave.at(M, np.linalg.inv(M))
+    assert 1.0 / value == pytest.approx(definition(M), rel=1e-9)
+    assert np.sum(gradient * M) == pytest.approx(value, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", CONCAVE)
+def test_derivatives_of_concave_functions(name, rng):
+    """Gradient and curvature against finite differences."""
+    function = CUTS[name][0].concave
+    M = random_matrix(rng) + np.eye(K)
+    D = rng.normal(size=(K, K))
+    D = D + D.T
+
+    def value(t):
+        return function.at(M + t * D, np.linalg.inv(M + t * D))[0]
+
+    h = 1e-3
+    g, G = function.at(M, np.linalg.inv(M))
+    assert (value(h) - value(-h)) / (2 * h) == pytest.approx(np.sum(G * D), rel=1e-4)
+    second = function.curvature * (np.sum(G * D) ** 2 / g - np.trace(np.linalg.solve(M, D) @ G @ D))
+    assert (value(h) - 2 * g + value(-h)) / h**2 == pytest.approx(second, rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_what_one_matrix_implies_holds(name, rng):
+    """tr(Y M) >= r for every M of the set, from any matrix."""
+    cut, _ = CUTS[name]
+    boundary = [least_scale(cut, M)[0] * M for M in (random_matrix(rng) for _ in range(6))]
+    order = K if cut.inequality is None else len(cut.inequality.constant)
+    for _ in range(20):
+        root = rng.normal(size=(order, order))
+        Y, r = cut.implied(root @ root.T + 0.3 * rng.normal() * np.eye(order))
+        for M in boundary:
+            assert np.sum(Y * M) >= r - 1e-6 * abs(r)
+
+
+@pytest.mark.parametrize("name", [name for name in CUTS if name not in CONCAVE])
+def test_inequalities_are_the_set(name, rng):
+    """On the boundary of the set the largest least eigenvalue over nu is zero."""
+    cut, _ = CUTS[name]
+    part = cut.inequality
+    M = random_matrix(rng)
+    M = least_scale(cut, M)[0] * M
+    whole = part.constant.copy()
+    whole[:K, :K] += part.scale * M
+    shares = np.linspace(0.0, 5.0, 5001) if part.form is not None else [0.0]
+    form = np.zeros_like(whole) if part.form is None else part.form
+    best = max(np.linalg.eigvalsh(whole + nu * form)[0] for nu in shares)
+    assert best == pytest.approx(0.0, abs=1e-3 * np.abs(whole).max())

@@ -1,6 +1,7 @@
 """Commands in an empty folder, with stand-ins for what they compute."""
 
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ def verbs(monkeypatch):
         return Results(RESULT, "title: x\n", tables={"signal": Table({"u1": np.zeros(3)})})
 
     monkeypatch.setattr(specification, "load_spec", load_spec)
-    monkeypatch.setattr("inputdesign_cli.sweep.verbs.load_spec", load_spec)
+    monkeypatch.setattr(import_module("inputdesign_cli.sweep.verbs"), "load_spec", load_spec)
     for verb in ("solve", "analyse"):
         monkeypatch.setattr(tasks, verb, results)
     monkeypatch.setattr(tasks, "validate", lambda spec: None)

@@ -4,6 +4,7 @@ import io
 import json
 import shutil
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -131,3 +132,19 @@ def test_an_empty_name_is_no_place(analyse, tmp_path, name):
     assert code == 2
     assert "empty" in err
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["-o", "/"], "the root of the file system is no directory for a run"),
+        (["--confine", "nosuch"], "does not exist"),
+        (["--confine", "a.yaml"], "is a file"),
+    ],
+)
+def test_places_that_cannot_be_are_refused_before_anything_is_computed(run, verbs, options, told):
+    Path("a.yaml").write_text("x", encoding="utf-8")
+    code, _, err = run("solve", "a.yaml", *options)
+    assert code == 2
+    assert told in " ".join(err.split())
+    assert not verbs

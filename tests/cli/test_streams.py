@@ -95,6 +95,30 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     assert not (tmp_path / "r").exists()
 
 
+LOST = """
+import signal, sys, time
+import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
+
+class Finalised:
+    def __del__(self):
+        signal.raise_signal(int(sys.argv[1]))
+
+def run():
+    cli.streams.prepare_signals()
+    Finalised()
+    time.sleep(20)
+
+cli.main = run
+command.main()
+"""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_that_comes_while_something_is_finalised_is_not_lost(number, code):
+    done = subprocess.run([sys.executable, "-c", LOST, str(int(number))], capture_output=True, text=True)
+    assert (done.returncode, "Traceback" in done.stderr) == (code, False)
+
+
 def test_names_that_are_no_text_end_in_no_fault(tmp_path):
     """A file name need not be UTF-8: what is written tells it with escapes."""
     name = os.fsdecode(b"\xff\xfe.yaml")

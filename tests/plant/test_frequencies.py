@@ -1,6 +1,7 @@
 """Grids see resonances; maxima are found where calculus puts them."""
 
 import numpy as np
+import pytest
 
 from inputdesign_cli.plant import graded_grid, local_maxima, logarithmic_distance
 
@@ -40,3 +41,16 @@ def test_kinks_are_found():
     w, values = local_maxima(lambda w: -np.abs(w - 0.3333), grid, -np.abs(grid - 0.3333))
     np.testing.assert_allclose(w, [0.3333], atol=1e-6)
     assert values[0] > -1e-6
+
+
+@pytest.mark.parametrize("end", [0.0, np.pi])
+def test_a_maximum_at_an_end_is_told_as_that_end(end):
+    """cos(w) and its mirror are flat at 0 and pi: rounding cannot tell 1e-9 from 0."""
+
+    def function(w):
+        return 1.0 + np.cos(w - end)
+
+    grid = np.union1d(np.geomspace(1e-6, np.pi, 50), [0.0])
+    at, value = local_maxima(function, grid, function(grid))
+    assert at.tolist() == [end]
+    assert value.tolist() == [2.0]

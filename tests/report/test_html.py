@@ -18,6 +18,7 @@ import scipy.signal
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.report.charts import _bound
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.sweep.running import sweep
@@ -109,6 +110,16 @@ def test_a_result_that_somebody_changed_is_an_error_or_a_page(runs, tmp_path, mo
         (tmp_path / "a" / "result.json").write_text(json.dumps(whole | {key: broken}))
         with suppress(DataError):
             report_text(tmp_path / "a")
+
+
+@pytest.mark.parametrize("field", ["power", "signal", "objective", "notes", "title", "information"])
+def test_a_field_that_is_not_of_its_kind_is_named(runs, tmp_path, field):
+    shutil.copytree(runs / "open", tmp_path / "run")
+    file = tmp_path / "run" / "result.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), field: 7}))
+    with pytest.raises(DataError, match=f'result.json cannot be read .*"{field}" is not') as caught:
+        report_text(tmp_path / "run")
+    assert caught.value.diagnostics[0].code == "run-unreadable"
 
 
 @pytest.mark.parametrize("name", ["spec.yaml", "bound.csv", "result.json"])
@@ -321,3 +332,18 @@ def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
     result["simulation"] = {"runs": 10, "inputs": inputs}
     (tmp_path / "run" / "result.json").write_text(json.dumps(result))
     assert row in rows(parse(report_text(tmp_path / "run")))
+
+
+@pytest.mark.parametrize(
+    ("result", "label"),
+    [
+        ({"objective": {}}, "design"),
+        ({"identification": {}}, "data"),
+        ({"identification": {}, "objective": {}}, "design"),
+    ],
+)
+def test_the_chart_of_the_error_says_what_gave_it(result, label):
+    """A top-up has a design of its own; what the data gave stands beside it."""
+    table = {"frequency_rad_per_s": np.array([0.1, 1.0]), "r_u": np.ones(2), "G_abs": np.ones(2)}
+    curves, _, _ = _bound(table, result)
+    assert curves.panels[0].label == label

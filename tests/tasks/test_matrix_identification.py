@@ -56,11 +56,8 @@ def test_the_blocks_can_be_pasted(given, write):
     assert estimated.names == model.names
     np.testing.assert_allclose(estimated.theta, list(found["theta"].values()))
     validate(again)
-    prior = outcome.files["model.yaml"].decode().split("uncomment:\n")[1]
-    uncommented = "\n".join(line.removeprefix("# ") for line in prior.splitlines())
-    stated = yaml.safe_load(uncommented)["experiment"]["prior"]
-    assert tuple(stated["parameters"]) == model.names
-    np.testing.assert_allclose(stated["information"], outcome.result["information"]["matrix"])
+    assert pasted["estimate"]["parameters"] == found["theta"]
+    np.testing.assert_allclose(pasted["estimate"]["covariance"], outcome.result["information"]["covariance"])
 
 
 IN_S = """

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import InaccurateError
 
 
 def worst_ratio(B, F, variance, lines, samples, relative, alpha, band):
@@ -66,3 +67,36 @@ signal: {{seed: 1}}
     assert any("working precision" in note for note in found.get("notes", [])) != told
     if told:  # by 60 digits: 0.999999990644
         assert math.isclose(found["signal"]["worst_ratio"], 1.0, abs_tol=1e-6)
+
+
+NEAR = """
+plant: {B: [0, 1], F: [1, -0.9999998, 0]}
+noise: {C: [1, -0.9999999], variance: 1}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.1, band: [0.01, 3]}}
+"""
+
+
+def test_what_another_excitation_could_tell_is_not_called_impossible():
+    with pytest.raises(InaccurateError) as found:
+        solve(parse_spec(NEAR))
+    told = found.value.diagnostics[0]
+    assert told.code == "numerically-singular"
+    assert "limits.band" in told.hint
+    lines = ["limits={band: [0.01, 3.14]}", "spectrum={type: multisine, lines: 20}"]
+    result = solve(parse_spec(NEAR, overrides=lines)).result
+    assert result["status"] == "optimal"
+    assert "the slowest mode has a time constant of" in result["notes"][0]
+
+
+@pytest.mark.parametrize(("pole", "told"), [(0.5, False), (0.99, False), (0.999, True)])
+def test_an_experiment_shorter_than_its_slowest_mode_is_told(pole, told):
+    spec = f"""
+plant: {{B: [0, 1], F: [1, {-pole}]}}
+noise: {{variance: 1}}
+experiment: {{samples: 500}}
+accuracy: {{model_error: {{relative: 0.1, band: [0.01, 3]}}}}
+spectrum: {{type: fir, order: 3}}
+"""
+    notes = solve(parse_spec(spec)).result.get("notes", [])
+    assert any("the slowest mode" in note for note in notes) == told

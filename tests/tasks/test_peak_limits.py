@@ -5,6 +5,7 @@ import pytest
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.report.facts import facts
 
 DEAR_OUTPUT = """
 sample_time: 5
@@ -53,12 +54,50 @@ def test_a_power_below_the_least_is_a_proof():
     assert samples == pytest.approx(720 / 0.99**2, rel=0.02)
 
 
-def test_the_power_that_the_hint_names_does():
+def test_a_record_of_another_spectrum_is_delivered_where_that_of_the_cheapest_does_not_fit():
+    found = solve(parse_spec(DEAR_OUTPUT % "amplitude: 2"))
+    signal, u = found.result["signal"], np.array(found.tables["signal"].columns["u1"])
+    assert np.abs(u).max() <= 2.0
+    assert signal["worst_ratio"] <= 1.0 + 1e-9
+    assert found.result["status"] == "optimal"
+    note = next(text for text in found.result["notes"] if "another spectrum" in text)
+    power = signal["spectrum_of"]["input_power"]
+    assert f"limits.input_power: {power:.4g}" in note
+    # What it costs is told against the design, and what the note promises is true.
+    assert signal["extra_power"] == pytest.approx(signal["output_power"][0] / found.result["cost"] - 1)
+    again = solve(parse_spec(DEAR_OUTPUT % f"amplitude: 2, input_power: {power}")).result["signal"]
+    assert again["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_a_kind_of_signal_that_is_asked_for_is_not_replaced():
+    stated = DEAR_OUTPUT + "signal: {type: binary, candidates: 8}\n"
     with pytest.raises(InfeasibleError) as caught:
-        solve(parse_spec(DEAR_OUTPUT % "amplitude: 2"))
+        solve(parse_spec(stated % "amplitude: 2"))
     told = caught.value.diagnostics[0]
     assert told.code == "limits-too-tight"
     assert "was found" in told.message
-    power = told.hint.split("limits.input_power: ")[1].split()[0]
-    found = solve(parse_spec(DEAR_OUTPUT % f"amplitude: 2, input_power: {power}"))
+    assert "; tried besides: a binary signal of 5 spectra" in told.message
+    kind, power = told.hint.split("signal.type: ")[1].split(" with limits.input_power: ")
+    as_told = DEAR_OUTPUT + f"signal: {{type: {kind}, candidates: 8}}\n"
+    found = solve(parse_spec(as_told % f"amplitude: 2, input_power: {power}"))
     assert found.result["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_a_record_that_falls_short_of_the_best_accuracy_is_not_called_cheap():
+    spec = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.01, alpha: 2.45}}
+objective: best_accuracy
+spectrum: {type: fir, order: 8}
+limits: {amplitude: 0.4}
+signal: {type: multisine, candidates: 1}
+"""
+    result = solve(parse_spec(spec)).result
+    less = 1 - result["objective"]["value"] / result["signal"]["worst_ratio"]
+    assert less > 0.01
+    line = next(text for name, text, _ in facts(result, "s") if name == "signal")
+    assert f"{100 * less:.3g} % less accuracy than the design" in line
+    assert "cost" not in line
+    assert any(f"reaches {result['signal']['worst_ratio']:.4g} times" in note for note in result["notes"])

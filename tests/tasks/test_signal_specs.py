@@ -58,7 +58,7 @@ def test_the_power_of_the_design_on_request():
 
 def test_a_record_that_is_too_short_names_one_that_is_not():
     with pytest.raises(InfeasibleError) as error:
-        solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2}\n"))
+        solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2, type: filtered_noise}\n"))
     (diagnostic,) = error.value.diagnostics
     assert diagnostic.code == "limits-too-tight"
     assert diagnostic.location is not None
@@ -70,6 +70,14 @@ def test_a_record_that_is_too_short_names_one_that_is_not():
     signal = solve(spec).result["signal"]
     assert signal["worst_ratio"] <= 1 + 1e-9
     assert signal["peak"][0] <= 0.65
+
+
+def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
+    found = solve(parse_spec(BASE + "limits: {amplitude: 0.65}\nsignal: {candidates: 2}\n")).result
+    assert found["signal"]["type"] != "filtered_noise"
+    assert found["signal"]["worst_ratio"] <= 1 + 1e-9
+    assert found["signal"]["peak"][0] <= 0.65
+    assert any("no record of noise" in note for note in found["notes"])
 
 
 def test_a_converter_of_too_small_a_range_is_named():

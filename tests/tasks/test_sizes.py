@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import time
+from importlib import import_module
 
+import clarabel
+import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve, validate
@@ -45,10 +49,10 @@ def test_the_record_of_a_shortest_experiment_may_be_too_long():
 
 
 def test_a_model_of_many_parameters_is_refused_with_what_fits():
-    zeros = ", ".join(["0"] * 30)
+    zeros = ", ".join(["0"] * 150)
     found = refused(f"plant: {{B: [0, 1], A: [1, {zeros}, 0.5]}}\nnoise: {{variance: 1}}\n{BOUND}")
     assert found.key == "plant"
-    assert "30 parameters fit" in found.hint
+    assert "127 parameters fit" in found.hint
 
 
 def test_a_wide_plant_of_long_polynomials_is_refused():
@@ -66,3 +70,45 @@ def test_a_design_ends_with_its_time():
         solve(spec)
     assert found.value.diagnostics[0].code == "out-of-time"
     assert time.monotonic() - started < 5.0
+
+
+class Clock:
+    """In place of the module time: it goes on only when told."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+
+@pytest.fixture
+def slow_solver(monkeypatch):
+    """Each call of the solver takes three seconds of a clock of its own; the limits that it was given."""
+    clock, given, make = Clock(), [], clarabel.DefaultSolver
+
+    def slow(*arguments):
+        given.append(arguments[-1].time_limit)
+        clock.now += 3.0
+        return make(*arguments)
+
+    monkeypatch.setattr(import_module("inputdesign_cli.compute.time_limit"), "time", clock)
+    monkeypatch.setattr(clarabel, "DefaultSolver", slow)
+    return given
+
+
+def test_the_solver_is_given_what_is_left_and_the_best_so_far_is_told(slow_solver):
+    text = f"{PLANT}{BOUND}experiment: {{samples: 500}}\n".replace("order: 3", "order: 20")
+    optimum = solve(parse_spec(text + "solver: {time_limit: 10000}")).result["objective"]
+    assert optimum["relative_gap"] <= 1e-7
+    calls = len(slow_solver)
+    first = slow_solver[:]
+    np.testing.assert_allclose(first, 10000.0 - 3.0 * np.arange(calls))
+    slow_solver.clear()
+    with pytest.raises(InaccurateError) as caught:
+        solve(parse_spec(text + "solver: {time_limit: 7}"))
+    assert slow_solver == pytest.approx([7.0, 4.0, 1.0])
+    (told,) = caught.value.diagnostics
+    assert told.code == "out-of-time"
+    best, bound = re.search(r"so far costs ([^,]+), and none less than (.+)", told.message).groups()
+    assert float(bound) * (1 - 1e-5) <= optimum["value"] <= float(best) * (1 + 1e-5)

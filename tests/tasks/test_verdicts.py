@@ -1,5 +1,6 @@
 """Met, missed or undecided: what `assess` says of records, right models and wrong ones."""
 
+import html
 import json
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
+from inputdesign_cli.errors import SpecError
 
 STRUCTURE = """
 sample_time: 5
@@ -128,6 +130,49 @@ def test_a_prior_without_its_estimate_does_not_count(record):
     assert "experiment.prior does not count" in " ".join(with_prior["notes"])
 
 
+def test_a_prior_with_its_estimate_counts_as_its_record_does(record, tmp_path):
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"], folder=tmp_path)
+    first = record("a.csv", 700, 1, power=0.5, level=(40.0, 52.3), warm=1.0)
+    second = record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
+    (tmp_path / "model.yaml").write_bytes(identify(spec, first).files["model.yaml"])
+    alone, both = assess(spec, second), assess(spec, [first, second])
+    named = ["accuracy.model_error.relative=0.1", "experiment.prior.information=model.yaml"]
+    known = assess(parse_spec(HEATER, overrides=named, folder=tmp_path), second)
+    ratio, joint, single = (
+        found.results.result["assessment"]["requirements"][0]["worst_ratio"] for found in (known, both, alone)
+    )
+    assert ratio == pytest.approx(joint, rel=0.1)
+    assert ratio < 0.9 * single
+    result = known.results.result
+    assert result["model_error"]["worst_ratio"] == pytest.approx(ratio)
+    assert "experiment.prior counts" in " ".join(result["notes"])
+    assert result["identification"]["prior"]["probability"] > 1e-3
+
+
+def test_a_prior_of_another_system_decides_nothing(record):
+    path = record("a.csv", 700, 1, power=0.5)
+    found = identify(parse_spec(HEATER), path).result
+    values = {name: 1.01 * value for name, value in found["identification"]["theta"].items()}
+    prior = json.dumps({"information": found["information"]["matrix"].tolist(), "parameters": values})
+    verdict = assess(parse_spec(HEATER, overrides=[f"experiment.prior={prior}"]), path)
+    assert verdict.verdict == "undecided"
+    assert "contradict each other" in " ".join(verdict.results.result["assessment"]["undecided"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "secret: [", "- 1", "plant: {B: [0, 1]}", "estimate: {parameters: {b1: 1}, covariance: [[1, 0]]}"],
+)
+def test_what_is_no_model_file_is_refused_and_not_shown(tmp_path, text):
+    (tmp_path / "model.yaml").write_text(text)
+    spec = parse_spec(HEATER, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
+    with pytest.raises(SpecError) as caught:
+        solve(spec)
+    (diagnostic,) = caught.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == ("bad-model-file", "experiment.prior.information")
+    assert "secret" not in str(caught.value)
+
+
 def test_what_a_top_up_within_limits_leaves_is_told(record):
     path = record("a.csv", 300, 1, power=0.02)
     limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
@@ -201,3 +246,90 @@ def test_the_operating_point_of_the_command_line(record, tmp_path):
     unknown = CliRunner().invoke(app, call)
     assert json.loads(unknown.stdout)["identification"]["free_start"]
     assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
+
+
+def test_beside_an_undecided_model_stands_what_the_data_say_without_one(record):
+    found = assess(parse_spec(HEATER), record("a.csv", 720, 1, lag=True))
+    table, told = found.results.tables["frequency_response"].columns, found.results.result["assessment"]
+    G = table["G_re"] + 1j * table["G_im"]
+    q = np.exp(-5j * table["frequency_rad_per_s"])
+    gain = 2.35 * (1 - SLOW) * (1 - LAG)
+    truth = gain * (0.4 * q**6 + 0.6 * q**7) / ((1 - SLOW * q) * (1 - LAG * q))
+    assert np.mean(np.abs(G - truth) < table["radius"]) > 0.85
+    assert told["frequency_response"]["model_outside"] > 0.2
+    assert "frequency_response" in found.results.curves
+    assert "frequency_response" not in assess(parse_spec(HEATER), record("b.csv", 720, 1)).results.tables
+
+
+def test_in_a_loop_the_reference_is_used_where_it_is_recorded(record, tmp_path):
+    loop = [
+        "experiment.controller={numerator: [0.01], denominator: [1]}",
+        "accuracy.model_error.relative=1.0",
+        "plant={B: [0, 0, 0.03, 0.02], F: [1, -0.97]}",
+    ]
+    columns = heater(720, 1)
+    for name, by in (("r", "r"), ("note", "u")):
+        named = columns | {name: columns["u"] + 0.01 * columns["y"]}
+        path = tmp_path / f"{name}.csv"
+        rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*named.values(), strict=True))
+        path.write_text(",".join(named) + "\n" + rows + "\n")
+        result = assess(parse_spec(HEATER, overrides=loop), path).results.result
+        assert result["assessment"]["frequency_response"]["excitation"] == by
+        assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")
+
+
+@pytest.mark.parametrize(("factor", "contradicts"), [(1.0, False), (1.1, False), (-1.0, True), (3.0, True)])
+def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, record):
+    path = record("a.csv", 720, 1)
+    B = [0, 0, 0, 0, 0, 0, *(factor * 2.35 * (1 - SLOW) * share for share in (0.4, 0.6))]
+    found = assess(parse_spec(HEATER, overrides=[f"plant={{B: {B}, F: [1, {-SLOW}]}}"]), path)
+    result = found.results.result
+    nominal, notes = result["assessment"]["nominal"], " ".join(result.get("notes", []))
+    assert found.verdict == "met"
+    assert ("contradicts the plant of the spec" in notes) == contradicts
+    assert nominal["opposite_sign"] == (factor < 0)
+    assert nominal["degrees_of_freedom"] == 3
+    names = ["b6", "b7", "f1"]
+    P = covariance_of(result, names)
+    away = np.array([*B[6:], -SLOW]) - [result["identification"]["theta"][name] for name in names]
+    assert nominal["statistic"] == pytest.approx(away @ np.linalg.solve(P, away), rel=1e-6)
+    if contradicts:
+        share = abs(factor - 1.0) / max(abs(factor), 1.0)
+        assert nominal["worst_difference"] == pytest.approx(share, rel=0.15)
+        assert "b7 is" in notes or "b6 is" in notes
+
+
+def covariance_of(result, names):
+    """The covariance of some parameters."""
+    at = [result["information"]["parameters"].index(name) for name in names]
+    return np.array(result["information"]["covariance"])[np.ix_(at, at)]
+
+
+def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", record("first run.csv", 300, 2, level=(40.0, 52.3))
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    spec.write_text(STRUCTURE + asked)
+    out = tmp_path / "run"
+    call = [
+        "assess",
+        str(spec),
+        str(path),
+        "-o",
+        str(out),
+        "--no-figures",
+        "--operating-point",
+        "u1=40,y1=52.3",
+    ]
+    run = CliRunner().invoke(app, call)
+    assert run.exit_code == 1, run.output
+    result = json.loads((out / "result.json").read_text())
+    assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
+    assert result["signal"]["operating_point"] == [40.0]
+    assert any("varies about the operating point, u1 = 40" in note for note in result["notes"])
+    u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
+    assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
+    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
+    page = html.unescape((out / "report.html").read_text())
+    assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page

@@ -58,11 +58,14 @@ def certify(
         sides: for each cut of the proof whether it is a side requirement's; missing means that none is.
         rows: the limits that the weights `proof.rows` belong to.
     """
-    found = _certified(problem, proof, sides, rows, _LEAST_SHARES[0])
+    k = problem.experiment.size
+    weight = sum((Y for Y, _ in proof.cuts), np.zeros((k, k)))
+    value = problem.value(weight)
+    found = _certified(problem, proof, weight, value, sides, rows, _LEAST_SHARES[0])
     if problem.goal == "cost":
         return found
     for share in _LEAST_SHARES[1:]:
-        other = _certified(problem, proof, sides, rows, share)
+        other = _certified(problem, proof, weight, value, sides, rows, share)
         if other.bound <= found.bound:
             break
         found = other
@@ -70,16 +73,19 @@ def certify(
 
 
 def _certified(
-    problem: Problem, proof: Proof, sides: Sequence[bool], rows: Sequence[Row], share: float
+    problem: Problem,
+    proof: Proof,
+    weight: Array,
+    value: Functional,
+    sides: Sequence[bool],
+    rows: Sequence[Row],
+    share: float,
 ) -> Certificate:
-    k = problem.experiment.size
     sides = sides or [False] * len(proof.cuts)
-    weight = sum((Y for Y, _ in proof.cuts), np.zeros((k, k)))
     required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if not side)
     scaled_required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if side)
     weights = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
     price: Functional | None = problem.price if problem.goal == "cost" else None
-    value = problem.value(weight)
     upper = lower = fixed_lower = 0.0
     for row, w in zip(rows, weights, strict=True):
         if w == 0.0:

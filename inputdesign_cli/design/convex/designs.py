@@ -11,7 +11,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from inputdesign_cli.design.convex.candidate import Candidate, candidate_at, excess, least_scale, scaled_up
+from inputdesign_cli.accuracy.calibration import with_alpha
+from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
+from inputdesign_cli.design.convex.candidate import (
+    Candidate,
+    Place,
+    candidate_at,
+    excess,
+    least_scale,
+    scaled_up,
+)
 from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.feasible import strictly_feasible
@@ -50,6 +59,16 @@ class Question:
     limits: Sequence[PowerLimit] = ()
     densities: Sequence[DensityLimit] = ()
 
+    def at_alpha(self, alpha: float) -> Question:
+        """The same question with another confidence factor of the model errors."""
+
+        def changed(make: RequirementFactory) -> RequirementFactory:
+            return lambda experiment: with_alpha([make(experiment)], alpha)[0]
+
+        return replace(
+            self, requirements=list(map(changed, self.requirements)), side=list(map(changed, self.side))
+        )
+
 
 @dataclass(frozen=True)
 class Design:
@@ -69,13 +88,16 @@ class Design:
     any_spectrum: ExchangeResult
 
 
-def solve_design(question: Question, *, tolerance: float) -> Design:
-    """Solve a design problem with its baseline and its bound over every spectrum.
+def solve_design(
+    question: Question, *, tolerance: float, any_spectrum_tolerance: float = _ANY_SPECTRUM_TOLERANCE
+) -> Design:
+    """Solve a design problem with its baseline and its bound over every spectrum, each to its relative gap.
 
     Raises:
         SpecError: `not-identifiable` when no excitation can tell some parameters apart;
             `too-few-lines` when the given lines cannot.
         UnreachableError: the requirements cannot be met within the limits.
+        OutOfTimeError: with the best design so far.
     """
     power = white_power(question)
     powers = balanced_powers(question, power or 1.0)
@@ -94,8 +116,11 @@ def solve_design(question: Question, *, tolerance: float) -> Design:
     result = _without_faint_lines(problem, _solve(problem, start, tolerance))
     if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
-    loose = max(tolerance, _ANY_SPECTRUM_TOLERANCE)
-    anything = _solve(anywhere, anywhere.basis.spread(powers), loose)
+    loose = max(tolerance, any_spectrum_tolerance)
+    try:
+        anything = _solve(anywhere, anywhere.basis.spread(powers), loose, known=result.active)
+    except OutOfTimeError:
+        raise _stopped(problem, (result.objective, result.certificate.bound)) from None
     return Design(problem, white, white_level, within, result, anything)
 
 
@@ -181,21 +206,39 @@ def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
     return replace(problem, basis=lines, densities=(), finer=None)
 
 
-def _solve(problem: Problem, start: Array, tolerance: float) -> ExchangeResult:
+def _solve(problem: Problem, start: Array, tolerance: float, known: Sequence[Place] = ()) -> ExchangeResult:
     floors = problem.has_floors
     limited = bool(problem.limits or problem.densities)
     if problem.goal == "cost" and limited and not floors:
         # Limits that the cheapest design keeps anyway cost nothing.
         unlimited = replace(problem, limits=(), densities=(), finer=problem)
-        free = exchange(unlimited, start, tolerance=tolerance)
+        free = exchange(unlimited, start, tolerance=tolerance, known=known)
         kept = problem.on(free.basis)
         if excess(kept, candidate_at(kept, free.x, 1.0)) <= _KEEPS:
             no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
             return replace(free, certificate=no_weight)
-    if not (floors or problem.side or (problem.goal == "cost" and limited)):
-        return exchange(problem, start, tolerance=tolerance)
-    basis, interior = strictly_feasible(problem, start)
-    return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior)
+    basis, interior = problem.basis, None
+    if floors or problem.side or (problem.goal == "cost" and limited):
+        basis, interior = strictly_feasible(problem, start)
+    try:
+        return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior, known=known)
+    except OutOfTimeError as ended:
+        raise ended if ended.reached is None else _stopped(problem, ended.reached) from None
+
+
+def _stopped(problem: Problem, reached: tuple[float, float]) -> OutOfTimeError:
+    """The error that tells the best design so far and what is proved of all others."""
+    value, bound = reached
+    criterion = problem.stated_criterion
+    if criterion is not None:
+        best, most = criterion.value(1.0 / value), criterion.value(1.0 / max(bound, 1e-300))
+        return out_of_time(
+            f"the best design so far has the criterion {best:.6g}, and none has more than {most:.6g}"
+        )
+    if problem.goal == "factor":
+        value, bound = float(np.sqrt(value)), float(np.sqrt(bound))
+    what = {"cost": "costs", "samples": "takes samples:", "factor": "reaches r_u / r_adm ="}[problem.goal]
+    return out_of_time(f"the best design so far {what} {value:.6g}, and none less than {bound:.6g}")
 
 
 def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResult:

@@ -9,13 +9,15 @@ distance is the proof.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inputdesign_cli.accuracy import Cut, Violation
+from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.compute.watching import Round, tell
 from inputdesign_cli.design.convex.candidate import (
     Candidate,
     Place,
@@ -64,7 +66,7 @@ class ExchangeResult:
     objective: float
     information: Array
     certificate: Certificate
-    active: tuple[Place, ...]  # (requirement, frequency) with a positive multiplier
+    active: tuple[Place, ...]  # (requirement, frequency) with a positive multiplier, the largest first
     rounds: int
     cuts: int
 
@@ -91,6 +93,7 @@ def exchange(
     tolerance: float,
     interior: Array | None = None,
     enough: Enough | None = None,
+    known: Sequence[Place] = (),
 ) -> ExchangeResult:
     """Solve a design problem to a proved relative gap.
 
@@ -102,22 +105,32 @@ def exchange(
         tolerance: the relative gap at which to stop. The result may miss it after `MAX_ROUNDS` or
             when the solver makes no more progress: its `gap` says so.
         enough: stop already when it says so of (objective, bound).
+        known: places that are likely to bind, such as those of a like design: cuts to begin with.
+
+    Raises:
+        OutOfTimeError: with what was reached.
     """
     done = enough or (lambda objective, bound: False)
     coarser = [] if interior is not None else problem.basis.coarser()
     # x of a coarser basis is the head of x of the next, so that they share their integrals.
     stages = [replace(problem, basis=coarse, finer=problem) for coarse in coarser] + [problem]
-    state = _first_state(stages[0], start, interior)
+    state = _first_state(stages[0], start, interior, known)
     rounds = 0
     for stage in stages:
         if stage is not stages[0]:
-            state = state.moved_to(stage) if state.solved else _first_state(stage, start, interior)
+            state = state.moved_to(stage) if state.solved else _first_state(stage, start, interior, known)
         goal = tolerance if stage is problem else max(_STAGE_TOLERANCE, tolerance)
         gaps: list[float] = []
         for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
             rounds += 1
-            solved = state.improve(tolerance)
+            try:
+                solved = state.improve(tolerance)
+            except OutOfTimeError as ended:
+                if stage is problem:
+                    ended.reached = (state.best.objective, state.certificate.bound)
+                raise
             gaps.append(state.gap)
+            tell(Round(rounds, state.best.objective, state.certificate.bound, len(state.cuts)))
             grows = state.problem.basis.size > stage.basis.size
             patience = _PATIENCE_GROWING if grows else _PATIENCE
             stalled = len(gaps) > patience and gaps[-1] > 0.9 * gaps[-1 - patience]
@@ -201,7 +214,7 @@ class _State:
         self._add_rows(breaches)
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
-            self._grow(problem.on(basis))
+            self._grow(problem.grown(basis))
         same = self.face is face and self.best is best and len(self.cuts) == cuts
         if same and not (moves or breaches):
             return False  # the next round would solve the same program
@@ -272,7 +285,7 @@ class _State:
             self.rows.append(density_row(self.problem, breach.place))
 
 
-def _first_state(problem: Problem, start: Array, interior: Array | None) -> _State:
+def _first_state(problem: Problem, start: Array, interior: Array | None, known: Sequence[Place]) -> _State:
     size, inner = problem.basis.size, None
     if interior is not None:
         inner = _inner(problem, interior[:size])
@@ -292,8 +305,9 @@ def _first_state(problem: Problem, start: Array, interior: Array | None) -> _Sta
             0.0, np.zeros((k, k)), np.zeros((problem.basis.size, 0)), np.zeros(len(problem.limits))
         ),
     )
+    state._add(list(known))
     nearly = problem.violations(best.information, above=_FIRST_CUTS)
-    state._add(_most_violated(nearly, [], 2 * problem.experiment.size + _MORE_CUTS))
+    state._add(_most_violated(nearly, state.keys, 2 * problem.experiment.size + _MORE_CUTS))
     if problem.side:
         close = problem.side_violations(best.information / best.s, above=_FIRST_CUTS)
         state._add(_most_violated(close, state.keys, problem.experiment.size + _MORE_CUTS))
@@ -322,4 +336,5 @@ def _most_violated(found: list[tuple[int, Violation]], known: list[Place], most:
 
 def _active(keys: list[Place], proof: Proof) -> tuple[Place, ...]:
     weights = np.array([np.trace(Y) for Y, _ in proof.cuts])
-    return tuple(key for key, weight in zip(keys, weights, strict=True) if weight > 1e-4 * weights.sum())
+    largest_first = np.argsort(-weights, kind="stable")
+    return tuple(keys[i] for i in largest_first if weights[i] > 1e-4 * weights.sum())

@@ -10,24 +10,30 @@ from inputdesign_cli.design.convex.candidate import least_scale, missing_floor, 
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
 
 _TOLERANCE = 1e-6
 _ROOM = 0.8
+_NEARLY = 1e-5
 _PLENTY = 1e4
 
 
 class UnreachableError(Exception):
     """The requirements cannot be met within the limits.
 
-    `nearest` solves `problem` (goal "factor"): the least multiple s > 1 of the limits for which they can
-    be met, so that the accuracy must be loosened by sqrt(s), with its certificate. With
-    `limits_alone` it is the lower limits that contradict the upper ones, whatever the accuracy.
+    `nearest` solves `problem` (goal "factor"), the best accuracy within the limits: the least s > 1 such that
+    s times its information meets them, so that every error must be loosened by sqrt(s), with its certificate.
+    `within` keeps to all limits with room to spare, where some are lower ones. With `limits_alone` it is the
+    lower limits that contradict the upper ones, whatever the accuracy.
     """
 
-    def __init__(self, problem: Problem, nearest: ExchangeResult, *, limits_alone: bool) -> None:
+    def __init__(
+        self, problem: Problem, nearest: ExchangeResult, within: Array | None = None, *, limits_alone: bool
+    ) -> None:
         super().__init__("no design meets the requirements within the limits")
+        self.within = within
         self.problem = problem
         self.nearest = nearest
         self.limits_alone = limits_alone
@@ -44,6 +50,7 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
 
     Raises:
         UnreachableError: there is none; the proof comes with it.
+        InaccurateError: `gap-not-closed`: neither a design nor a proof was found.
     """
     if not any(limit.upper for limit in problem.limits):
         # Nothing caps the excitation: enough of it meets everything.
@@ -57,6 +64,7 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
         )
         reached = exchange(limits_only, start, tolerance=_TOLERANCE, enough=_decided)
         if reached.objective >= 1.0:
+            _check_proved(reached)
             raise UnreachableError(limits_only, reached, limits_alone=True)
         within = np.sqrt(reached.s) * reached.x
         problem, start = problem.on(reached.basis), np.pad(start, (0, within.size - start.size))
@@ -72,7 +80,8 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
         again = exchange(capped, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
         found = again if again.objective < 1.0 else found
     if found.objective >= 1.0:
-        raise UnreachableError(factor, found, limits_alone=False)
+        _check_proved(found)
+        raise UnreachableError(factor, found, within, limits_alone=False)
     if within is None:
         return found.basis, np.sqrt(found.s) * found.x
     share = 0.5 * (1.0 - found.s)
@@ -80,5 +89,19 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
     return found.basis, (1.0 - share) * found.x + share * within
 
 
+def _check_proved(found: ExchangeResult) -> None:
+    """Raise `InaccurateError` unless it is proved, to rounding, that nothing is within the limits."""
+    bound = found.certificate.bound
+    if bound < 1.0 - _NEARLY:
+        raise InaccurateError.because(
+            "gap-not-closed",
+            "whether any design keeps to the limits was not decided: the best found misses by a factor of "
+            f"{np.sqrt(found.objective):.4g}, and the proof excludes only factors below {np.sqrt(bound):.4g}",
+            hint="write limits and costs of the channels in units in which they are of like size, or lower "
+            "the order of the spectrum",
+            key="limits",
+        )
+
+
 def _decided(objective: float, bound: float) -> bool:
-    return objective < _ROOM or (bound > 1.0 and objective - bound < 1e-4 * bound)
+    return objective < _ROOM or (bound > 1.0 and objective - bound < _TOLERANCE * bound)

@@ -188,7 +188,7 @@ class _Step:
             with warnings.catch_warnings():
                 # An inaccurate step does no harm: only what it is found to attain counts.
                 warnings.simplefilter("ignore")
-                self._problem.solve(solver=cp.CLARABEL)
+                self._problem.solve(solver=cp.CLARABEL, time_limit=seconds_left())
         except cp.SolverError:
             return None
         found = self._x.value

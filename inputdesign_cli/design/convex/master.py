@@ -2,30 +2,30 @@
 
 Unknowns: y (the spectrum on the face), svec(M'), s where the goal has one, and the auxiliary unknowns of
 the cuts. Everything is scaled by the best design so far: there M' is the identity and the objective is
-one, so that whatever is active has multipliers and slacks of order one. Eliminating M' would halve the
-time and cost two digits of the multipliers.
+one, so that whatever is active has multipliers and slacks of order one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from inputdesign_cli.accuracy import Cut, positive_part
-from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.convex.candidate import Candidate
+from inputdesign_cli.design.convex.finite import FiniteProgram, solve_program
 from inputdesign_cli.design.convex.limits import DensityPlace
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
+from inputdesign_cli.spectrum import Face, Functional, smat, svec
 
 # The conic program is solved this much tighter than the gap that is asked for.
 _SOLVER_MARGIN = 1e-2
 _SOLVER_FLOOR = 1e-10
 _SINGULAR = 1e-14
+_AT_ONCE = 256  # basis functions
 # Without a requirement that keeps M definite, weak directions are not blown up beyond this.
 _INDEFINITE = 1e-3
 
@@ -89,74 +89,53 @@ def solve_master(
         keep: let any multiple of the best spectrum be added to the face, so that the program stays
             feasible where scaling up is no remedy.
     """
-    k = problem.experiment.size
     ray = best.z[:, None] / problem.price.at(best.z) if keep else np.zeros((best.z.size, 0))
     columns = np.concatenate([face.columns, ray], axis=1)
-    inside, number, entries = face.columns.shape[1], columns.shape[1], svec_length(k)
+    inside, number = face.columns.shape[1], columns.shape[1]
     congruence = _congruence(best.information, definite=problem.needs_definite)
     objective, worth = best.objective, problem.price.at(best.z)
-    scaled = 1 if problem.scaled else 0
-    transformed = [cut.transformed(congruence) for cut, _ in cuts]
-    parts = [cut.blocks(k) for cut in transformed]
-    widths = [blocks[0].auxiliary.shape[1] for blocks in parts]
-    starts = np.concatenate([[0], np.cumsum(widths)]).astype(int) + number + entries + scaled
-    total = number + entries + scaled + sum(widths)
 
     def turned(information: Array) -> Array:
         return svec(congruence @ information @ congruence.T)
 
-    gains = turned(problem.information_map).T @ columns
-    link = [-worth * gains, np.eye(entries)]
-    if scaled:
-        link.append(-best.s * turned(problem.scaled_information)[:, None])
-    blocks = [
-        Block("zero", _widened(sp.csc_matrix(np.hstack(link)), 0, total), -turned(problem.fixed_information)),
-        Block(face.kind, sp.eye_array(inside, total, format="csc"), np.zeros(inside), face.order),
-    ]
-    if keep:
-        blocks.append(Block("nonnegative", sp.eye_array(1, total, k=inside, format="csc"), np.zeros(1)))
-    at_s = number + entries
-    if scaled:
-        blocks.append(Block("nonnegative", sp.eye_array(1, total, k=at_s, format="csc"), np.zeros(1)))
-    if rows:
-        blocks.append(_row_block(problem, columns, rows, best.s, worth, at_s, total))
-    first = len(blocks)
-    for (_, side), conic, start in zip(cuts, parts, starts, strict=False):
-        for block in conic:
-            pieces = [sp.csc_matrix((block.constant.size, number)), block.information]
-            if scaled:
-                column = best.s * block.constant[:, None] if side else np.zeros((block.constant.size, 1))
-                pieces.append(sp.csc_matrix(column))
-            head = sp.hstack(pieces, format="csc")
-            matrix = _widened(head, 0, total) + _widened(block.auxiliary, int(start), total)
-            offset = np.zeros(block.constant.size) if side else block.constant
-            blocks.append(Block(block.kind, sp.csc_matrix(matrix), offset, block.order))
-    q = np.zeros(total)
-    if scaled:
-        q[at_s] = 1.0
-    else:
-        q[:number] = problem.price.vector @ columns
-    solution = solve_conic(q, blocks, tolerance=max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR))
-    if solution.status in ("infeasible", "unbounded") or not np.all(np.isfinite(solution.x)):
+    maps = problem.information_map
+    parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
+    gains = [worth * (np.concatenate(parts).T @ columns)]
+    signs = np.eye(number)[inside:]
+    cost = problem.price.vector @ columns
+    if problem.scaled:
+        gains.append(best.s * turned(problem.scaled_information)[:, None])
+        signs = np.eye(number + 1)[inside:]
+        cost = np.eye(number + 1)[number]
+    limits, offset = _limits(problem, columns, rows, best.s, worth)
+    transformed = [cut.transformed(congruence) for cut, _ in cuts]
+    program = FiniteProgram(
+        cost=cost,
+        face=face,
+        gains=np.hstack(gains),
+        offset=turned(problem.fixed_information),
+        signs=signs,
+        limits=limits,
+        limit_offset=offset,
+        cuts=transformed,
+        sides=[side for _, side in cuts],
+        unit=best.s if problem.scaled else None,
+        size=problem.experiment.size,
+    )
+    solution = solve_program(program, tolerance=max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR))
+    if solution is None:
         return None
-    y = worth * _in_cone(face, solution.x[:inside])
-    kept = worth * np.maximum(solution.x[inside:number], 0.0)
-    remaining = list(solution.multipliers[first:])
-    proofs = []
-    for cut, conic in zip(transformed, parts, strict=True):
-        mine, remaining = remaining[: len(conic)], remaining[len(conic) :]
-        Y, r = cut.proof(mine)
-        proofs.append((objective * congruence.T @ Y @ congruence, objective * r))
-    weights = np.zeros(0)
-    if rows:
-        scales = np.array([_level(problem, row, best.s) for row in rows])
-        weights = objective * np.maximum(solution.multipliers[first - 1], 0.0) / scales
+    y = worth * _in_cone(face, solution.v[:inside])
+    kept = worth * np.maximum(solution.v[inside:number], 0.0)
+    proofs = [(objective * congruence.T @ Y @ congruence, objective * r) for Y, r in solution.proofs]
+    scales = np.array([_level(problem, row, best.s) for row in rows])
+    weights = objective * np.maximum(solution.limit_weights, 0.0) / scales
     return MasterSolution(
         y=y,
         z=face.columns @ y + ray @ kept,
-        s=best.s * float(solution.x[at_s]) if scaled else 1.0,
+        s=best.s * float(solution.v[-1]) if problem.scaled else 1.0,
         proof=Proof(tuple(proofs), weights),
-        converged=solution.status != "failed",
+        converged=solution.converged,
     )
 
 
@@ -168,7 +147,15 @@ def _in_cone(face: Face, y: Array) -> Array:
 
 
 def _congruence(information: Array, *, definite: bool) -> Array:
-    """K with K M K^T = I, or nearly so where M is close to singular."""
+    """K with K M K^T = I, or nearly so where M is close to singular.
+
+    By the Cholesky factor, which leaves apart what M keeps apart.
+    """
+    if definite:
+        with suppress(np.linalg.LinAlgError):
+            factor = np.linalg.cholesky(information)
+            if np.diag(factor).min() ** 2 > _SINGULAR * np.diag(factor).max() ** 2:
+                return np.linalg.inv(factor)
     eigenvalues, vectors = np.linalg.eigh(information)
     floor = (_SINGULAR if definite else _INDEFINITE) * eigenvalues[-1]
     return (vectors / np.sqrt(np.maximum(eigenvalues, floor))).T
@@ -178,25 +165,20 @@ def _level(problem: Problem, row: Row, s: float) -> float:
     return row.bound * problem.bound_factor(row.upper, s) or 1.0
 
 
-def _row_block(
-    problem: Problem, columns: Array, rows: Sequence[Row], s: float, worth: float, at_s: int, total: int
-) -> Block:
+def _limits(
+    problem: Problem, columns: Array, rows: Sequence[Row], s: float, worth: float
+) -> tuple[Array, Array]:
     """Each limit over its level at the best design: 1 (or s over its best value) minus the used share."""
-    matrix, offset = np.zeros((len(rows), total)), np.zeros(len(rows))
     number = columns.shape[1]
+    matrix = np.zeros((len(rows), number + int(problem.scaled)))
+    offset = np.zeros(len(rows))
     for index, row in enumerate(rows):
         sign = 1.0 if row.upper else -1.0
         level = _level(problem, row, s)
         matrix[index, :number] = -sign * worth / level * (row.functional.vector @ columns)
         share = sign * row.bound * problem.bound_factor(row.upper, s) / level
         if problem.scaled and (row.upper or not problem.floors_fixed):
-            matrix[index, at_s] = share
+            matrix[index, number] = share
         else:
             offset[index] = share
-    return Block("nonnegative", sp.csc_matrix(matrix), offset)
-
-
-def _widened(matrix: sp.csc_matrix, start: int, total: int) -> sp.csc_matrix:
-    rows, width = matrix.shape
-    left, right = sp.csc_matrix((rows, start)), sp.csc_matrix((rows, total - start - width))
-    return sp.hstack([left, matrix, right], format="csc")
+    return matrix, offset

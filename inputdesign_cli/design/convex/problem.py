@@ -23,7 +23,7 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts
 from inputdesign_cli.plant import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Functional
@@ -83,6 +83,7 @@ class Problem:
     side: tuple[Requirement, ...] = ()
     floors_fixed: bool = False
     finer: Problem | None = field(default=None, repr=False)
+    _before: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @property
     def stated_criterion(self) -> Criterion | None:
@@ -92,6 +93,14 @@ class Problem:
     def on(self, basis: Basis) -> Problem:
         """The same problem on another basis, such as one that has grown out of this one."""
         return self if basis is self.basis else replace(self, basis=basis, finer=None)
+
+    def grown(self, basis: Basis) -> Problem:
+        """The same problem on a basis that begins with this one; what is known of this one is kept."""
+        grown = replace(self, basis=basis, finer=None)
+        grown._before.append(self)
+        _ = grown.information_map, grown.grid, grown.grid_products
+        grown._before.clear()
+        return grown
 
     @property
     def scaled(self) -> bool:
@@ -114,7 +123,12 @@ class Problem:
         """(size, k, k): M_i, the information of each basis function."""
         if self.finer is not None:
             return self.finer.information_map[: self.basis.size]
-        return self.basis.integrals(self.experiment.information_density, self.experiment.singularities)
+        experiment = self.experiment
+        basis = self.basis.beyond(self._before[0].basis.size) if self._before else self.basis
+        found = basis.integrals(
+            experiment.information_density, experiment.singularities, experiment.information_factor
+        )
+        return np.concatenate([*(before.information_map for before in self._before), found])
 
     @property
     def baseline_information(self) -> Array:
@@ -185,10 +199,16 @@ class Problem:
 
     def value(self, weight: Array) -> Functional:
         """tr(Y (M(x) - M0)) for a fixed Y = `weight` (k, k) as a functional of the spectrum."""
-        return Functional(
-            np.tensordot(self.information_map, weight, axes=2),
-            lambda w: self.experiment.value_density(weight, w),
-        )
+        known: dict[int, NDArray] = {}
+
+        def density(w: Array) -> NDArray:
+            if w is not self.grid:
+                return self.experiment.value_density(weight, w)
+            if not known:  # asked for again with every share that limits keep of a price
+                known[0] = self.experiment.valued(self.grid_products, weight)
+            return known[0]
+
+        return Functional(np.tensordot(self.information_map, weight, axes=2), density)
 
     def density_at(self, place: DensityPlace) -> Functional:
         """v^* Phi v at one frequency as a functional; it has no density over frequency."""
@@ -225,7 +245,14 @@ class Problem:
     @cached_property
     def grid(self) -> Array:
         """Frequencies that see every resonance of the excitation's densities, over its band."""
+        if self._before:
+            return self._before[0].grid
         return graded_grid(self.experiment.singularities, *self.experiment.band)
+
+    @cached_property
+    def grid_products(self) -> WeightedProducts:
+        """The gradients at the frequencies of `grid`."""
+        return self._before[0].grid_products if self._before else self.experiment.products(self.grid)
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[tuple[int, Violation]]:
         """All local maxima of all requirements' ratios, each with the index of its requirement."""

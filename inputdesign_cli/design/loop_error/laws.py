@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.design.loop_error.checks import (
@@ -20,6 +19,7 @@ from inputdesign_cli.design.loop_error.checks import (
     check_model_reference,
 )
 from inputdesign_cli.design.loop_error.plant import MatrixPlant
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, join_roots, roots_in_z, unit_circle
 from inputdesign_cli.plant.polynomial_matrix import delay_of, determinant_and_adjugate
@@ -203,7 +203,7 @@ class MinimumVariance:
         impulse = np.zeros(self.delay)
         impulse[0] = 1.0
         return [
-            scipy.signal.lfilter(c, np.convolve(a, d), impulse)
+            filtered(c, np.convolve(a, d), impulse)
             for a, c, d in zip(*map(plant.per_output, (plant.A, plant.C, plant.D)), strict=True)
         ]
 

@@ -16,7 +16,8 @@ def something_asked(spec: Spec) -> Iterator[PathDiagnostic]:
         yield PathDiagnostic(
             "nothing-asked",
             "nothing is asked of the model: accuracy holds neither a requirement nor a criterion",
-            "write accuracy: {model_error: {relative: 0.01}}, or give the excitation under spectrum.given",
+            "write accuracy: {model_error: {relative: 0.01}}, accuracy: {criterion: D} for the best within "
+            "limits, or give the excitation under spectrum.given",
             ("accuracy",),
         )
     if "scale" in accuracy.model_fields_set and accuracy.criterion is None:

@@ -13,6 +13,7 @@ from inputdesign_cli.specification.yaml.places import Path, parse_key
 
 ROUNDING = 1e-4
 """3.1416 is meant as pi."""
+_LONGEST_DELAY = 1000
 
 # Every key that takes a list with one entry per input or output.
 _PER_CHANNEL = {
@@ -61,6 +62,24 @@ def _wrong_size(key: str, value: tuple, noun: str, size: int) -> PathDiagnostic:
         f"write one entry per {noun}" + ("" if depth(value) > 1 else ", or a number"),
         parse_key(key),
     )
+
+
+def delays(spec: Spec) -> Iterator[PathDiagnostic]:
+    """Dead times end within the record, and are not too many samples."""
+    plant = spec.plant
+    if plant.kind != "continuous":
+        return
+    longest = max(max(row) for row in plant.continuous.delays)
+    path = ("plant", "continuous", "dead_time" if plant.continuous.kind == "process" else "delay")
+    whole = spec.experiment.samples * spec.sample_time
+    if "samples" in spec.experiment.model_fields_set and longest >= whole:
+        message = f"{{key}} is {show(longest)} {spec.time_unit}, and the experiment lasts {show(whole)}"
+        yield PathDiagnostic(
+            "delay-beyond-record", message, "take more samples, or look at the time_unit", path
+        )
+    elif plant.sampled and longest > _LONGEST_DELAY * spec.sample_time:
+        message = f"{{key}} is more than {_LONGEST_DELAY} samples: {show(longest)} {spec.time_unit}"
+        yield PathDiagnostic("too-large", message, "sample more slowly", path)
 
 
 def bands(spec: Spec) -> Iterator[PathDiagnostic]:

@@ -12,6 +12,7 @@ from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
     Band,
+    Count,
     Denominator,
     FileName,
     Flag,
@@ -26,9 +27,11 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
+from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import Controller, DiscreteTransfer, Transfer
 
 DEFAULT_CONFIDENCE = 0.95
+_PROBABILITY = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
 _NO_TARGET = "every estimate has some error; remove the key for the least that limits.energy allows"
 
 Deviations = Annotated[
@@ -68,6 +71,24 @@ class Sensitivity(Section):
         return DiscreteTransfer(numerator=self.numerator, denominator=self.denominator or (1.0,))
 
 
+class Confidence(Section):
+    """The probability that sizes r_u: of an ellipsoid of parameters, or that of the error itself."""
+
+    ellipsoid: Fraction | None = Field(
+        default=None, description="Probability that fixes alpha by the chi-squared distribution."
+    )
+    exact: Fraction | None = Field(
+        default=None, description="Probability that |G(theta) - G| <= r_adm at all frequencies."
+    )
+    draws: Annotated[Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
+        default=4000, description="Simulated estimates that fix alpha for exact, and as many that check."
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """One probability is given."""
+        yield from self.exactly_one("ellipsoid", "exact")
+
+
 class ModelError(Section):
     """r_u(w) <= r_adm(w) at every frequency of the band."""
 
@@ -75,9 +96,10 @@ class ModelError(Section):
     absolute: Positive | None = Field(default=None, description="r_adm = this value at every frequency.")
     table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
     sensitivity: Sensitivity | None = Field(default=None, description="r_adm from a bound on a sensitivity.")
-    confidence: Fraction | None = Field(
+    confidence: Annotated[Confidence, Shorthand("ellipsoid", _PROBABILITY)] | None = Field(
         default=None,
-        description="Probability that fixes alpha by the chi-squared distribution (default 0.95).",
+        description="Probability that fixes alpha by the chi-squared distribution (default 0.95), or "
+        "{exact: 0.95}: alpha calibrated by simulated estimates.",
     )
     alpha: Positive | None = Field(
         default=None, description="Size of the confidence region, in place of confidence."
@@ -100,11 +122,25 @@ class ModelError(Section):
         if self.sensitivity is not None and self.norm == "entry":
             message = "{key} is entry, but a sensitivity depends on all entries of the error together"
             yield PathDiagnostic("conflicting-keys", message, "remove norm, or write frobenius", ("norm",))
+        if self.region == "ellipsoid" and self.calibrated is not None:
+            message = (
+                "{key} is ellipsoid, but an exact confidence is that of the estimates, not of an ellipsoid"
+            )
+            yield PathDiagnostic("conflicting-keys", message, "remove region", ("region",))
+
+    @property
+    def calibrated(self) -> Confidence | None:
+        """The exact confidence, where one is asked for."""
+        stated = self.confidence
+        return stated if stated is not None and stated.exact is not None else None
 
     @property
     def probability(self) -> float | None:
         """The confidence, 0.95 when neither it nor alpha is given; None when alpha is given."""
-        return None if self.alpha is not None else self.confidence or DEFAULT_CONFIDENCE
+        if self.alpha is not None:
+            return None
+        stated = self.confidence
+        return (stated and (stated.ellipsoid or stated.exact)) or DEFAULT_CONFIDENCE
 
 
 class InformationTarget(Section):

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated
 
 import numpy as np
 from pydantic import Discriminator, Field
 
+from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     Count,
+    CovarianceMatrix,
     FileName,
     Names,
     NonNegative,
+    Number,
     PerChannel,
     Positive,
     SemidefiniteMatrix,
@@ -30,6 +33,16 @@ InformationSource = Annotated[
     Discriminator(lambda value: TAG + ("file" if isinstance(value, str) else "matrix")),
 ]
 
+Values = Annotated[
+    Mapping[str, Number],
+    Field(min_length=1),
+    Wording("a mapping", "write parameter names and values: {b1: 3.6, f1: -0.7}"),
+]
+PriorParameters = Annotated[
+    Annotated[Values, tag("values")] | Annotated[Names, tag("names")],
+    Discriminator(lambda value: TAG + ("values" if isinstance(value, Mapping) else "names")),
+]
+
 
 class NoiseShape(Section):
     """The filter C(q)/D(q) that colours the noise; one polynomial, or one per output."""
@@ -37,6 +50,9 @@ class NoiseShape(Section):
     C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
     D: StablePerOutput = Field(default=(1.0,), description="Monic, stable denominator in q^-1 (default 1).")
     variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
+    known: Names | None = Field(
+        default=None, description="Names of coefficients of C and D that are known and not estimated."
+    )
 
     def covariance(self, outputs: int) -> np.ndarray:
         """The covariance of e (outputs, outputs); a number stands for that multiple of I, none for I."""
@@ -70,19 +86,48 @@ class SimulationNoise(NoiseShape):
 
 
 class Prior(Section):
-    """Information at hand before the experiment."""
+    """Information at hand before the experiment; with the parameters' values it counts for estimates."""
 
     information: InformationSource = Field(
-        description="Information matrix (inverse covariance) of the parameters, or the name of a data file."
+        description="Information matrix (inverse covariance) of the parameters, or the name of a file: data "
+        "(.csv), or a model that identify wrote (.yaml)."
     )
-    parameters: Names | None = Field(
-        default=None, description="Names that order the rows of the matrix (default: the order of the model)."
+    parameters: PriorParameters | None = Field(
+        default=None,
+        description="Names that order the rows of the matrix (default: the order of the model), or names and "
+        "values: {b1: 3.6, f1: -0.7}.",
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Every row of the matrix has a name."""
         if isinstance(self.information, tuple):
-            yield from check_names(self.parameters, len(self.information), "information")
+            yield from check_names(self.names, len(self.information), "information")
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """Of the parameters, row by row, where they are stated."""
+        return None if self.parameters is None else tuple(self.parameters)
+
+    @property
+    def values(self) -> Mapping[str, float] | None:
+        """Of the parameters by name, where they are stated."""
+        return self.parameters if isinstance(self.parameters, Mapping) else None
+
+    @property
+    def names_a_model(self) -> bool:
+        """Whether the information is that of a model file."""
+        return isinstance(self.information, str) and self.information.endswith((".yaml", ".yml"))
+
+
+class Estimated(Section):
+    """What identify says of the plant and noise beside it; by itself it changes nothing."""
+
+    parameters: Values = Field(description="The parameters and their values.")
+    covariance: CovarianceMatrix = Field(description="Their covariance, in the same order.")
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Every row of the matrix has a name."""
+        yield from check_names(tuple(self.parameters), len(self.covariance), "covariance")
 
 
 class Experiment(Section):

@@ -118,9 +118,10 @@ Harmonics = Annotated[
 _ROWS = nested(2, "a matrix", "write rows: [[1, 0], [0, 1]]")
 SymmetricMatrix = Annotated[Several[Several[Number]], _ROWS, AfterValidator(symmetric)]
 SemidefiniteMatrix = Annotated[SymmetricMatrix, AfterValidator(semidefinite)]
+CovarianceMatrix = Annotated[SymmetricMatrix, AfterValidator(positive_definite)]
 Variance = Annotated[
     Annotated[Positive, Wording("a number", "noise without power needs no experiment"), tag("one")]
-    | Annotated[SymmetricMatrix, AfterValidator(positive_definite), tag("list")],
+    | Annotated[CovarianceMatrix, tag("list")],
     _LIST_OR_NOT,
 ]
 """A variance, or a covariance matrix."""
@@ -131,16 +132,25 @@ _PER_OUTPUT = Wording(f"{_ONE}, or a list of them, one per output")
 _FACTORS = Wording(f"{_ONE}, or a list of factors")
 _MATRIX = Wording(
     f"{_ONE}, or rows (outputs) of columns (inputs) of them",
-    "for several inputs or outputs write rows of columns of polynomials: [[[0, 1], [0, 2]]]",
+    "for one input and one output write a list of coefficients: [0, 1]; for several, rows of columns of "
+    "them: [[[0, 1], [0, 2]]]",
 )
 _CONTINUOUS = Wording(f"{_ONE}, or a list of factors, or rows (outputs) of columns (inputs) of coefficients")
-_Coefficients = Annotated[Several[Number], SIZES["coefficients of a numerator"], Wording(_ONE)]
-_Rooted = Annotated[Several[Number], SIZES["coefficients of a denominator"], Wording(_ONE)]
+_Coefficient = Annotated[
+    Number, Wording("a number", "names of parameters stand in a plant with parameters: {K: 2.1}")
+]
+_Coefficients = Annotated[Several[_Coefficient], SIZES["coefficients of a numerator"], Wording(_ONE)]
+_Rooted = Annotated[Several[_Coefficient], SIZES["coefficients of a denominator"], Wording(_ONE)]
 _Monic = Annotated[_Rooted, holds(check_monic)]
 _Stable = Annotated[_Monic, holds(check_delay_stable)]
 _Leading = Annotated[_Rooted, holds(check_leading)]
 _Channels = Annotated[Several[T], SIZES["inputs or outputs"]]
 _Rows = Annotated[_Channels[_Channels[T]], AfterValidator(same_columns)]
+_Grid = Annotated[
+    Annotated[T, tag("0")] | Annotated[_Rows[T], tag("2")],
+    _DEPTH,
+    Wording("a number, or rows (outputs) of columns (inputs) of numbers", "write 25, or [[1, 3], [7, 3]]"),
+]
 _OneOrList = Annotated[Annotated[T, tag("1")] | Annotated[Several[T], tag("2")], _DEPTH]
 _OneOrRows = Annotated[Annotated[T, tag("1")] | Annotated[_Rows[T], tag("3")], _DEPTH]
 
@@ -152,9 +162,14 @@ StablePerOutput = Annotated[_OneOrList[_Stable], _PER_OUTPUT]
 StableMatrix = Annotated[_OneOrRows[_Stable], _MATRIX]
 GainMatrix = Annotated[_OneOrRows[_Coefficients], _MATRIX]
 RowsMatrix = Annotated[
-    _Rows[_Coefficients], nested(3, "rows (outputs) of columns (inputs) of coefficients", _MATRIX.hint)
+    _Rows[_Coefficients],
+    nested(3, "rows (outputs) of columns (inputs) of coefficients", "write [[[0, 1], [0, 2]]]"),
 ]
 """A matrix of polynomials, never a single one."""
+NumberGrid = _Grid[Number]
+PositiveGrid = _Grid[Positive]
+NonNegativeGrid = _Grid[NonNegative]
+"""One number, or one for each entry of a transfer matrix."""
 ContinuousDenominator = Annotated[
     Annotated[_Leading, tag("1")]
     | Annotated[Several[_Leading], tag("2")]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
@@ -13,10 +13,26 @@ from inputdesign_cli.specification.models.fields import (
     GainMatrix,
     Index,
     MonicPerOutput,
+    Names,
+    Number,
     Numbers,
     StableMatrix,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.named import (
+    EXPRESSIONS,
+    CoefficientTexts,
+    NamedParameter,
+    Texts,
+    check_names,
+    check_used,
+    matrix,
+    text,
+    texts_in,
+    values_of,
+    worth,
+)
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
+from inputdesign_cli.specification.models.process import ProcessModel
 from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
@@ -26,24 +42,89 @@ from inputdesign_cli.specification.models.shapes import (
     size_of,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import ContinuousMatrix
+from inputdesign_cli.specification.models.transfer import DelayedMatrix
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+from inputdesign_cli.specification.yaml.plain import Plain
+
+Continuous = Annotated[
+    DelayedMatrix | ProcessModel,
+    pick(
+        lambda v: (DelayedMatrix if v.keys().isdisjoint(ProcessModel.model_fields) else ProcessModel).phrase
+    ),
+    Wording(
+        "a mapping of keys", "write {numerator: [..], denominator: [..]}, or {gain: .., time_constant: ..}"
+    ),
+]
+"""The plant itself in s."""
 
 
-class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A, B, F"):
+class NamedPlant(Section):
+    """What plants have in common whose coefficients may be expressions in named parameters."""
+
+    TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ()
+
+    parameters: Mapping[str, Number] | None = Field(
+        default=None,
+        min_length=1,
+        description="Named parameters and their values. Coefficients may then be expressions in them, and "
+        "these alone are estimated.",
+        examples=[{"K": 2.1, "T": 180}],
+    )
+    known: Names | None = Field(
+        default=None, description="Names of parameters that are known and not estimated.", examples=[["b1"]]
+    )
+
+    _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _worth(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """The section with the values of its expressions; it remembers what was written."""
+        if not isinstance(data, dict):
+            return handler(data)
+        numbers = dict(data)
+        if isinstance(data.get("parameters"), dict):
+            values = values_of(data["parameters"])
+            found = list(check_names(values))
+            stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
+            numbers |= {key: worth(data[key], values, (key,), found) for key in stated}
+            if not found:
+                found += check_used(values, texts_in([data[key] for key in stated]))
+            if found:
+                raise carry(*found)
+        made = handler(numbers)
+        made._written = dict(data)
+        return made
+
+    @property
+    def written(self) -> dict[str, Plain]:
+        """The section as it was written, with its expressions."""
+        return self._written
+
+    @property
+    def named_parameters(self) -> tuple[NamedParameter, ...]:
+        """Parameters with names of their own; none where the coefficients are the parameters."""
+        stated = self.parameters or {}
+        return tuple(
+            NamedParameter(name, name, value, ("parameters", name)) for name, value in stated.items()
+        )
+
+
+class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials A, B, F"):
     """A(q) y = B(q)/F(q) u + noise, coefficients in ascending powers of q^-1."""
 
     kind: ClassVar[Literal["polynomial"]] = "polynomial"
     sampled: ClassVar[bool] = True
+    TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("A", "B", "F")
 
-    A: MonicPerOutput = Field(
+    A: Annotated[MonicPerOutput, EXPRESSIONS] = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."
     )
-    B: GainMatrix = Field(
+    B: Annotated[GainMatrix, EXPRESSIONS] = Field(
         description="Leading zeros are the delay. MIMO: rows (outputs) of columns (inputs) of polynomials.",
         examples=[[0, 3.6]],
     )
-    F: StableMatrix | None = Field(
+    F: Annotated[StableMatrix, EXPRESSIONS] | None = Field(
         default=None, description="Monic and stable, in the shape of B (default 1)."
     )
 
@@ -69,6 +150,13 @@ class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A,
         """The number of inputs."""
         return len(self.B_matrix[0])
 
+    def coefficients(self, letter: str, output: int, input: int) -> Texts:
+        """A, B or F of an entry as expressions in the named parameters."""
+        written = text(self.written[letter.upper()])
+        if letter == "a":
+            return written[output] if depth(written) == 2 else written
+        return matrix(written)[output][input]
+
     @property
     def B_matrix(self) -> PolynomialMatrix:  # noqa: N802 (the paper's symbol)
         """B as rows (outputs) of columns (inputs) of coefficients, also for one input and output."""
@@ -81,12 +169,16 @@ class PolynomialPlant(Section, family="plant", phrase="a plant of polynomials A,
         return ones if self.F is None else as_matrix(self.F)
 
 
-class ContinuousPlant(Section, family="plant", phrase="a continuous-time plant"):
+class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plant"):
     """A continuous-time transfer matrix; without `sample` the design stays in continuous time."""
 
     kind: ClassVar[Literal["continuous"]] = "continuous"
 
-    continuous: ContinuousMatrix = Field(description="Transfer matrix in s; rows are outputs.")
+    TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("continuous",)
+
+    continuous: Continuous = Field(
+        description="Transfer matrix in s, rows are outputs; or gain, time constant and dead time."
+    )
     sample: Literal["zoh"] | None = Field(
         default=None,
         description="zoh: sampled at sample_time with a zero-order hold. Absent: continuous time.",
@@ -106,6 +198,22 @@ class ContinuousPlant(Section, family="plant", phrase="a continuous-time plant")
     def sampled(self) -> bool:
         """Whether the design runs in discrete time."""
         return self.sample is not None
+
+    @property
+    def named_parameters(self) -> tuple[NamedParameter, ...]:
+        """Those that are stated, or the quantities of a process model."""
+        if self.parameters is None and self.continuous.kind == "process":
+            return self.continuous.own_parameters()
+        return super().named_parameters
+
+    @property
+    def texts(self) -> CoefficientTexts:
+        """The coefficients as expressions in the named parameters."""
+        if self.parameters is not None:
+            return self.continuous.texts(self.written["continuous"])
+        if self.continuous.kind == "process":
+            return self.continuous.texts()
+        raise ValueError("the coefficients of this plant are its parameters")
 
 
 class RegressionSize(Section):
@@ -156,7 +264,7 @@ Plant = Annotated[PolynomialPlant | ContinuousPlant | RegressionPlant, pick(_kin
 
 TruePlant = Annotated[
     PolynomialPlant | ContinuousPlant | RegressionPlant | TrueParameters,
-    pick(lambda v: TrueParameters.phrase if "parameters" in v else _kind(v)),
+    pick(lambda v: TrueParameters.phrase if set(v) == {"parameters"} else _kind(v)),
     _FORMS,
 ]
 """The plant of a simulation; of a regression only its parameters."""

@@ -75,8 +75,17 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
         "unstable-polynomial",
         f"{{key}} has a root of radius {where} at {angle:.4g} rad/sample; "
         "all roots (in z) must lie inside the unit circle",
-        "check the signs, and that the coefficients ascend in q^-1 and begin with 1",
+        "check the signs, and that the coefficients ascend in q^-1 and begin with 1"
+        + _decimal_comma(polynomial),
     )
+
+
+def _decimal_comma(polynomial: Polynomial) -> str:
+    """What to add where 0,7 was most likely meant for 0.7: whole numbers with a zero before another."""
+    whole = all(float(c).is_integer() for c in polynomial)
+    if whole and 0.0 in polynomial[1:-1]:
+        return "; if 0,7 was meant for a number, write 0.7: a comma begins the next coefficient"
+    return ""
 
 
 def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:

@@ -122,6 +122,10 @@ class Solver(Section):
         description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
     )
     tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
+    any_spectrum_tolerance: Tolerance = Field(
+        default=1e-4,
+        description="Relative gap of the bound over every spectrum (default 1e-4; no less than tolerance).",
+    )
     time_limit: Positive = Field(default=600.0, description="Seconds that a design may take (default 600).")
     grid: Annotated[Count, SIZES["solver.grid"]] = Field(
         default=1000, description="Number of frequencies of the lmi method (default 1000)."

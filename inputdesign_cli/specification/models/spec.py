@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr
 
 from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.accuracy import Accuracy
-from inputdesign_cli.specification.models.experiment import Cost, Experiment, Noise
+from inputdesign_cli.specification.models.experiment import Cost, Estimated, Experiment, Noise
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
 from inputdesign_cli.specification.models.plant import Plant
@@ -48,6 +48,10 @@ class Spec(Section):
     )
     experiment: Experiment = Field(
         default=Experiment(), description="Samples, controller, prior information."
+    )
+    estimate: Estimated | None = Field(
+        default=None,
+        description="What identify says of plant and noise, with their covariance: for experiment.prior.",
     )
     cost: Cost = Field(
         default=Cost(input_power=1.0),

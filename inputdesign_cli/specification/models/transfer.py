@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
@@ -12,8 +12,17 @@ from inputdesign_cli.specification.models.fields import (
     ContinuousDenominator,
     Denominator,
     GainMatrix,
+    NonNegativeGrid,
     Numerator,
     RowsMatrix,
+)
+from inputdesign_cli.specification.models.named import (
+    EXPRESSIONS,
+    CoefficientTexts,
+    TextMatrix,
+    matrix,
+    product_of,
+    text,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import (
@@ -125,6 +134,62 @@ class ContinuousMatrix(_Matrix):
             for j, entry in enumerate(row):
                 where = (i, j) if depth(self.numerator) == 3 else ()
                 yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
+
+
+class DelayedMatrix(ContinuousMatrix, family="continuous", phrase="a transfer matrix in s"):
+    """The same with dead times: those of a plant."""
+
+    kind: ClassVar[Literal["rational"]] = "rational"
+
+    numerator: Annotated[GainMatrix, EXPRESSIONS] = Field(
+        description="Coefficients; a matrix is rows (outputs) of columns (inputs)."
+    )
+    denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
+        description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
+    )
+    delay: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+        default=None,
+        description="Dead time in time_unit: a number, common to all entries, or rows of columns.",
+        examples=[25],
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """As of every transfer matrix in s; dead times for each entry have its shape."""
+        yield from super().check()
+        sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
+        if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
+            message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
+            yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
+
+    @property
+    def common(self) -> bool:
+        """Whether all entries share one denominator."""
+        return depth(self.denominator) != 3
+
+    @property
+    def common_delay(self) -> bool:
+        """Whether all entries share one dead time."""
+        return not isinstance(self.delay, tuple)
+
+    @property
+    def delays(self) -> tuple[tuple[float, ...], ...]:
+        """Dead times as rows of columns; 0 where there is none."""
+        if isinstance(self.delay, tuple):
+            return self.delay
+        return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)
+
+    def texts(self, written: Mapping[str, Plain]) -> CoefficientTexts:
+        """Its coefficients as expressions, from the section as it was written."""
+        above, below, delay = (text(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay"))
+        rows = matrix(above)
+        denominators: TextMatrix
+        if depth(below) == 3:
+            denominators = matrix(below)
+        else:
+            common = product_of(below if depth(below) == 2 else [below])
+            denominators = tuple(tuple(common for _ in row) for row in rows)
+        delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
+        return CoefficientTexts(rows, denominators, delays)
 
 
 class ContinuousTarget(ContinuousMatrix):

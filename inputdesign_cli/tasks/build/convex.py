@@ -13,13 +13,14 @@ from inputdesign_cli.tasks.build.demand import check_design
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
-from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
-from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements
+from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.parameters import check_known
+from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements, stated_bounds
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
-from inputdesign_cli.tasks.build.system import build_cost, build_experiment, check_known
+from inputdesign_cli.tasks.build.system import build_cost, build_experiment
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
 from inputdesign_cli.tasks.factor_columns import FewColumns
 
@@ -60,13 +61,16 @@ def build_convex(spec: Spec) -> ConvexTask:
         experiment=experiment,
         cost=cost,
         alpha=model_error_alpha(spec, experiment.model),
+        calibration=build_calibration(spec),
         tolerance=spec.solver.tolerance,
+        any_spectrum_tolerance=spec.solver.any_spectrum_tolerance,
         most_samples=spec.limits.samples,
         ellipses=spec.report.ellipses,
         grid=grid,
         columns=_few_columns(spec, basis),
         record=build_record_request(spec, experiment.size),
         unstated=unstated_errors(spec, experiment),
+        stated=stated_bounds(spec),
         simulation=build_simulation(spec, experiment),
     )
 

@@ -26,9 +26,10 @@ from inputdesign_cli.tasks.build.preparation import (
     trend,
     whole_segments,
 )
-from inputdesign_cli.tasks.build.tables import columns_of
+from inputdesign_cli.tasks.build.tables import columns_of, is_dated
 
-TIME_UNITS = ("s", "ms", "us", "min", "h", "d")
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
+TIME_UNITS = tuple(_SECONDS)
 _UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
     unit: unit for unit in TIME_UNITS
 }
@@ -40,12 +41,14 @@ class Data:
     """u (samples, r) and y (samples, p) of experiments one after the other, and what to know of them.
 
     Attributes:
+        r: (samples, r), the reference of a loop; None where some file does not have it.
         lengths: the samples of each stretch without gaps.
         notes: what was done to the record and what was seen in it.
     """
 
     u: Array
     y: Array
+    r: Array | None
     lengths: tuple[int, ...]
     notes: tuple[str, ...]
 
@@ -73,9 +76,11 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
                     hint=f"its channels are {', '.join(channels)}: write {option}",
                 )
     parts = [_read(path, units, preparation, named=len(paths) > 1) for path in paths]
+    references = [part.r for part in parts if part.r is not None]
     return Data(
         np.concatenate([part.u for part in parts]),
         np.concatenate([part.y for part in parts]),
+        np.concatenate(references) if len(references) == len(parts) else None,
         tuple(length for part in parts for length in part.lengths),
         tuple(note for part in parts for note in part.notes),
     )
@@ -83,21 +88,28 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
 
 @dataclass(frozen=True)
 class Signals:
-    """What stands in the columns of a file: u (n, r), y (n, p), NaN where a number is missing.
+    """What stands in the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
 
     Attributes:
         time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
+        dated: whether the times stand as dates; they are counted in seconds then.
+        inputs, outputs: what notes call the columns of u and y.
     """
 
     sheet: Sheet
     time: Array
     name: str
+    dated: bool
     u: Array
     y: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
 
 
-def signals_of(sheet: Sheet, inputs: int, outputs: int, preparation: Preparation) -> Signals:
-    """The columns of so many channels.
+def signals_of(
+    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Sequence[str] = ()
+) -> Signals:
+    """The columns of so many channels; those of `references` follow the inputs.
 
     Raises:
         DataError: a column is missing, or holds text or nothing.
@@ -105,6 +117,7 @@ def signals_of(sheet: Sheet, inputs: int, outputs: int, preparation: Preparation
     wanted = {
         **_channels("u", inputs, sheet, preparation),
         **_channels("y", outputs, sheet, preparation),
+        **{name: name for name in references},
         **time_column(sheet, preparation),
     }
     found = columns_of(sheet, wanted)
@@ -124,11 +137,17 @@ def signals_of(sheet: Sheet, inputs: int, outputs: int, preparation: Preparation
     kept = replace(
         sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
     )
-    u, y = (
-        np.column_stack([found[f"{letter}{i + 1}"][rows] for i in range(count)])
-        for letter, count in (("u", inputs), ("y", outputs))
-    )
-    return Signals(kept, time[rows], wanted.get("time", ""), u, y)
+    driving = (*_labels("u", inputs), *references)
+    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
+    y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
+    name = wanted.get("time", "")
+    dated = bool(name) and is_dated(sheet, name)
+    return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
+
+
+def _labels(letter: str, count: int) -> tuple[str, ...]:
+    """What notes call channels: u, or u1, u2, .. of several."""
+    return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
 
 
 def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
@@ -173,12 +192,11 @@ def prepared(
         message = f"the time goes from {time[row - 1]:.10g} to {time[row]:.10g} {time_unit}"
         hint = "sort the rows, and keep one of those with the same time"
         raise DataError(sheet.error("data-not-uniform", message, hint, row))
-    for letter, values in (("u", signals.u), ("y", signals.y)):
-        for i, x in enumerate(values.T):
+    for names, values in ((signals.inputs, signals.u), (signals.outputs, signals.y)):
+        for name, x in zip(names, values.T, strict=True):
             there = ~np.isnan(x)
-            name = f"{letter}{i + 1}" if values.shape[1] > 1 else letter
             told += outliers(name, x[there], rows[there])
-            told += limits_of_sensor(name, x[there]) if letter == "y" else []
+            told += limits_of_sensor(name, x[there]) if names is signals.outputs else []
     segments, cuts = whole_segments(time, signals.u, signals.y, step, resample=preparation.resample)
     told = [*cuts, *told]
     off = jitter(segments, step)
@@ -197,22 +215,21 @@ def prepared(
             f"the steps of time jitter by up to {100 * off:.2g} % of {step:.6g} {time_unit}: resampled "
             "(outputs by interpolation, inputs at the nearest sample)",
         )
-    taken = [_detrended(part, preparation) for part in segments]
+    taken = [_detrended(part, signals, preparation) for part in segments]
     return [part for part, _ in taken], [*told, *dict.fromkeys(n for _, notes in taken for n in notes)]
 
 
-def _detrended(part: Segment, preparation: Preparation) -> tuple[Segment, list[str]]:
+def _detrended(part: Segment, signals: Signals, preparation: Preparation) -> tuple[Segment, list[str]]:
     told = []
     found = {}
-    for letter, values in (("u", part.u), ("y", part.y)):
+    for letter, names, values in (("u", signals.inputs, part.u), ("y", signals.outputs, part.y)):
         columns = []
-        for i, x in enumerate(values.T):
-            level = preparation.operating_point.get(f"{letter}{i + 1}", 0.0)
+        for name, x in zip(names, values.T, strict=True):
+            level = preparation.operating_point.get(name if name[1:] else f"{name}1", 0.0)
             if preparation.detrend == "none":
                 columns.append(x - level)
                 continue
             away, what = trend(x, preparation.detrend)
-            name = f"{letter}{i + 1}" if values.shape[1] > 1 else letter
             told.append(f"{what} was taken away from {name}")
             columns.append(x - away)
         found[letter] = np.column_stack(columns)
@@ -226,15 +243,29 @@ def _worst_step(time: Array, step: float) -> int:
 def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) -> Data:
     """One file, which the notes name if asked to."""
     sheet = read_sheet(path, key="")
-    signals = signals_of(sheet, units.inputs, units.outputs, preparation)
+    references = _references(units, sheet.header)
+    signals = signals_of(sheet, units.inputs, units.outputs, preparation, references)
+    if signals.dated:
+        signals = replace(signals, time=signals.time / _SECONDS[units.time_unit])
     _check_steps(signals, units, preparation)
     segments, told = prepared(signals, units.sample_time, units.time_unit, preparation)
+    inputs = np.concatenate([part.u for part in segments])
     return Data(
-        np.concatenate([part.u for part in segments]),
+        inputs[:, : units.inputs],
         np.concatenate([part.y for part in segments]),
+        inputs[:, units.inputs :] if references else None,
         tuple(len(part.y) for part in segments),
         tuple(f"{path.name}: {note}" if named else note for note in told),
     )
+
+
+def _references(units: Units, header: Sequence[str]) -> Sequence[str]:
+    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
+    if not units.closed_loop:
+        return []
+    if units.inputs == 1:
+        return [name for name in ("r1", "r") if name in header][:1]
+    return list(units.excitations) if set(units.excitations) <= set(header) else []
 
 
 @contextmanager
@@ -274,7 +305,7 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         DataError: `data-wrong-unit` or `data-not-uniform`.
     """
     sheet = signals.sheet
-    unit = preparation.time_unit or time_unit_of(signals.name)
+    unit = None if signals.dated else preparation.time_unit or time_unit_of(signals.name)
     if unit is not None and unit != units.time_unit:
         message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
         hint = f"set time_unit: {unit} (and sample_time in it), or convert the column"

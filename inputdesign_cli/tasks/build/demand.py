@@ -14,9 +14,12 @@ from inputdesign_cli.spectrum import Basis
 _MOST_BYTES = 4 * 2**30
 _NODES = 2000  # of an integral, where poles are well damped
 _COPIES = 4  # of a record's gradient while its information matrix is formed
-# The solver's matrix fills up: with so many cuts, steps of the solver and rounds to begin with.
-_CUTS, _STEPS, _ROUNDS, _CRITERION = 15, 10, 5, 4
+# A round takes so many steps of the solver; in each, matrices of so many cuts are factored, and products of
+# all pairs of entries of the information matrix are summed over them and taken to so many unknowns.
+_CUTS, _STEPS, _ROUNDS, _UNKNOWNS = 50, 15, 15, 250
+_CRITERION, _FACTORINGS = 4, 60
 _PER_SECOND = 1e10  # multiplications
+_GENEROUS = 10  # times the first rounds: plants that are hard take as long
 
 
 def check_model(spec: Spec, model: Model) -> None:
@@ -54,19 +57,29 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
         inequalities += _CUTS
 
     def seconds(parameters: int) -> float:
-        rows = inequalities * parameters * (parameters + 1) / 2
-        return rows**3 / 3 * _STEPS * _ROUNDS / _PER_SECOND
+        entries = parameters * (parameters + 1) / 2
+        step = inequalities * (_FACTORINGS * parameters**3 + entries**2)
+        step += entries**2 * _UNKNOWNS
+        return step * _STEPS * _ROUNDS / _PER_SECOND
 
-    limit = spec.solver.time_limit
+    # What takes less than a second is tried.
+    limit = max(spec.solver.time_limit, 1.0)
     if seconds(size) > limit:
         fits = max(k for k in range(size) if seconds(k) <= limit)
         raise spec.complain(
             "too-large",
             f"a design for a model of {size} parameters would take {seconds(size):.0f} seconds or more; "
             f"solver.time_limit is {limit:g}",
-            hint=f"{fits} parameters fit: lower the orders, or raise solver.time_limit",
+            hint=f"{fits} parameters fit: lower the orders, or write solver.time_limit: "
+            f"{_rounded(_GENEROUS * seconds(size))} or more",
             key="plant",
         )
+
+
+def _rounded(seconds: float) -> str:
+    """Two digits, rounded up, written out."""
+    unit = 10 ** max(len(f"{seconds:.0f}") - 2, 0)
+    return str(int(-(-seconds // unit) * unit))
 
 
 def check_record(spec: Spec, parameters: int) -> None:

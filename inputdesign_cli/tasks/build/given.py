@@ -18,7 +18,7 @@ from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
 from inputdesign_cli.tasks.build.header import build_header, build_units
 from inputdesign_cli.tasks.build.limits import build_power_limits
-from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
@@ -75,6 +75,7 @@ def build_given(spec: Spec) -> GivenTask:
         excitation=_excitation(spec, spec.spectrum, experiment),
         cost=build_cost(spec),
         alpha=model_error_alpha(spec, experiment.model),
+        calibration=build_calibration(spec),
         limits=_limits(spec),
         record=build_record_request(spec, experiment.size),
         ellipses=spec.report.ellipses,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -14,9 +16,11 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.prior import build_earlier
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.system import build_experiment, build_model, record_step
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.identification import Identification, ModelQuestion
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
@@ -34,14 +38,16 @@ def build_identification(spec: Spec) -> Identification:
             hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
             key="plant",
         )
+    nominal = build_model(spec)
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(
         header=build_header(spec),
-        nominal=build_model(spec),
+        nominal=nominal,
         assessable=bool(spec.accuracy.requirements),
         operating_point=_operating_point(spec),
+        earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
-        at=lambda model, samples, source: _question(_restated(spec, model, source), samples),
+        at=lambda model, samples, factor, source: _question(_restated(spec, model, source), samples, factor),
     )
 
 
@@ -51,6 +57,15 @@ def _operating_point(spec: Spec) -> dict[str, float]:
         return {}
     levels = np.broadcast_to(np.asarray(spec.signal.offset, dtype=float), (spec.plant.inputs,))
     return {f"u{j + 1}": float(level) for j, level in enumerate(levels)}
+
+
+def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:
+    """The override that lets a record vary about the levels of the data, where the spec does not say it."""
+    inputs = [f"u{j + 1}" for j in range(spec.plant.inputs)]
+    if spec.closed_loop or spec.signal.offset is not None or not set(inputs) & set(levels):
+        return []
+    offsets = [levels.get(name, 0.0) for name in inputs]
+    return [f"signal.offset={json.dumps(offsets if len(offsets) > 1 else offsets[0])}"]
 
 
 def _restated(spec: Spec, model: Model, source: str) -> Spec:
@@ -64,33 +79,33 @@ def _restated(spec: Spec, model: Model, source: str) -> Spec:
     )
 
 
-def _question(spec: Spec, samples: int) -> ModelQuestion:
-    """What a spec asks of an experiment of so many samples.
+def _question(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
+    """What a spec asks of an experiment of so many samples, of which the information has this factor (k, k).
 
     Raises:
         SpecError: the loop is unstable; see the builders of the parts.
     """
-    experiment = replace(build_experiment(spec), samples=samples)
-    requirements = [make(experiment) for make in build_requirements(spec, experiment)]
+    raw = replace(build_experiment(spec), samples=samples)
+    experiment = replace(raw, factor=factor)
 
-    def topped_up(information: Array) -> Results:
-        prior = {
-            "parameters": list(experiment.model.names),
-            "information": (0.5 * (information + information.T)).tolist(),
-        }
+    def topped_up(levels: Mapping[str, float]) -> Results:
+        prior = {"parameters": list(raw.model.names), "information": (factor @ factor.T).tolist()}
         return build_convex(
             parse_spec(
                 spec.to_yaml(),
                 file="top-up",
-                overrides=[f"experiment.prior={json.dumps(prior)}"],
+                overrides=[f"experiment.prior={json.dumps(prior)}", *_offset(spec, levels)],
                 folder=spec.resolve_path("."),
             )
         ).solve()
 
+    requirements = [make(experiment) for make in build_requirements(spec, raw)]
+    usual, information = model_error_alpha(spec, raw.model), np.eye(experiment.size)
+    confidence = Confidence.of(build_calibration(spec), requirements, information, usual)
     return ModelQuestion(
         experiment=experiment,
-        alpha=model_error_alpha(spec, experiment.model),
-        requirements=requirements,
-        entries=unstated_errors(spec, experiment),
+        confidence=confidence,
+        requirements=with_alpha(requirements, confidence.alpha),
+        entries=[replace(error, experiment=experiment) for error in unstated_errors(spec, raw)],
         top_up=topped_up if spec.designs else None,
     )

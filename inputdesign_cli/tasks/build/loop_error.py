@@ -84,6 +84,16 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
+    if plant.kind != "parameters" and plant.kind != "regression":
+        for part, listed in (("noise", noise.known), (key, plant.known or plant.named_parameters)):
+            if listed:
+                raise bad_spec(
+                    "not-supported",
+                    "this version designs for the closed-loop error with every coefficient of the sampled "
+                    f"plant estimated, and {part} has known or named parameters",
+                    hint="remove known, and write numbers for coefficients",
+                    key=part,
+                )
     if plant.kind == "continuous" and plant.sampled:
         plant = held_plant(plant, spec.sample_time)
     if plant.kind != "polynomial":
@@ -111,7 +121,9 @@ def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, C
         T = TransferMatrix.build(target.numerator_matrix, target.denominator_matrix)
     elif target.kind == "continuous_matrix":
         inside = target.continuous
-        held = hold_entries(inside.numerator_matrix, inside.denominator_matrix, spec.sample_time)
+        rows = inside.numerator_matrix
+        at_once = [[0.0] * len(row) for row in rows]
+        held = hold_entries(rows, inside.denominator_matrix, spec.sample_time, at_once)
         T = TransferMatrix.build(*held)
     else:
         T = TransferMatrix.diagonal(_transfer(spec, target), plant.outputs)

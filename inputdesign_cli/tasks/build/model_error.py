@@ -17,6 +17,7 @@ from inputdesign_cli.accuracy import (
     Weighted,
     active_entries,
 )
+from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.information import Experiment
@@ -44,6 +45,15 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
         return error.alpha
     probability = (error.probability if error is not None else None) or DEFAULT_CONFIDENCE
     return confidence_factor(probability, int(np.sum(model.in_plant)))
+
+
+def build_calibration(spec: Spec) -> Calibration | None:
+    """How alpha is calibrated where `confidence: {exact: ..}` asks for that."""
+    error = spec.accuracy.model_error
+    stated = None if error is None else error.calibrated
+    if stated is None or stated.exact is None:
+        return None
+    return Calibration(stated.exact, stated.draws)
 
 
 def required_band(
@@ -152,12 +162,13 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
             hint="use region: first_order, or norm: entry with relative, absolute or table",
             key=f"{_KEY}.region",
         )
-    if not model.is_fraction(*entry):
+    if np.any(model.bends(*entry)):
         named = build_units(spec).entry(*entry) or "G"
         raise spec.complain(
             "not-supported",
             f"region: ellipsoid needs a fraction that is linear in the parameters; {named} is not: it has "
-            "both A and F, or is sampled from s",
+            "both A and F, is sampled from s, has a dead time that is estimated, or expressions that are not "
+            "linear",
             hint="use region: first_order for this structure",
             key=f"{_KEY}.region",
         )

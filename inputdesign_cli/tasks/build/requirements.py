@@ -20,8 +20,9 @@ from inputdesign_cli.tasks.build.model_error import (
     confidence_factor,
     required_band,
 )
-from inputdesign_cli.tasks.build.system import embedded
+from inputdesign_cli.tasks.build.parameters import embedded
 from inputdesign_cli.tasks.build.weights import build_weight
+from inputdesign_cli.tasks.result.within_limits import StatedBound
 
 _RELATIVE_ZERO = 1e-9
 
@@ -65,6 +66,35 @@ def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | 
         return Criterion(letter, scale[:, None] * factor)
 
     return make
+
+
+def stated_bounds(spec: Spec) -> list[StatedBound]:
+    """The numbers of `accuracy` that bound errors in proportion to them, or to their powers.
+
+    None for a bound over the whole confidence ellipsoid: its error is not in proportion to any of them.
+    """
+    accuracy, found = spec.accuracy, list[StatedBound]()
+    error, variance = accuracy.model_error, accuracy.weighted_variance
+    if error is not None and error.region == "ellipsoid":
+        return []
+    if error is not None:
+        key = "accuracy.model_error"
+        if error.relative is not None:
+            found.append(StatedBound(f"{key}.relative", "relative", error.relative, fraction=True))
+        if error.absolute is not None:
+            found.append(StatedBound(f"{key}.absolute", "absolute", error.absolute))
+    if accuracy.application is not None:
+        key, gamma = "accuracy.application.gamma", accuracy.application.gamma
+        found.append(StatedBound(key, "gamma", gamma, power=-2))
+    if variance is not None:
+        key = "accuracy.weighted_variance.max"
+        found.append(StatedBound(key, "weighted_variance", variance.max, power=2))
+    key = "accuracy.standard_deviation"
+    found += [
+        StatedBound(f"{key}.{name}", f"standard_deviation of {name}", most)
+        for name, most in (accuracy.standard_deviation or {}).items()
+    ]
+    return found
 
 
 def _model_errors(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:

@@ -46,6 +46,8 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         meets=signal.scale != "design",
         most_samples=limits.samples,
         longest=longest_record(parameters, spec.plant.outputs),
+        stated_method=signal.type is not None,
+        others=tuple(build_signal_settings(spec, method) for method in _other_methods(spec)),
         limit_keys=tuple(key for key, value in stated.items() if value is not None),
         delivery=Delivery(
             operating_points=None if signal.offset is None else _operating_points(spec),
@@ -56,10 +58,14 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
     )
 
 
-def build_signal_settings(spec: Spec) -> SignalSettings:
-    """What is to be generated; kinds and phases that the spec leaves open follow from the rest."""
+def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSettings:
+    """What is to be generated; kinds and phases that the spec leaves open follow from the rest.
+
+    Args:
+        method: in place of the kind that the spec asks for.
+    """
     signal, inputs = spec.signal, spec.plant.inputs
-    method = _method(spec)
+    method = method or _method(spec)
     limited = spec.limits.amplitude is not None or spec.limits.rate is not None
     uniform: Phases = "orthogonal" if inputs > 1 else "random"
     phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else uniform)
@@ -147,7 +153,7 @@ def sampling_rate(spec: Spec) -> float:
 
 
 def _method(spec: Spec) -> Method:
-    """The kind of signal; noise where a spectral factor may be had: one input and output in q^-1."""
+    """The kind of signal: as stated, or as other keys ask for."""
     signal = spec.signal
     if signal.type is not None:
         return signal.type
@@ -155,10 +161,25 @@ def _method(spec: Spec) -> Method:
         return "multisine"
     if signal.bits is not None:
         return "prbs"
+    return _usual_method(spec)
+
+
+def _usual_method(spec: Spec) -> Method:
+    """Where nothing is stated: noise where a spectral factor may be had, one input and output in q^-1."""
     plant, spectrum = spec.plant, spec.spectrum
     single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
     banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
     return "filtered_noise" if single and not banded else "multisine"
+
+
+def _other_methods(spec: Spec) -> tuple[Method, ...]:
+    """What may stand in for the kind of signal; none where the spec says how it is to be made."""
+    signal = spec.signal
+    if signal.phases is not None or signal.lines is not None or signal.bits is not None:
+        return ()
+    levels: tuple[Method, ...] = ("binary",) if spec.plant.sampled and not signal.ramp else ()
+    others: list[Method] = list(dict.fromkeys((_usual_method(spec), "multisine", *levels)))
+    return tuple(method for method in others if method != _method(spec))
 
 
 def per_channel(value: float | tuple[float, ...], channels: int) -> Array:

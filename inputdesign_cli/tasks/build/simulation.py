@@ -7,7 +7,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.specification import Simulation as SimulationSection, Spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.model_error import model_error_alpha, unstated_errors
+from inputdesign_cli.tasks.build.model_error import unstated_errors
 from inputdesign_cli.tasks.build.system import build_cost, build_loop, build_model, held_plant
 from inputdesign_cli.tasks.simulation import Simulation, TrueSystem
 
@@ -32,7 +32,6 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
         compare=study.compare,
         cost=build_cost(spec),
         entries=unstated_errors(spec, nominal),
-        alpha=model_error_alpha(spec, nominal.model),
     )
 
 

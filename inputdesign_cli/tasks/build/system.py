@@ -34,22 +34,23 @@ from inputdesign_cli.specification.models.transfer import DiscreteMatrix, Discre
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.demand import check_model
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
+from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.tables import read_columns
 from inputdesign_cli.tasks.build.weights import rational
-
-_PRIOR = "experiment.prior.information"
 
 
 def build_model(spec: Spec) -> Model:
     """The model of `plant` and `noise`.
 
     Raises:
-        SpecError: `not-supported` for a regression, and for a plant in s whose noise is not white.
+        SpecError: `not-supported` for a regression, and for a plant in s whose noise is not white; what
+            is wrong with known and with named parameters.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
     match spec.plant:
         case PolynomialPlant() as plant:
-            return polynomial_model(plant, spec.noise, covariance)
+            return reparametrised(spec, plant, polynomial_model(plant, spec.noise, covariance))
         case ContinuousPlant() as plant:
             for name in spec.noise.filters:
                 raise spec.complain(
@@ -64,9 +65,12 @@ def build_model(spec: Spec) -> Model:
                 _reversed(matrix.numerator_matrix),
                 _reversed(matrix.denominator_matrix),
                 covariance,
-                common=depth(matrix.denominator) != 3,
+                common=matrix.common,
+                delay=delays_of(plant),
+                common_delay=matrix.common_delay,
             )
-            return SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
+            model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
+            return reparametrised(spec, plant, model)
     raise spec.complain(
         "not-supported",
         "a regression has no dynamics to be estimated here",
@@ -90,7 +94,8 @@ def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Arra
 def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
     """A plant in s behind a hold as B/F in q^-1: C and D then filter the noise alone."""
     matrix = plant.continuous
-    held = hold_entries(matrix.numerator_matrix, matrix.denominator_matrix, sample_time)
+    rows = (matrix.numerator_matrix, matrix.denominator_matrix)
+    held = hold_entries(*rows, sample_time, matrix.delays)
     B, F = (tuple(tuple(tuple(entry.tolist()) for entry in row) for row in rows) for rows in held)
     return PolynomialPlant.model_construct(A=(1.0,), B=B, F=F)
 
@@ -180,16 +185,15 @@ def build_cost(spec: Spec) -> dict[PowerKind, Weight]:
 
 
 def _prior(spec: Spec, experiment: Experiment) -> Array | None:
-    """`experiment.prior` (k, k): a matrix, or that of the samples of an earlier experiment."""
-    prior = spec.experiment.prior
-    if prior is None:
+    """`experiment.prior` (k, k): a matrix, that of a model file, or that of earlier samples."""
+    stated = stated_prior(spec)
+    if stated is not None:
+        return stated.over(spec, experiment.model.names)
+    if spec.experiment.prior is None or not isinstance(spec.experiment.prior.information, str):
         return None
-    if isinstance(prior.information, str):
-        record = read_excitation_record(spec, prior.information, _PRIOR)
-        earlier = replace(experiment, samples=len(record))
-        return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
-    matrix = np.array(prior.information, dtype=float)
-    return embedded(spec, experiment.model.names, matrix, prior.parameters, _PRIOR)
+    record = read_excitation_record(spec, spec.experiment.prior.information, PRIOR)
+    earlier = replace(experiment, samples=len(record))
+    return FiniteRecord(earlier, len(record), record_step(spec)).information(record)
 
 
 def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
@@ -224,39 +228,6 @@ def record_step(spec: Spec) -> float:
             key="sample_time",
         )
     return spec.sample_time
-
-
-def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
-    """Raise `SpecError` (`unknown-parameter`) for the name of a parameter that the model does not have."""
-    if name not in known:
-        raise spec.complain(
-            "unknown-parameter",
-            f'the model has no parameter "{name}"',
-            hint=f"its parameters are {', '.join(known)}",
-            key=key,
-        )
-
-
-def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
-    """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
-
-    Raises:
-        SpecError: `unknown-parameter` or `wrong-shape`.
-    """
-    for name in names or ():
-        check_known(spec, known, name, key)
-    listed = tuple(names or known)
-    if len(matrix) != len(listed):
-        raise spec.complain(
-            "wrong-shape",
-            f"the matrix is {len(matrix)} x {len(matrix)}, but there are {len(listed)} parameters",
-            hint=f"order its rows as {', '.join(known)}, or name its parameters",
-            key=key,
-        )
-    full = np.zeros((len(known), len(known)))
-    index = [list(known).index(name) for name in listed]
-    full[np.ix_(index, index)] = matrix
-    return full
 
 
 def _arrays(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, ...], ...]:

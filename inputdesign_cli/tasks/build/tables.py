@@ -65,6 +65,11 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
 
+def is_dated(sheet: Sheet, name: str) -> bool:
+    """Whether a column holds dates, as seconds since the first."""
+    return sheet.columns[_named(sheet, name.strip().lower())[0]].dated
+
+
 def read_header(path: Path, *, key: str) -> list[str]:
     """The names of the columns of a data file, in small letters.
 

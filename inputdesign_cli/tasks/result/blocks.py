@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from functools import singledispatch
 
-from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel, SampledModel
+from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel, Reparametrised, SampledModel
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
+from inputdesign_cli.plant.reparametrised import Place
 from inputdesign_cli.runs.results import Json
 
 Blocks = dict[str, dict[str, Json]]
@@ -42,10 +44,13 @@ def _(model: PolynomialModel) -> Blocks:
 def _(model: ContinuousModel) -> Blocks:
     below = _matrix(model.denominator, descending=True)
     i, j = model.active[0]
-    matrix = {
+    matrix: dict[str, Json] = {
         "numerator": _matrix(model.numerator, descending=True),
         "denominator": below[i][j] if model.common else below,
     }
+    if model.delay:
+        late = [[model.dead_time(o, n) for n in range(model.inputs)] for o in range(model.outputs)]
+        matrix["delay"] = model.memory if model.common_delay else late
     return {"plant": {"continuous": matrix}, "noise": _variance(model)}
 
 
@@ -53,6 +58,30 @@ def _(model: ContinuousModel) -> Blocks:
 def _(model: SampledModel) -> Blocks:
     blocks = blocks_of(model.continuous_plant)
     return {**blocks, "plant": {**blocks["plant"], "sample": "zoh"}}
+
+
+@blocks_of.register
+def _(model: Reparametrised) -> Blocks:
+    words, blocks = model.words, blocks_of(model.coefficients)
+    if words.plant is not None:
+        plant = copy.deepcopy(dict(words.plant))
+        at = model.parametrisation
+        values = dict(zip(at.labels, at.values.tolist(), strict=True))
+        for label, place in words.places.items():
+            _put(plant, place, values[label])
+        blocks["plant"] = plant
+    for section, known in words.known.items():
+        if known:
+            blocks[section]["known"] = list(known)
+    return blocks
+
+
+def _put(block: Json, place: Place, value: float) -> None:
+    """The value at its place in nested mappings and lists."""
+    *steps, last = place
+    for step in steps:
+        block = block[step]
+    block[last] = value
 
 
 @singledispatch
@@ -64,6 +93,11 @@ def predictor_of(model: Model) -> dict[str, list[Array]]:
 @predictor_of.register
 def _(model: PolynomialModel) -> dict[str, list[Array]]:
     return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
+
+
+@predictor_of.register
+def _(model: Reparametrised) -> dict[str, list[Array]]:
+    return predictor_of(model.coefficients)
 
 
 def _variance(model: Model) -> dict[str, Json]:

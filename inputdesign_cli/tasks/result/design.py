@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis
+from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
 
 # A limit binds when the design uses all but this share of it.
@@ -25,6 +27,8 @@ _FREE = 1e-3
 _SUPPORT = 1e-3
 # An input with less than this share of the power has none.
 _NOTHING = 1e-9
+# Time constants that an experiment has at least, for its spectrum to tell what it reaches.
+_SETTLED = 2.0
 _KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "accuracy_factor"}
 
 
@@ -37,7 +41,7 @@ class Designed:
     design: Design
     experiment: Experiment
     cost: dict[PowerKind, Weight]
-    alpha: float
+    confidence: Confidence
 
     @property
     def units(self) -> Units:
@@ -48,6 +52,14 @@ class Designed:
     def problem(self) -> Problem:
         """The problem on the basis of the answer, which may have grown."""
         return self.design.problem.on(self.design.result.basis)
+
+    @cached_property
+    def information(self) -> Array:
+        """(k, k): M of the delivered spectrum over the delivered number of samples."""
+        if self.design.problem.goal != "samples":
+            return self.design.result.information
+        samples = float(self.experiment.samples)
+        return candidate_at(self.problem, samples * self.design.result.x, samples).information
 
 
 def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dict[str, Json]:
@@ -67,7 +79,7 @@ def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dic
         "cost": cost,
         "samples": done.experiment.samples,
         "power": powers(problem, found.basis, found.x),
-        "information": information_entry(done.experiment, _information(done)),
+        "information": information_entry(done.experiment, done.information),
         "spectrum": spectrum_entry(done.units, found.basis, found.x),
         "baseline": {"white": _white(done, cost)},
         "solver": {**how, "tolerance": tolerance},
@@ -75,7 +87,7 @@ def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dic
     if status != "nothing_needed":
         asked = (*problem.requirements, *problem.side)
         active = found.active_frequencies
-        result |= requirements_entry(done.units, done.alpha, asked, found.information, active)
+        result |= requirements_entry(done.units, done.confidence, asked, done.information, active)
     for name, entry in (("limits", _limits(done)), ("notes", _notes(done))):
         if entry:
             result[name] = entry
@@ -100,11 +112,15 @@ def information_entry(experiment: Experiment, information: Array) -> dict[str, J
 
 
 def requirements_entry(
-    units: Units, alpha: float, requirements: Sequence[Requirement], information: Array, active: Array
+    units: Units,
+    confidence: Confidence,
+    requirements: Sequence[Requirement],
+    information: Array,
+    active: Array,
 ) -> dict[str, Json]:
     """`model_error` of the contract, and the worst ratio of each requirement."""
     listed: list[dict[str, Json]] = []
-    entry: dict[str, Json] = {"alpha": alpha}
+    entry: dict[str, Json] = {"alpha": confidence.alpha, **confidence.entry}
     for requirement in requirements:
         if isinstance(requirement, Criterion):
             continue
@@ -169,14 +185,6 @@ def _objective(design: Design) -> dict[str, Json]:
     }
 
 
-def _information(done: Designed) -> Array:
-    """M of the delivered spectrum over the delivered number of samples."""
-    if done.design.problem.goal != "samples":
-        return done.design.result.information
-    samples = float(done.experiment.samples)
-    return candidate_at(done.problem, samples * done.design.result.x, samples).information
-
-
 def _white(done: Designed, cost: float) -> dict[str, Json]:
     """Flat excitation that meets the same requirements, or exhausts the same limits."""
     design, problem = done.design, done.design.problem
@@ -237,10 +245,25 @@ def _notes(done: Designed) -> list[str]:
         sources += ["experiment.prior"] if experiment.prior is not None else []
         known = " and ".join(sources) or "the noise"
         return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
-    notes = _left_out(done)
+    notes = _left_out(done) + _too_short(experiment)
     if units.closed_loop and not found.basis.has_density:
         notes += _free_of_charge(done)
     return notes
+
+
+def _too_short(experiment: Experiment) -> list[str]:
+    """Whether the experiment ends before its slowest mode has settled; without a length nothing is said."""
+    if experiment.model.continuous or experiment.samples == 1:
+        return []
+    damping = np.abs(experiment.singularities.imag)
+    slowest = float(np.min(damping[damping > 0.0], initial=np.inf))
+    if slowest * experiment.samples >= _SETTLED:
+        return []
+    return [
+        f"the slowest mode has a time constant of {1.0 / slowest:.2g} samples, the experiment "
+        f"{experiment.samples}: spectra tell what long records reach; believe what the record reaches by its "
+        "own samples, and idesign simulate"
+    ]
 
 
 def _left_out(done: Designed) -> list[str]:

@@ -12,7 +12,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
-from inputdesign_cli.tasks.result.refutations import refutations, unsettled
+from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
 
 
 def identification_entry(estimate: Estimate) -> dict[str, Json]:
@@ -31,6 +31,8 @@ def identification_entry(estimate: Estimate) -> dict[str, Json]:
         "failed": [test.name for test in estimate.failed],
         "free_start": estimate.free,
     }
+    if estimate.agreement is not None:
+        entry["prior"] = {"probability": estimate.agreement}
     if len(estimate.lengths) > 1:
         entry["records"] = list(estimate.lengths)
     if not single:
@@ -116,26 +118,36 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
     return notes
 
 
+def prior_notes(estimate: Estimate, *, stated: bool) -> list[str]:
+    """What a prior that the spec `stated` has to do with the estimate."""
+    if not stated:
+        return []
+    if estimate.agreement is None:
+        return [
+            "experiment.prior does not count for this estimate: it is information without the parameters "
+            "that it belongs to; write parameters: {b1: 3.6, ..} beside it, name the model.yaml of the "
+            "earlier data, or give their records as further files"
+        ]
+    counted = (
+        "experiment.prior counts: estimate, covariance and accuracy are those of prior and data together"
+    )
+    return [counted, *contradictions(estimate)]
+
+
 def model_text(model: Model, estimate: Estimate) -> str:
-    """The blocks to paste, with the covariance and, as a comment, the same as prior information."""
+    """The blocks to paste, with the covariance and what the next experiment may take as its prior."""
     lines = [
         f"# Estimated from {len(estimate.errors)} samples: paste in place of the blocks of the same names,",
         "# or write include: and the name of this file in a spec without them.",
     ]
     for key, block in blocks_of(model).items():
         lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]
-    names = ", ".join(estimate.names)
-    quoted = names if "[" not in names else ", ".join(json.dumps(name) for name in estimate.names)
+    values = dict(zip(estimate.names, estimate.theta.tolist(), strict=True))
     lines += [
-        "",
-        f"# Covariance of {names}:",
-        *(f"#   {json.dumps(row)}" for row in estimate.covariance.tolist()),
-        "",
-        "# To count these data as prior information of the next experiment, uncomment:",
-        "# experiment:",
-        "#   prior:",
-        f"#     parameters: [{quoted}]",
-        "#     information:",
-        *(f"#       - {json.dumps(row)}" for row in estimate.information.tolist()),
+        "# How far to trust them; a later spec may say experiment: {prior: {information: model.yaml}}.",
+        "estimate:",
+        f"  parameters: {json.dumps(values)}",
+        "  covariance:",
+        *(f"    - {json.dumps(row)}" for row in estimate.covariance.tolist()),
     ]
     return "\n".join(lines) + "\n"

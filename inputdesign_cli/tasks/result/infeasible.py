@@ -2,53 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import LinesBasis
+from inputdesign_cli.tasks.result.needed_power import needed_power
+from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound, named, rounded_up
 
-# A limit takes part in the conflict when its share of the proof's weight is above this.
-_TAKES_PART = 1e-4
 _TOLERANCE = 1e-5
 
 
-def explain(units: Units, question: Question, unreachable: UnreachableError) -> InfeasibleError:
-    """The proof that came with the failure, in the words of the spec."""
+def explain(
+    units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound] = ()
+) -> InfeasibleError:
+    """The proof that came with the failure, in the words of the spec.
+
+    Args:
+        stated: the numbers of the spec that can be loosened.
+    """
     problem, nearest = unreachable.problem, unreachable.nearest
-    proved = nearest.certificate.bound
-    weights = nearest.certificate.limits * np.array([limit.bound for limit in problem.limits])
-    stated = len(question.limits)  # limits implied by those on the density follow
-    involved = [
-        limit
-        for limit, weight in zip(problem.limits[:stated], weights, strict=False)
-        if weight > _TAKES_PART * max(weights.max(initial=0.0), 1e-300)
-    ]
+    bought = Bought(units, stated, question.limits, problem, nearest)
+    involved = bought.involved
     if unreachable.limits_alone:
-        return _contradiction(involved, proved)
-    asked = _conflicting(unreachable)
-    names = " and ".join(dict.fromkeys(requirement.name for requirement, _ in asked))
-    where = sorted({w for _, w in asked if w is not None})
-    at = f" (hardest at {_list(where, units)})" if where else ""
-    needs = [_needed(question, limit) for limit in involved if limit.upper]
-    parts = [text for text in needs if text]
-    looser = np.sqrt(max(proved, 1.0))
-    if not parts:
+        return _contradiction(involved, nearest.certificate.bound)
+    names = " and ".join(dict.fromkeys(problem.requirement(index).name for index, _ in nearest.active))
+    needs = {limit: _needed(unreachable, limit) for limit in involved if limit.upper}
+    parts = [f"{named(limit)} is exhausted" for limit, need in needs.items() if not need]
+    parts += [need for need in needs.values() if need]
+    if not any(needs.values()):
         # The optimum of the goal "factor" meets the accuracy within limits so many times as large.
-        times = f"would have to be {_up(nearest.objective)} times as large"
-        only_density = problem.densities and not stated
+        times = f"would have to be {rounded_up(nearest.objective)} times as large"
+        only_density = problem.densities and not question.limits
         together = f"no change of a single limit is enough; all of them together {times}"
-        parts = [f"limits.spectrum {times}" if only_density else together]
-    message = f"{names}{at} cannot be met within the limits: " + "; ".join(parts)
+        parts.append(f"limits.spectrum {times}" if only_density else together)
+    message = f"{names} cannot be met within the limits: {bought.sentence}; " + "; ".join(parts)
     hint = (
         f"raise the limit, or loosen the accuracy: within the limits the error can be made no smaller than "
-        f"{looser:.4g} times what is asked"
+        f"{bought.proved:.4g} times what is asked"
     )
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
         # Within the same limits information grows in proportion to the length.
@@ -56,40 +53,23 @@ def explain(units: Units, question: Question, unreachable: UnreachableError) -> 
         hint += f"; with {longer} samples a spectrum can"
     if _within_reach_of_any(question):
         hint += "; spectrum: {type: free} can meet it"
-    if problem.densities and stated:
+    if problem.densities and question.limits:
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
-    return InfeasibleError.because("infeasible", message, hint, key)
+    return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
 
 
-def _conflicting(unreachable: UnreachableError) -> list[tuple[Requirement, float | None]]:
-    requirements = unreachable.problem.requirements
-    return [(requirements[index], frequency) for index, frequency in unreachable.nearest.active]
-
-
-def _needed(question: Question, limit: PowerLimit) -> str:
-    """The least power of this kind with which the other limits allow the accuracy; empty if none does."""
-    others = [other for other in question.limits if other is not limit]
-    if limit.channel is not None:
+def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
+    """What the limit would have to be with the others kept; empty if that does not help."""
+    least = needed_power(unreachable, limit)
+    if least is None:
         return ""
-    asked = [*question.requirements, *question.side] if question.goal == "cost" else list(question.side)
-    alone = Question(
-        experiment=question.experiment,
-        basis=question.basis,
-        goal="cost",
-        requirements=asked,
-        cost={limit.kind: 1.0},
-        limits=others,
-        densities=question.densities,
-    )
-    try:
-        least = solve_design(alone, tolerance=_TOLERANCE).result.certificate.bound
-    except (UnreachableError, np.linalg.LinAlgError):
-        return ""
+    channel = "" if limit.channel is None else f" {limit.channel + 1}"
+    needs = f"needs {limit.kind}{channel} power >= {rounded_up(least)}"
     if limit.implied:
         peak = np.sqrt(limit.bound)
-        return f"needs {limit.kind} power >= {_up(least)}, but a peak of {peak:.6g} leaves {limit.bound:.6g}"
-    return f"needs {limit.kind} power >= {_up(least)}, limit is {limit.bound:.6g}"
+        return f"{needs}, but a peak of {peak:.6g} leaves {limit.bound:.6g}"
+    return f"{needs}, limit is {limit.bound:.6g}"
 
 
 def _within_reach_of_any(question: Question) -> bool:
@@ -117,18 +97,3 @@ def _contradiction(involved: list[PowerLimit], proved: float) -> InfeasibleError
         "lower min, or raise max",
         where,
     )
-
-
-def _list(frequencies: list[float], units: Units) -> str:
-    shown: list[float] = []
-    for w in frequencies:
-        if not shown or w > 1.01 * shown[-1] + 1e-6:
-            shown.append(w)
-    text = ", ".join(f"{w / units.frequency:.4g}" for w in shown[:3])
-    return f"{text}{', ..' if len(shown) > 3 else ''} {units.per_time}"
-
-
-def _up(value: float) -> str:
-    """Six digits, rounded up: what is printed suffices."""
-    digits = 5 - int(np.floor(np.log10(value)))
-    return f"{np.ceil(value * 10.0**digits) / 10.0**digits:.6g}"

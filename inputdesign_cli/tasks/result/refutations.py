@@ -24,6 +24,9 @@ _IN_S = {
     "drift": "describe it by a model in q^-1",
 }
 
+# The prior and the data of one system differ as much with this probability.
+_ONE_SYSTEM = 1e-3
+
 
 def unsettled(estimate: Estimate) -> list[str]:
     """What to say of a search that did not settle."""
@@ -32,6 +35,16 @@ def unsettled(estimate: Estimate) -> list[str]:
     return [
         f"the search did not settle after {estimate.steps} steps from the best of {estimate.starts} "
         "starts: the estimate may be far from the minimum; the orders may be too high for these data"
+    ]
+
+
+def contradictions(estimate: Estimate) -> list[str]:
+    """What to say where the prior and the data are not of one system."""
+    if estimate.agreement is None or estimate.agreement >= _ONE_SYSTEM:
+        return []
+    return [
+        f"experiment.prior and these data contradict each other (probability {estimate.agreement:.1e} for "
+        "one system): remove the prior, or look for what has changed since"
     ]
 
 

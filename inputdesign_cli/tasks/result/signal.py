@@ -32,8 +32,8 @@ def signal_entry(
 ) -> dict[str, Json]:
     """What `result.json` says of a record: powers and peaks by channel, and what it achieves.
 
-    For a criterion that is the criterion that the record reaches, per as many samples as the experiment has,
-    and its share of that of the design; for other requirements their worst ratio.
+    Of a criterion that is its value for an experiment of its own length that goes on as the record does, so
+    that it compares with that of the design, and its share of that; of other requirements their worst ratio.
 
     Args:
         designed: information matrix (k, k) of the design.
@@ -47,7 +47,7 @@ def signal_entry(
     entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
     criterion = criterion_of(requirements)
     if criterion is not None:
-        reached = criterion.level(experiment.samples / len(samples) * plant.information(samples))
+        reached = criterion.level(plant.information_of_experiment(samples))
         entry["criterion"] = criterion.value(reached)
         if designed is not None:
             entry["efficiency"] = reached / criterion.level(designed)

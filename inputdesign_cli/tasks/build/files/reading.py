@@ -12,6 +12,8 @@ from inputdesign_cli.tasks.build.files.sheet import Sheet, unreadable
 from inputdesign_cli.tasks.build.files.text import read_text
 
 _MOST_BYTES = 100 * 2**20
+# How the files of .xlsx and .ods, and of .xls begin.
+_SHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 
 
 def read_sheet(path: Path, *, key: str) -> Sheet:
@@ -34,6 +36,9 @@ def read_sheet(path: Path, *, key: str) -> Sheet:
             return read_mat(path, key, raw)
         if kind in PARQUET + EXCEL:
             return read_frame(path, key, raw)
+        if raw.startswith(_SHEETS):
+            hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
+            raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
         return read_text(path, key, raw.decode("utf-8-sig"))
     except FileNotFoundError:
         hint = "paths are relative to the folder of the spec" if key else "check the name and the folder"

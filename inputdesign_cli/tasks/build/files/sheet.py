@@ -16,10 +16,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Column:
-    """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text."""
+    """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
+
+    Dates, as ISO 8601 writes them, are `dated`: seconds since the first.
+    """
 
     numbers: Array
     fault: tuple[int, str] | None = None
+    dated: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ import io
 import math
 import re
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, unreadable
@@ -141,7 +143,17 @@ def _column(cells: list[str]) -> Column:
     unclear = np.flatnonzero(~np.isfinite(numbers))
     numbers[unclear] = np.nan
     fault = next(((int(i), cells[i].strip()) for i in unclear if not _missing(cells[i])), None)
-    return Column(numbers, fault)
+    seconds = None if fault is None else _seconds(cells)
+    return Column(numbers, fault) if seconds is None else Column(seconds, dated=True)
+
+
+def _seconds(cells: list[str]) -> NDArray[np.float64] | None:
+    """Dates and times as ISO 8601 writes them, as seconds since the first; None where some cell is none."""
+    try:
+        moments = [datetime.fromisoformat(cell.strip()) for cell in cells]
+        return np.array([(moment - moments[0]).total_seconds() for moment in moments])
+    except (ValueError, TypeError):  # some are no dates, or some with and some without a time zone
+        return None
 
 
 def _of_numbers(rows: Rows) -> bool:

@@ -1,0 +1,323 @@
+"""How the time of a design grows with the number of parameters k and of channels.
+
+Four families of random plants, from the spec's words to the design with its proved bound over every
+spectrum (no signal):
+
+- output-error plants of order 2, 4, 6, 8 (k = 4 .. 16), |G - G0| held below a constant, FIR spectrum of
+  order 40. The rival is what a user writes in forty lines: plain cvxpy with Clarabel in whitened
+  coordinates, an exchange on 8001 frequencies that adds every local maximum, the FIR optimum alone, without
+  a bound. Its plant, its gradients and its integrals are its own; they are outside of its time.
+- the same with Box-Jenkins noise of order 6 and 10 (k = 24, 40), ours alone;
+- p x p plants with entries b q^-1 / (1 - f q^-1), p outputs with independent white noise, D-optimal
+  within a limit on the input power, FIR of order 15; criteria A and E;
+- the same plants with every entry held to a relative model error, least cost.
+
+Times are of processor, one thread, in one run: only ratios mean anything. Memory is the largest ever
+of the process. `--quick` takes one plant of each row and leaves out the largest.
+
+    python benchmarks/scaling.py [--quick] [--only NAME ...] [--json FILE] [--plot FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import statistics
+import sys
+import time
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from inputdesign_cli.compute.threads import use_one_thread
+
+use_one_thread()  # as the command line does, before numpy is imported
+
+import cvxpy as cp  # noqa: E402
+import numpy as np  # noqa: E402
+
+from inputdesign_cli.design.convex.designs import Design, solve_design  # noqa: E402
+from inputdesign_cli.specification import parse_spec  # noqa: E402
+from inputdesign_cli.tasks.build.task import build_task  # noqa: E402
+
+ROOT = Path(__file__).parent.parent
+TOLERANCE = 1e-7
+SAMPLES = 1000
+GRID = np.linspace(0.0, np.pi, 8001)
+ADMISSIBLE = 0.1
+# At most this share of the naive loop's time, by the number of parameters.
+SHARES = {12: 1 / 4, 16: 1 / 8}
+# At most this many times the time of p = 2, by p.
+GROWTH = {4: 6.0, 6: 60.0}
+AGREEMENT = 1e-4
+
+Spec = Mapping[str, object]
+Row = dict[str, float | int | str]
+
+
+def random_poles(rng: np.random.Generator, order: int) -> np.ndarray:
+    """A monic polynomial in q^-1 with `order` roots, in conjugate pairs, of modulus 0.5 to 0.9."""
+    pairs = order // 2
+    roots = rng.uniform(0.5, 0.9, pairs) * np.exp(1j * rng.uniform(0.2, 2.9, pairs))
+    every = np.concatenate([roots, roots.conj(), rng.uniform(-0.8, 0.8, order % 2)])
+    return np.atleast_1d(np.poly(every).real)
+
+
+def output_error(seed: int, order: int) -> tuple[np.ndarray, np.ndarray]:
+    """B (b_1 .. b_n after the delay) and F of a random plant with |G| at most one."""
+    rng = np.random.default_rng([seed, order])
+    F = random_poles(rng, order)
+    B = np.concatenate([[0.0], rng.normal(size=order)])
+    z = np.exp(-1j * GRID)
+    size = np.abs(np.polyval(B[::-1], z) / np.polyval(F[::-1], z)).max()
+    return B / size, F
+
+
+def output_error_spec(seed: int, order: int, *, noise_order: int = 0) -> Spec:
+    """An absolute bound on |G - G0| at every frequency."""
+    B, F = output_error(seed, order)
+    noise: dict[str, object] = {"variance": 0.01}
+    if noise_order:
+        rng = np.random.default_rng([seed, order, noise_order])
+        noise |= {"C": random_poles(rng, noise_order).tolist(), "D": random_poles(rng, noise_order).tolist()}
+    return {
+        "plant": {"B": B.tolist(), "F": F.tolist()},
+        "noise": noise,
+        "experiment": {"samples": SAMPLES},
+        "cost": {"input_power": 1},
+        "accuracy": {"model_error": {"absolute": ADMISSIBLE, "alpha": 2.0}},
+        "spectrum": {"type": "fir", "order": 40},
+    }
+
+
+def matrix_spec(p: int, demand: Spec, **more: object) -> Spec:
+    """p x p entries b q^-1 / (1 - f q^-1)."""
+    rng = np.random.default_rng([7, p])
+    B = [[[0.0, float(rng.uniform(0.5, 2.0))] for _ in range(p)] for _ in range(p)]
+    F = [[[1.0, float(rng.uniform(-0.8, 0.8))] for _ in range(p)] for _ in range(p)]
+    return {
+        "plant": {"B": B, "F": F},
+        "noise": {"variance": np.eye(p).tolist()},
+        "experiment": {"samples": SAMPLES},
+        "accuracy": dict(demand),
+        "spectrum": {"type": "fir", "order": 15},
+        **more,
+    }
+
+
+def ours(spec: Spec) -> tuple[Design, Row]:
+    """The design with its bound over every spectrum; its processor time, gap and size."""
+    started = time.process_time()
+    task = build_task(parse_spec(json.dumps(spec)))
+    built = time.process_time()
+    design = solve_design(
+        task.question, tolerance=task.tolerance, any_spectrum_tolerance=task.any_spectrum_tolerance
+    )
+    found, free = design.result, design.any_spectrum
+    return design, {
+        "k": design.problem.experiment.size,
+        "seconds": time.process_time() - built,
+        "building_seconds": built - started,
+        "objective": found.objective,
+        "gap": found.gap,
+        "rounds": found.rounds,
+        "cuts": found.cuts,
+        "any_spectrum_gap": free.gap,
+        "any_spectrum_rounds": free.rounds,
+        "memory_gib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
+    }
+
+
+def naive(seed: int, order: int) -> tuple[float, float]:
+    """The forty lines of cvxpy: the FIR optimum on 8001 frequencies and its processor time."""
+    B, F = output_error(seed, order)
+    m, number = 40, 1 << 14
+    # Gradients of the prediction on a fine grid, and from it the M_i by the rectangle rule.
+    w = 2 * np.pi * np.arange(number) / number
+    lags, sigma = np.arange(m + 1), 0.1
+
+    def gradient(at: np.ndarray) -> np.ndarray:
+        z = np.exp(-1j * np.outer(at, np.arange(1, order + 1)))
+        below = 1.0 + z @ F[1:]
+        return np.concatenate([z / below[:, None], -z * ((z @ B[1:]) / below**2)[:, None]], axis=1)
+
+    dG = gradient(w)
+    products = (dG[:, :, None] * dG[:, None, :].conj()).real
+    maps = SAMPLES / sigma**2 * np.fft.fft(products, axis=0).real[lags] / number
+    maps[1:] *= 2.0
+    white = np.linalg.inv(np.linalg.cholesky(maps[0]))
+    maps = white @ maps @ white.T
+    on_grid = gradient(GRID) @ white.T * (2.0 / ADMISSIBLE)
+    rows = np.stack([on_grid.real, on_grid.imag], axis=1)
+    power = float(np.linalg.norm(rows, 2, axis=(1, 2)).max() ** 2)
+    table = np.cos(np.outer(GRID, lags)) * np.where(lags > 0, 2.0, 1.0)
+    started = time.process_time()
+    cuts, positive = list(range(0, 8001, 800)), list(range(0, 8001, 50))
+    for _ in range(100):
+        c = cp.Variable(m + 1)
+        information = sum(c[i] * maps[i] for i in range(m + 1))
+        conditions = [table[positive] @ c >= 0]
+        conditions += [information - rows[i].T @ rows[i] / power >> 0 for i in cuts]
+        program = cp.Problem(cp.Minimize(c[0]), conditions)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            program.solve(solver=cp.CLARABEL)
+        M = np.tensordot(c.value, maps, axes=1)
+        ratio = np.linalg.norm(rows @ np.linalg.inv(np.linalg.cholesky(M)).T, 2, axis=(1, 2)) ** 2 / power
+        phi = table @ c.value
+        peaks = [i for i in maxima(ratio) if ratio[i] > 1.0 + 1e-6]
+        dips = [i for i in maxima(-phi) if phi[i] < -1e-6 * c.value[0]]
+        if not peaks and not dips:
+            break
+        cuts, positive = sorted({*cuts, *peaks}), sorted({*positive, *dips})
+    return power * float(c.value[0]), time.process_time() - started
+
+
+def maxima(values: np.ndarray) -> np.ndarray:
+    """Indices of the local maxima, ends included."""
+    beside = np.concatenate([[-np.inf], values, [-np.inf]])
+    return np.flatnonzero((values >= beside[:-2]) & (values >= beside[2:]))
+
+
+def output_error_rows(*, quick: bool) -> Iterator[Row]:
+    """k = 4 .. 16 against the naive loop, the worst of the random plants told by each one's row."""
+    for order in (2, 4, 6, 8):
+        for seed in range(1 if quick else 5):
+            design, row = ours(output_error_spec(seed, order))
+            on_grid, seconds = naive(seed, order)
+            yield row | {
+                "name": "output error",
+                "size": row["k"],
+                "seed": seed,
+                "naive_seconds": seconds,
+                "share": float(row["seconds"]) / seconds,
+                "difference": on_grid / design.result.objective - 1.0,
+            }
+
+
+def box_jenkins_rows(*, quick: bool) -> Iterator[Row]:
+    """k = 24 and 40."""
+    for order in (6,) if quick else (6, 10):
+        yield ours(output_error_spec(0, order, noise_order=order))[1] | {
+            "name": "Box-Jenkins",
+            "size": 4 * order,
+        }
+
+
+def criterion_rows(letter: str, sizes: tuple[int, ...]) -> Iterator[Row]:
+    """A criterion of all parameters of a p x p plant."""
+    for p in sizes:
+        spec = matrix_spec(p, {"criterion": letter}, limits={"input_power": 1.0})
+        if p == 8:
+            spec = {**spec, "solver": {"tolerance": 1e-4}}
+        yield ours(spec)[1] | {"name": f"criterion {letter}", "size": p}
+
+
+def model_error_rows(sizes: tuple[int, ...]) -> Iterator[Row]:
+    """All entries of a p x p plant, each relative to itself."""
+    for p in sizes:
+        spec = matrix_spec(p, {"model_error": {"relative": 0.1, "alpha": 2.0}}, cost={"input_power": 1})
+        yield ours(spec)[1] | {"name": "relative model error", "size": p}
+
+
+def rows_of(name: str, *, quick: bool) -> Iterator[Row]:
+    """The rows of one family."""
+    small = (2, 3)
+    if name == "output-error":
+        return output_error_rows(quick=quick)
+    if name == "box-jenkins":
+        return box_jenkins_rows(quick=quick)
+    if name == "model-error":
+        return model_error_rows(small if quick else (2, 3, 4))
+    sizes = {"D": small if quick else (2, 3, 4, 6, 8)}.get(name, small if quick else (2, 3, 4))
+    return criterion_rows(name, sizes)
+
+
+NAMES = ("output-error", "box-jenkins", "D", "A", "E", "model-error")
+
+
+def exponent(rows: list[Row]) -> float:
+    """Slope of log time against log k over output-error and Box-Jenkins plants and D, k = 4 .. 32."""
+    fitted = [row for row in rows if row["name"] in ("output error", "criterion D") and int(row["k"]) <= 32]
+    if len({row["k"] for row in fitted}) < 2:
+        return float("nan")
+    k = np.log([float(row["k"]) for row in fitted])
+    seconds = np.log([float(row["seconds"]) for row in fitted])
+    return float(np.polyfit(k, seconds, 1)[0])
+
+
+def figures(rows: list[Row]) -> dict[str, float]:
+    """What the targets are about."""
+    found = {"exponent of time against k (target at most 3)": exponent(rows)}
+    for k, target in SHARES.items():
+        shares = [float(row["share"]) for row in rows if row["name"] == "output error" and row["k"] == k]
+        if shares:
+            found[f"worst share of the naive loop, k = {k} (target {target:.3f})"] = max(shares)
+            found[f"median share of the naive loop, k = {k}"] = statistics.median(shares)
+    D = {int(row["size"]): float(row["seconds"]) for row in rows if row["name"] == "criterion D"}
+    for p, target in GROWTH.items():
+        if p in D:
+            found[f"D-optimal, p = {p} over p = 2 (target {target:.0f})"] = D[p] / D[2]
+    return found
+
+
+def plot(rows: list[Row], path: Path) -> None:
+    """Time against k, a line for each family."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+    for name in dict.fromkeys(str(row["name"]) for row in rows):
+        mine = [row for row in rows if row["name"] == name]
+        k = sorted({int(row["k"]) for row in mine})
+        middle = [statistics.median(float(r["seconds"]) for r in mine if r["k"] == size) for size in k]
+        axes.loglog(k, middle, "o-", label=name)
+    rival = [row for row in rows if "naive_seconds" in row]
+    k = sorted({int(row["k"]) for row in rival})
+    slow = [statistics.median(float(r["naive_seconds"]) for r in rival if r["k"] == size) for size in k]
+    if k:
+        axes.loglog(k, slow, "s--", color="0.5", label="naive loop (output error)")
+    ticks = [4, 8, 16, 32, 64, 128]
+    axes.set_xticks(ticks, labels=[str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("number of parameters k")
+    axes.set_ylabel("processor time [s]")
+    axes.legend(fontsize="small")
+    figure.savefig(path)
+
+
+def main() -> int:
+    """Print the table and write it as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="one plant of each row, none of the largest")
+    parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
+    parser.add_argument("--json", type=Path, default=ROOT / "benchmarks" / "scaling.json")
+    parser.add_argument("--plot", type=Path, help="write a plot of time against k")
+    arguments = parser.parse_args()
+    ours(output_error_spec(0, 1))  # imports and first calls
+    rows: list[Row] = []
+    agreed = True
+    for name in arguments.only:
+        for row in rows_of(name, quick=arguments.quick):
+            rows.append(row)
+            close = abs(float(row.get("difference", 0.0))) <= AGREEMENT
+            agreed = agreed and close
+            rival = f" naive {row['naive_seconds']:7.2f} share {row['share']:6.3f}" if "share" in row else ""
+            print(
+                f"{row['name']:22}{row['size']:4} k {row['k']:4}  {row['seconds']:8.2f} s"
+                f"{rival}  gap {row['gap']:.1e}, {row['any_spectrum_gap']:.1e}"
+                f"  rounds {row['rounds']}, {row['any_spectrum_rounds']}  cuts {row['cuts']}"
+                f"  {row['memory_gib']:.2f} GiB{'' if close else '  DISAGREE'}",
+                flush=True,
+            )
+    report = {"rows": rows, "figures": figures(rows)}
+    for text, value in report["figures"].items():
+        print(f"{text}: {value:.3f}")
+    arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    if arguments.plot:
+        plot(rows, arguments.plot)
+    return 0 if agreed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

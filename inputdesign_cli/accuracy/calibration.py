@@ -1,0 +1,103 @@
+"""The confidence factor alpha for which the model error itself keeps a probability, by simulation.
+
+The chi-squared quantile makes |G(theta) - G| <= r_u hold at all frequencies for every theta of an ellipsoid
+of that probability, and to first order only. Most estimates outside of that ellipsoid keep below r_adm as
+well: an ellipsoid has more dimensions than a frequency response has directions that matter. Here estimates
+are drawn from their asymptotic distribution, and the largest |G(theta) - G| / r_adm over the band is computed
+for each with the exact G. alpha is set so that the largest r_u / r_adm is the quantile of those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.accuracy.model_error import ModelError
+from inputdesign_cli.accuracy.requirement import Requirement, inverse_factor
+from inputdesign_cli.plant.polynomial import Array
+
+_POINTS, _AT_ONCE = 800, 256
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How many fresh draws stay below r_adm in the whole band: by the exact G, and to first order."""
+
+    draws: int
+    exact: int
+    linear: int
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What is asked: max over w of |G(theta) - G| / r_adm <= 1 with this probability.
+
+    The same `draws` serve every information matrix, so that alpha is a smooth function of it; as many
+    fresh ones tell the coverage.
+    """
+
+    probability: float
+    draws: int
+    seed: int = 0
+
+    def alpha(self, errors: Sequence[ModelError], information: Array) -> float:
+        """The calibrated alpha of an experiment with this information (k, k), in the errors' coordinates."""
+        largest = self._largest(errors, self._steps(errors, information, fresh=False))
+        reached = float(np.quantile(largest, self.probability, method="higher"))
+        return errors[0].alpha * reached / max(error.worst(information).ratio for error in errors)
+
+    def coverage(self, errors: Sequence[ModelError], information: Array) -> Coverage:
+        """What fresh draws say."""
+        steps = self._steps(errors, information, fresh=True)
+        exact, linear = self._largest(errors, steps), _to_first_order(errors, steps)
+        return Coverage(self.draws, int(np.sum(exact <= 1.0)), int(np.sum(linear <= 1.0)))
+
+    def _steps(self, errors: Sequence[ModelError], information: Array, *, fresh: bool) -> Array:
+        """(draws, k): theta minus its nominal value, of covariance M^-1."""
+        normal = np.random.default_rng([self.seed, fresh]).standard_normal((self.draws, len(information)))
+        return np.asarray(normal @ inverse_factor(information))
+
+    def _largest(self, errors: Sequence[ModelError], steps: Array) -> Array:
+        """(draws,): the largest |G(theta) - G| / r_adm over frequencies and errors."""
+        experiment, w = errors[0].experiment, _frequencies(errors)
+        bounds = [_admissible(error, w) for error in errors]
+        nominal = experiment.model.plant_at(w)
+        largest = np.zeros(self.draws)
+        for i, theta in enumerate(experiment.model.theta + experiment.raw_steps(steps)):
+            off = experiment.model.at(theta).plant_at(w) - nominal
+            for error, r_adm in zip(errors, bounds, strict=True):
+                ratio = np.linalg.norm(error.concerned(off), axis=1) / r_adm
+                largest[i] = max(largest[i], ratio.max() if np.all(np.isfinite(ratio)) else np.inf)
+        return largest
+
+
+def _to_first_order(errors: Sequence[ModelError], steps: Array) -> Array:
+    """(draws,): the same by the gradient of G."""
+    w, largest = _frequencies(errors), np.zeros(len(steps))
+    for error in errors:
+        rows = error.plant_rows(w) / _admissible(error, w)[:, None, None]
+        for part in np.array_split(np.arange(len(steps)), -(-len(steps) // _AT_ONCE)):
+            ratio = np.linalg.norm(rows @ steps[part].T, axis=1)
+            largest[part] = np.maximum(largest[part], ratio.max(axis=0))
+    return largest
+
+
+def _frequencies(errors: Sequence[ModelError]) -> Array:
+    """The grids of all errors, thinned out: a maximum over draws needs no polish."""
+    w = np.unique(np.concatenate([error.grid for error in errors]))
+    return w[:: -(-len(w) // _POINTS)]
+
+
+def _admissible(error: ModelError, w: Array) -> Array:
+    """r_adm at `w`, without bound outside of the band."""
+    lo, hi = error.band
+    inside, found = (w >= lo) & (w <= hi), np.full(w.size, np.inf)
+    found[inside] = error.admissible.at(w[inside])
+    return found
+
+
+def with_alpha(requirements: Iterable[Requirement], alpha: float) -> list[Requirement]:
+    """The requirements, those on the model error with another alpha."""
+    return [replace(r, alpha=alpha) if isinstance(r, ModelError) else r for r in requirements]

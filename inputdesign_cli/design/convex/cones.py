@@ -1,0 +1,260 @@
+"""The blocks of `interior`: what each keeps of its slack S and multiplier Z, and what it adds to a step.
+
+Every block states S(a) in its cone, a being the unknowns v or what M-blocks see of them: the entries of
+svec(M), and s. A step solves, linearised, S + dS = S(a + da) and
+Z + dZ = target S^-1 - (Z dS S^-1) - corrector, products of matrices made symmetric.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from inputdesign_cli.design.convex.entries import Entries, Stack
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import smat, svec
+
+
+class Cone(ABC):
+    """One block. `degree` is the number of its complementarity products; `curved` where S is not linear."""
+
+    degree: int
+    curved = False
+
+    @property
+    @abstractmethod
+    def gap(self) -> float:
+        """<S, Z>."""
+
+    @abstractmethod
+    def look(self, at: Array) -> float:
+        """Evaluate S(at); returns the largest entry of what the slack misses of it.
+
+        Raises:
+            LinAlgError: the slack has left the cone.
+        """
+
+    @abstractmethod
+    def pull(self) -> Array:
+        """A^T Z: the weight of the multipliers on the unknowns."""
+
+    @abstractmethod
+    def add_to(self, matrix: Array) -> None:
+        """Add A^T (Z . S^-1) A."""
+
+    @abstractmethod
+    def push(self, target: float, *, corrected: bool) -> Array:
+        """A^T (target S^-1 - Z miss S^-1 - corrector)."""
+
+    @abstractmethod
+    def turn(self, step: Array) -> None:
+        """Find dS and dZ for a step of the unknowns, with the target and the corrector of the last `push`."""
+
+    @abstractmethod
+    def lengths(self) -> tuple[float, float]:
+        """How far along dS and dZ the cone reaches, at most one."""
+
+    @abstractmethod
+    def gap_after(self, up: float, down: float) -> float:
+        """<S + up dS, Z + down dZ>."""
+
+    @abstractmethod
+    def move(self, up: float, down: float) -> None:
+        """Take the step."""
+
+    @abstractmethod
+    def multipliers(self) -> list[Array]:
+        """Z, one array for each of what the block was made of."""
+
+
+class Orthant(Cone):
+    """offset + rows a >= 0, `rows` (l, number of unknowns)."""
+
+    def __init__(self, rows: Array, offset: Array, slack: Array, weight: Array) -> None:
+        self.rows, self.offset, self.S, self.Z = rows, offset, slack, weight
+        self.dS, self.dZ = np.zeros_like(slack), np.zeros_like(weight)
+        self.degree = slack.size
+
+    @property
+    def gap(self) -> float:
+        """See `Cone`."""
+        return float(self.S @ self.Z)
+
+    def look(self, at: Array) -> float:
+        """See `Cone`."""
+        self.miss = self.offset + self.rows @ at - self.S
+        return float(np.abs(self.miss).max(initial=0.0))
+
+    def pull(self) -> Array:
+        """See `Cone`."""
+        return self.rows.T @ self.Z
+
+    def add_to(self, matrix: Array) -> None:
+        """See `Cone`."""
+        matrix += (self.rows.T * (self.Z / self.S)) @ self.rows
+
+    def push(self, target: float, *, corrected: bool) -> Array:
+        """See `Cone`."""
+        self.aim = target / self.S - (self.dZ * self.dS / self.S if corrected else 0.0)
+        return self.rows.T @ (self.aim - self.Z / self.S * self.miss)
+
+    def turn(self, step: Array) -> None:
+        """See `Cone`."""
+        self.dS = self.miss + self.rows @ step
+        self.dZ = self.aim - self.Z - self.Z / self.S * self.dS
+
+    def lengths(self) -> tuple[float, float]:
+        """See `Cone`."""
+        return reach(self.S, self.dS), reach(self.Z, self.dZ)
+
+    def gap_after(self, up: float, down: float) -> float:
+        """See `Cone`."""
+        return float((self.S + up * self.dS) @ (self.Z + down * self.dZ))
+
+    def move(self, up: float, down: float) -> None:
+        """See `Cone`."""
+        self.S = self.S + up * self.dS
+        self.Z = self.Z + down * self.dZ
+
+    def multipliers(self) -> list[Array]:
+        """All in one."""
+        return [self.Z]
+
+
+class Atoms(Orthant):
+    """The first unknowns are nonnegative themselves, and are the slack."""
+
+    def __init__(self, start: Array, weight: Array) -> None:
+        super().__init__(np.zeros((0, 0)), np.zeros(0), start, weight)
+        self.miss = np.zeros(1)
+
+    def look(self, at: Array) -> float:
+        """See `Cone`."""
+        self.total, self.S = at.size, at[: self.degree]
+        return 0.0
+
+    def pull(self) -> Array:
+        """See `Cone`."""
+        return np.pad(self.Z, (0, self.total - self.degree))
+
+    def add_to(self, matrix: Array) -> None:
+        """See `Cone`."""
+        matrix.flat[: self.degree * (self.total + 1) : self.total + 1] += self.Z / self.S
+
+    def push(self, target: float, *, corrected: bool) -> Array:
+        """See `Cone`."""
+        self.aim = target / self.S - (self.dZ * self.dS / self.S if corrected else 0.0)
+        return np.pad(self.aim, (0, self.total - self.degree))
+
+    def turn(self, step: Array) -> None:
+        """See `Cone`."""
+        self.dS = step[: self.degree]
+        self.dZ = self.aim - self.Z - self.Z / self.S * self.dS
+
+
+class Semidefinite(Cone):
+    """Matrices S_b >= 0 of one order d, with what all kinds of them share; `S` and `Z` are (number, d, d)."""
+
+    def __init__(self, number: int, order: int, slack: float, weight: float) -> None:
+        self.degree = number * order
+        unit = np.broadcast_to(np.eye(order), (number, order, order))
+        self.S, self.Z = slack * unit, weight * unit
+        self.dS, self.dZ = np.zeros_like(self.S), np.zeros_like(self.Z)
+
+    @property
+    def gap(self) -> float:
+        """See `Cone`."""
+        return float(np.sum(self.S * self.Z))
+
+    def factor(self) -> None:
+        """Inverses of S and of the Cholesky factors."""
+        self.root = np.linalg.inv(np.linalg.cholesky(self.S))
+        self.inverse = self.root.swapaxes(1, 2) @ self.root
+        self.dual_root = np.linalg.inv(np.linalg.cholesky(self.Z))
+
+    def scaled(self, X: Stack) -> Stack:
+        """Z X S^-1, made symmetric."""
+        return symmetric(self.Z @ X @ self.inverse)
+
+    def aimed(self, target: float, *, corrected: bool) -> Stack:
+        """target S^-1 - corrector."""
+        self.aim = target * self.inverse
+        if corrected:
+            self.aim = self.aim - symmetric(self.dZ @ self.dS @ self.inverse)
+        return self.aim
+
+    def answer(self, dS: Stack) -> None:
+        """dZ for this dS."""
+        self.dS = dS
+        self.dZ = self.aim - self.Z - self.scaled(dS)
+
+    def lengths(self) -> tuple[float, float]:
+        """See `Cone`."""
+        up = furthest(self.root @ self.dS @ self.root.swapaxes(1, 2))
+        return up, furthest(self.dual_root @ self.dZ @ self.dual_root.swapaxes(1, 2))
+
+    def gap_after(self, up: float, down: float) -> float:
+        """See `Cone`."""
+        return float(np.sum((self.S + up * self.dS) * (self.Z + down * self.dZ)))
+
+    def move(self, up: float, down: float) -> None:
+        """See `Cone`."""
+        self.S = self.S + up * self.dS
+        self.Z = self.Z + down * self.dZ
+
+    def multipliers(self) -> list[Array]:
+        """Z, one matrix each."""
+        return list(self.Z)
+
+
+class Gram(Semidefinite):
+    """The first unknowns are svec of a positive semidefinite matrix."""
+
+    def __init__(self, order: int, slack: float, weight: float) -> None:
+        super().__init__(1, order, slack, weight)
+        self.entries = Entries(order, np.arange(order * (order + 1) // 2), with_s=False)
+
+    def look(self, at: Array) -> float:
+        """See `Cone`. The slack is the unknown itself."""
+        self.at = at
+        self.S = smat(at[: self.entries.size])[None]
+        self.factor()
+        return 0.0
+
+    def _spread(self, values: Array) -> Array:
+        return np.concatenate([values, np.zeros(self.at.size - values.size)])
+
+    def pull(self) -> Array:
+        """See `Cone`."""
+        return self._spread(svec(self.Z[0]))
+
+    def add_to(self, matrix: Array) -> None:
+        """See `Cone`."""
+        size = self.entries.size
+        matrix[:size, :size] += self.entries.products(self.Z, self.inverse)
+
+    def push(self, target: float, *, corrected: bool) -> Array:
+        """See `Cone`."""
+        return self._spread(svec(self.aimed(target, corrected=corrected)[0]))
+
+    def turn(self, step: Array) -> None:
+        """See `Cone`."""
+        self.answer(smat(step[: self.entries.size])[None])
+
+
+def symmetric(X: Stack) -> Stack:
+    """The symmetric parts."""
+    return 0.5 * (X + X.swapaxes(1, 2))
+
+
+def reach(values: Array, steps: Array) -> float:
+    """The largest share of the steps that keeps the values positive."""
+    least = float(np.min(steps / values, initial=0.0))
+    return -1.0 / least if least < 0.0 else np.inf
+
+
+def furthest(changes: Stack) -> float:
+    """The same for matrices I + share * change."""
+    least = float(np.linalg.eigvalsh(changes)[:, 0].min())
+    return -1.0 / least if least < 0.0 else np.inf

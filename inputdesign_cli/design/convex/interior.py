@@ -1,0 +1,151 @@
+"""A primal-dual interior-point method for the finite programs of the exchange, on dense blocks.
+
+minimise q^T v subject to S_b(v) in its cone for every block b, with a multiplier Z_b each. Directions are
+those of [helmberg-1996], with the corrector of [mehrotra-1992]. All matrix inequalities of a program hold
+the same M(v): their part of the linear system is summed over the inequalities, as a matrix of the entries of
+M, and only then taken to the unknowns, so that one inequality more costs next to nothing. A general
+solver takes all unknowns through each of them. Smooth concave functions of M (determinant, inverse trace) are
+taken as they are, with their curvature, not by matrix inequalities of twice the order.
+
+Its answer is a suggestion like any solver's: the bound is evaluated from the multipliers by `certificate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.design.convex.cones import Cone
+from inputdesign_cli.plant.polynomial import Array
+
+_MOST_ITERATIONS = 100
+_NEAREST, _FURTHEST = 0.9, 0.09  # of the way to the edge of the cones
+_REGULAR = 1e-16
+_REFINEMENTS = 2
+# Iterations without a smaller error, far from the optimum and where only rounding is left.
+_PATIENCE, _PATIENCE_NEAR = 8, 2
+_ROUNDING = 1e-5  # errors below this are as likely rounding
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The best iterate: unknowns v (n,), multipliers of each block, its largest error; iterations taken."""
+
+    v: Array
+    multipliers: list[list[Array]]
+    error: float
+    iterations: int
+
+
+def follow_path(
+    q: Array,
+    start: Array,
+    direct: Sequence[Cone],
+    through: Sequence[Cone],
+    seen: tuple[Array, Array],
+    *,
+    tolerance: float,
+) -> Reached:
+    """Solve to a tolerance on gap and residuals, relative to an objective of order one.
+
+    Args:
+        q: (n,) the cost.
+        start: (n,) unknowns inside of their cones.
+        direct: blocks of v.
+        through: blocks of a = offset + gains v.
+        seen: (offset (e,), gains (e, n)).
+
+    Raises:
+        InaccurateError: `out-of-time`.
+    """
+    offset, gains = seen
+    cones = [*direct, *through]
+    degree, unit = sum(cone.degree for cone in cones), 1.0 + float(np.abs(q).max())
+    v, best, kept = start, Reached(start, [], np.inf, 0), 0
+    for iteration in range(_MOST_ITERATIONS):
+        seconds_left()
+        try:
+            missed = max(_look(direct, v), _look(through, offset + gains @ v))
+            weight = sum((c.pull() for c in direct), np.zeros(v.size))
+            weight = weight + gains.T @ sum((c.pull() for c in through), np.zeros(offset.size))
+            gap = sum(cone.gap for cone in cones)
+            error = max(gap / (1.0 + abs(float(q @ v))), missed, float(np.abs(q - weight).max()) / unit)
+            if error < best.error:
+                kept = iteration
+                best = Reached(v, [c.multipliers() for c in cones], error, iteration)
+            patience = _PATIENCE if best.error > _ROUNDING else _PATIENCE_NEAR
+            if error <= tolerance or iteration - kept > patience or not np.isfinite(error):
+                break
+            up, down = _step(q, v, direct, through, gains, gap, degree)
+        except np.linalg.LinAlgError:
+            break
+        v = v + up[0] * up[1]
+        for cone in cones:
+            cone.move(up[0], down)
+    return best
+
+
+def _look(cones: Sequence[Cone], at: Array) -> float:
+    return max((cone.look(at) for cone in cones), default=0.0)
+
+
+def _step(
+    q: Array, v: Array, direct: Sequence[Cone], through: Sequence[Cone], gains: Array, gap: float, degree: int
+) -> tuple[tuple[float, Array], float]:
+    """Predictor and corrector: (length, direction) of the unknowns, and the length of the multipliers."""
+    cones = [*direct, *through]
+    entries = np.zeros((len(gains), len(gains)))
+    for cone in through:
+        cone.add_to(entries)
+    matrix = gains.T @ (entries @ gains)
+    for cone in direct:
+        cone.add_to(matrix)
+    solve = _factored(matrix)
+
+    def towards(target: float, *, corrected: bool) -> Array:
+        pushed = sum((c.push(target, corrected=corrected) for c in direct), np.zeros(v.size))
+        seen = sum((c.push(target, corrected=corrected) for c in through), np.zeros(len(gains)))
+        step = solve(pushed + gains.T @ seen - q)
+        for cone in direct:
+            cone.turn(step)
+        for cone in through:
+            cone.turn(gains @ step)
+        return step
+
+    towards(0.0, corrected=False)
+    up, down = _lengths(cones, 1.0)
+    after = sum(cone.gap_after(up, down) for cone in cones)
+    power = max(1.0, 3.0 * min(up, down) ** 2)
+    sigma = min(1.0, max(after / gap, 0.0) ** power)
+    step = towards(sigma * gap / degree, corrected=True)
+    up, down = _lengths(cones, _NEAREST + _FURTHEST * min(up, down))
+    if any(cone.curved for cone in cones):
+        up = down = min(up, down)  # with a curvature the steps of both balance each other only as one
+    return (up, step), down
+
+
+def _lengths(cones: Sequence[Cone], share: float) -> tuple[float, float]:
+    reached = [cone.lengths() for cone in cones]
+    up, down = min(u for u, _ in reached), min(d for _, d in reached)
+    return min(1.0, share * up), min(1.0, share * down)
+
+
+def _factored(matrix: Array) -> Callable[[Array], Array]:
+    """A solver with this positive definite matrix, its rounding refined away."""
+    diagonal = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    unit = matrix / diagonal / diagonal[:, None]
+    lifted = unit + _REGULAR * len(matrix) * np.eye(len(matrix))
+    factor = scipy.linalg.cho_factor(lifted, check_finite=False)
+
+    def solve(right: Array) -> Array:
+        right = right / diagonal
+        found = scipy.linalg.cho_solve(factor, right, check_finite=False)
+        for _ in range(_REFINEMENTS):
+            found = found + scipy.linalg.cho_solve(factor, right - unit @ found, check_finite=False)
+        return found / diagonal
+
+    return solve

@@ -1,0 +1,54 @@
+"""An estimate from earlier data, in place of these: Gaussian knowledge of the parameters.
+
+It is worth -2 log of its density, q = (theta - theta_0)^T M_0 (theta - theta_0), so that the estimate with it
+minimises -2 log likelihood + q (maximum a posteriori; [ljung-1999], Section 7.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.special
+
+from inputdesign_cli.plant.polynomial import Array
+
+# Directions of which less than this share of the knowledge is of one side only are the other's alone.
+_OF_ONE_SIDE = 1e-9
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """An estimate `theta` (k,) of `information` (k, k), singular where some parameters are not known."""
+
+    theta: Array
+    information: Array
+
+    @property
+    def rows(self) -> Array:
+        """(k, k): R with R^T R the information."""
+        scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        values, vectors = np.linalg.eigh(self.information / np.outer(scale, scale))
+        return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale)
+
+    def slope(self, theta: Array) -> Array:
+        """(k,): half the gradient of q."""
+        return np.asarray(self.information @ (theta - self.theta))
+
+    def q(self, theta: Array) -> float:
+        """How far theta is away, squared, in standard deviations."""
+        return float(np.sum((self.rows @ (theta - self.theta)) ** 2))
+
+    def agreement(self, theta: Array, factor: Array) -> float:
+        """The probability that two estimates of one system differ as much as this one and that of the data.
+
+        Args:
+            theta: (k,), the estimate from both.
+            factor: L (k, k), lower triangular, L L^T the information of both.
+        """
+        inner = np.linalg.solve(factor, self.rows.T)
+        shares, turn = np.linalg.eigh(inner @ inner.T)
+        away = (turn.T @ (factor.T @ (theta - self.theta))) ** 2
+        both = (shares > _OF_ONE_SIDE) & (shares < 1.0 - _OF_ONE_SIDE)
+        statistic = float(np.sum(away[both] * shares[both] / (1.0 - shares[both])))
+        return float(scipy.special.chdtrc(both.sum(), statistic)) if np.any(both) else 1.0

@@ -1,0 +1,177 @@
+"""The frequency response of a plant from data alone, without a model, and how far to trust it.
+
+From inputs that repeat, line by line: the mean of the periods, and their scatter ([pintelon-schoukens-2012],
+Section 2.5). From others by a local polynomial: around each frequency, responses and the leakage of start and
+end are parabolas, fitted to a few lines of the Fourier transforms (the same, Section 7.3). Signals x from
+outside, such as the reference of a loop, are instruments: G is the response to x of y over that of u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.special
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+CONFIDENCE = 0.95
+_MOST_FREQUENCIES = 200
+_FREEDOM = 8
+_PARABOLA = 3
+_EXCITED = 1e-6
+_REPEATS, _BEGINNING, _TRIED = 1e-9, 16, 20
+_DEPENDENT = 1e-7
+
+Method = Literal["lines", "local_polynomial"]
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """An estimate of G at n frequencies.
+
+    Attributes:
+        frequency: (n,), rad/sample.
+        G: (n, p, r).
+        radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
+        method: how it was estimated.
+    """
+
+    frequency: Array
+    G: ComplexArray
+    radius: NDArray[np.float64]
+    method: Method
+
+
+def frequency_response(
+    u: Array, y: Array, x: Array | None = None, *, lengths: Sequence[int] | None = None
+) -> FrequencyResponse | None:
+    """From records that follow each other; None where they are too short or excite no frequency enough.
+
+    Args:
+        u, y: (N, r), (N, p).
+        x: (N, r), what excites from outside; None: u itself, which then must not answer y.
+    """
+    at = np.cumsum(lengths or [len(y)])[:-1]
+    outside = u if x is None else x
+    records = list(zip(*(np.split(signal, at) for signal in (outside, u, y)), strict=True))
+    if len(records) == 1 and u.shape[1] == 1:
+        period = _period(records[0][0][:, 0])
+        if period:
+            return _by_lines(outside, u, y, period)
+    return _local_polynomial(records)
+
+
+def _period(x: Array) -> int:
+    """Of a signal (N,) that repeats, at least twice; 0 of others."""
+    tolerance = _REPEATS * float(np.abs(x).max())
+    begin = x[:_BEGINNING]
+    windows = np.lib.stride_tricks.sliding_window_view(x[1 : x.size // 2 + begin.size], begin.size)
+    same = np.flatnonzero(np.all(np.abs(windows - begin) <= tolerance, axis=1)) + 1
+    for period in same[same <= x.size // 2][:_TRIED]:
+        if np.all(np.abs(x[period:] - x[:-period]) <= tolerance):
+            return int(period)
+    return 0
+
+
+def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | None:
+    """One input whose signals repeat; the first of three periods or more is left to the transient."""
+    periods = len(y) // period
+    kept = periods - (periods > 2)
+
+    def transforms(signal: Array) -> ComplexArray:
+        parts = signal[len(signal) - kept * period :].reshape(kept, period, -1)
+        return np.fft.rfft(parts, axis=1)[:, 1 : (period + 1) // 2] / period
+
+    size = np.abs(transforms(x)[:, :, 0]).mean(axis=0)
+    lines = np.flatnonzero(size > _EXCITED * size.max(initial=0.0))
+    if not lines.size:
+        return None
+    U, Y = transforms(u)[:, lines], transforms(y)[:, lines]
+    mean = U.mean(axis=0)
+    G = Y.mean(axis=0) / mean
+    scatter = np.sum(np.abs(Y - G * U) ** 2, axis=0) / (kept - 1)
+    radius = _radius(scatter / (kept * np.abs(mean) ** 2), kept - 1)
+    return FrequencyResponse(2.0 * np.pi * (lines + 1) / period, G[:, :, None], radius[:, :, None], "lines")
+
+
+def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
+    """(x, u, y) of every record, each (N, channels)."""
+    inputs = records[0][1].shape[1]
+    unknowns = _PARABOLA * (inputs + len(records))
+    window = -(-(unknowns + _FREEDOM) // len(records)) + 1
+    found = []
+    longest = max(len(y) for *_, y in records)
+    if min(len(y) for *_, y in records) < 2 * window + 4:
+        return None
+    transformed = [_transforms(*record) for record in records]
+    for w in _centres(longest):
+        one = _at(w, transformed, window, inputs)
+        if one is not None:
+            found.append((w, *one))
+    if not found:
+        return None
+    w, G, radius = (np.array(values) for values in zip(*found, strict=True))
+    return FrequencyResponse(w, G, radius, "local_polynomial")
+
+
+def _transforms(*signals: Array) -> tuple[NDArray, ...]:
+    """The lines of a record (N,), and the transforms (N, channels) of its signals there."""
+    samples = len(signals[0])
+    lines = 2.0 * np.pi * np.arange(samples) / samples
+    return lines, *(np.fft.fft(signal, axis=0) / np.sqrt(samples) for signal in signals)
+
+
+def _centres(samples: int) -> Array:
+    """Lines of a record, at most as many as can be looked at, evenly on a logarithmic axis."""
+    last = (samples - 1) // 2
+    if last <= _MOST_FREQUENCIES:
+        return np.asarray(2.0 * np.pi * np.arange(1, last + 1) / samples)
+    lines = np.unique(np.geomspace(1, last, _MOST_FREQUENCIES).round())
+    return np.asarray(2.0 * np.pi * lines / samples)
+
+
+def _at(
+    w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int
+) -> tuple[ComplexArray, NDArray[np.float64]] | None:
+    """G (p, r) and its radius at w; None where the inputs do not tell their effects apart."""
+    rows, targets = [], []
+    for number, (lines, X, U, Y) in enumerate(transformed):
+        last = (lines.size - 1) // 2
+        first = int(np.clip(np.searchsorted(lines, w) - window // 2, 1, last - window + 1))
+        near = slice(first, first + window)
+        away = (lines[near] - w) / (window * lines[1])
+        powers = away[:, None] ** np.arange(_PARABOLA)
+        leakage = np.zeros((window, len(transformed), _PARABOLA))
+        leakage[:, number] = powers
+        responses = X[near][:, None, :] * powers[:, :, None]
+        rows.append(np.concatenate([responses.reshape(window, -1), leakage.reshape(window, -1)], axis=1))
+        targets.append(np.concatenate([Y[near], U[near]], axis=1))
+    matrix, target = np.concatenate(rows), np.concatenate(targets)
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    left, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
+    if singular[-1] <= _DEPENDENT * singular[0]:
+        return None
+    inverse = (right.conj().T / singular) @ left.conj().T / scale[:, None]
+    found = inverse @ target
+    outputs = target.shape[1] - inputs
+    from_x = found[:inputs].T
+    to_u = from_x[outputs:]
+    if np.linalg.cond(to_u) > 1.0 / _DEPENDENT:
+        return None
+    back = np.linalg.inv(to_u)
+    G = from_x[:outputs] @ back
+    residuals = target - matrix @ found
+    errors = residuals[:, :outputs] - residuals[:, outputs:] @ G.T
+    freedom = len(matrix) - matrix.shape[1]
+    power = np.sum(np.abs(errors) ** 2, axis=0) / freedom
+    spread = np.sum(np.abs(back.T @ inverse[:inputs]) ** 2, axis=1)
+    return G, _radius(np.outer(power, spread), freedom)
+
+
+def _radius(variance: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:
+    """|error|^2 over its estimated variance is of the F distribution with 2 and 2 `freedom` degrees."""
+    return np.asarray(np.sqrt(variance * scipy.special.fdtri(2, 2 * freedom, CONFIDENCE)))

@@ -1,0 +1,156 @@
+"""An estimate from records, whatever the kind of model: what a kind answers, and the road from data to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.checks import check_length, check_varying
+from inputdesign_cli.identification.earlier import Earlier
+from inputdesign_cli.identification.estimate import (
+    BatchEstimate,
+    Estimate,
+    concluded,
+    information_of,
+    noise_of,
+)
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
+from inputdesign_cli.identification.records import Record, Records, centred, longest, split
+from inputdesign_cli.identification.search import Search, from_rest_or_free, search
+from inputdesign_cli.plant.polynomial import Array
+
+Part = tuple[Array, Array]
+"""u (N, r) and y (N, p) of one record."""
+
+
+class Starts(NamedTuple):
+    """Where a search begins: points (n, k), the steps (n,) made to each, and how many points were tried."""
+
+    points: Array
+    steps: NDArray[np.int64]
+    tried: int
+
+
+class Kind(Protocol):
+    """A structure of k parameters and p outputs that records are to determine."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the parameters."""
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+
+    @property
+    def recent(self) -> int:
+        """The lag up to which the structure looks at the inputs."""
+
+    @property
+    def explaining(self) -> NDArray[np.bool_]:
+        """(k,): the parameters that take directions of past inputs away from residuals."""
+
+    @property
+    def whitening(self) -> NDArray[np.bool_]:
+        """(k,): those that make residuals look whiter."""
+
+    def own(self) -> Array:
+        """(p,): how many parameters each output has; those that n outputs share count as 1/n."""
+
+    def record(self, u: Array, y: Array) -> Record:
+        """Samples u (N, r), y (N, p) that the structure is to explain."""
+
+    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+        """Where to begin: points made from records at rest about zero, and the `given` one (k,)."""
+
+    def holding(self, known: NDArray[np.bool_]) -> Self:
+        """The same, with starts that keep the known (k,) of its parameters where they know how to."""
+
+    def simulated(
+        self, found: Search, y: Array, lengths: Sequence[int] | None
+    ) -> tuple[Array, Sequence[bool]]:
+        """(N, p), what inputs and starts cause in the estimate, and which outputs can be simulated."""
+
+
+def identify_records(
+    kind: Kind,
+    u: Array,
+    y: Array,
+    *,
+    start: Array | None,
+    feedback: bool,
+    lengths: Sequence[int] | None,
+    rest: bool | None,
+    earlier: Earlier | None,
+    weights: Array | None = None,
+) -> Estimate:
+    """The maximum-likelihood estimate of a structure from one record, or jointly from several.
+
+    Args:
+        kind: of which names, orders and delays are those of the estimate; numbers are not used.
+        u, y: (N, r), (N, p).
+        start: (k,), tried besides starts made from the data.
+        feedback: whether u(t) answers y(t), which the tests of the residuals heed.
+        lengths: of the records that follow each other in u and y; None for one.
+        rest: whether each begins at rest about zero; None: as the data say.
+        earlier: an estimate from other data, which counts along.
+        weights: W (p, p) of the errors if the covariance of the noise is known.
+
+    Raises:
+        SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
+            `not-exciting`.
+    """
+    check_length(len(y), len(kind.names), kind.recent, outputs=kind.outputs)
+    check_varying(kind.names, u, y)
+    parts = split(u, y, lengths)
+
+    def records_of(signals: Sequence[Part]) -> Records:
+        made = tuple(kind.record(*part) for part in signals)
+        return Records(made, weights=weights, earlier=earlier)
+
+    def searched(records: Records, known: Array | None) -> Search:
+        chosen = longest(parts)
+        begin = kind.starts(centred(chosen) if records.free else chosen, start)
+        others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
+        points = np.concatenate([begin.points, *(theta[None] for theta in others)])
+        steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
+        return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
+
+    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched)
+    simulated, stable = kind.simulated(best, y, lengths)
+    return concluded(
+        kind.names,
+        best,
+        y,
+        simulated,
+        stable,
+        own=kind.own(),
+        in_noise=int(np.sum(kind.whitening)),
+        in_plant=int(np.sum(kind.explaining)),
+        recent=kind.recent,
+        feedback=feedback,
+    )
+
+
+def fit_records(records: Sequence[Records], start: Array, steps: Array, own: Array) -> BatchEstimate:
+    """The estimates of many runs, each from its one start (k,), without checks.
+
+    Args:
+        records: one a run.
+        start: (runs, k), and the steps (runs,) made to each.
+        own: see `Kind`.
+    """
+    found = minimise(RecordProblem(tuple(records)), start)
+    points = [evaluate(record, theta) for record, theta in zip(records, found.theta, strict=True)]
+    noise = np.array([noise_of(point, own) for point in points])
+    return BatchEstimate(
+        theta=found.theta,
+        noise=noise,
+        information=np.array([information_of(*each) for each in zip(records, points, noise, strict=True)]),
+        converged=found.converged,
+        steps=found.steps + steps.astype(np.int64),
+    )

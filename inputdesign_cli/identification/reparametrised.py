@@ -1,0 +1,219 @@
+"""Estimates of a model in other parameters than its coefficients, of which some may be known.
+
+The records are those of the coefficients, their gradients follow by the chain rule. Starts are estimates of
+all coefficients, brought back to the parameters by least squares weighed by what the records tell of them: in
+the limit of many samples that is an efficient estimate already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.optimize
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.identification.estimate import BatchEstimate
+from inputdesign_cli.identification.kind import Kind, Part, Starts, fit_records
+from inputdesign_cli.identification.record_problem import Point, evaluate
+from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.identification.search import Search
+from inputdesign_cli.plant import Parametrisation, Reparametrised
+from inputdesign_cli.plant.polynomial import Array
+
+# So often a point is moved halfway towards the nominal one before that takes its place.
+_HALVINGS = 40
+_RIDGE = 1e-9
+_MOST_EVALUATIONS = 60
+_OUT_OF_BOUNDS = 1e12
+
+
+@dataclass(frozen=True)
+class ReparametrisedRecord:
+    """A record of the coefficients against parameters (k,); see `Record`."""
+
+    record: Record
+    parametrisation: Parametrisation
+
+    @property
+    def u(self) -> Array:
+        """(N, r)."""
+        return self.record.u
+
+    @property
+    def y(self) -> Array:
+        """(N, p)."""
+        return self.record.y
+
+    @property
+    def size(self) -> int:
+        """Number of parameters k."""
+        return len(self.parametrisation.names)
+
+    def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Prediction errors (N, p) from rest, and psi (k, N, p); not a number where a coefficient is not."""
+        here = self.parametrisation.at(theta)
+        if not (np.all(np.isfinite(here.coefficients)) and np.all(np.isfinite(here.jacobian))):
+            return np.full(self.y.shape, np.nan), np.full((self.size, *self.y.shape), np.nan)
+        errors, psi = self.record.errors_and_gradient(here.coefficients)
+        return errors, np.tensordot(here.jacobian, psi, axes=(0, 0))
+
+    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): what an unknown start adds."""
+        return self.record.free_responses(self.parametrisation.at(theta).coefficients)
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """The derivatives of the free responses with respect to one parameter, by the chain rule."""
+        here = self.parametrisation.at(theta)
+        moved = [c for c in self.record.in_starts if here.jacobian[c, index] != 0.0]
+        slopes = [self.record.free_slopes(here.coefficients, int(c)) for c in moved]
+        if not slopes:
+            return tuple(np.zeros_like(x) for x in self.free_responses(theta))
+        weights = here.jacobian[moved, index]
+        return tuple(np.tensordot(weights, np.array(parts), 1) for parts in zip(*slopes, strict=True))
+
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those that move a coefficient on which the free responses depend."""
+        rows = self.parametrisation.jacobian[self.record.in_starts]
+        return np.flatnonzero(np.any(rows != 0.0, axis=0))
+
+    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
+        """(k, N, p), see `Record`."""
+        here = self.parametrisation.at(theta)
+        own = self.record.noise_in_regressors(here.coefficients, errors)
+        return np.tensordot(here.jacobian, own, axes=(0, 0))
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """(p, N, m), see `Record`."""
+        return self.record.whitened(self.parametrisation.at(theta).coefficients, signals)
+
+    def stabilised(self, theta: Array) -> Array:
+        """theta, moved towards the nominal parameters until its predictor is stable."""
+        home, share = self.parametrisation.theta, 1.0
+        for _ in range(_HALVINGS):
+            point = home + share * (theta - home)
+            coefficients = self.parametrisation.at(point).coefficients
+            if np.all(np.isfinite(coefficients)) and np.array_equal(
+                self.record.stabilised(coefficients), coefficients
+            ):
+                return point
+            share *= 0.5
+        return home.copy()
+
+
+@dataclass(frozen=True)
+class ReparametrisedKind:
+    """The structure of `model`, whose coefficients are those of the structure `coefficients`; see `Kind`."""
+
+    model: Reparametrised
+    coefficients: Kind
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the free parameters."""
+        return self.model.names
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.model.outputs
+
+    @property
+    def recent(self) -> int:
+        """The lag up to which the structure looks at the inputs."""
+        return self.coefficients.recent
+
+    @property
+    def explaining(self) -> NDArray[np.bool_]:
+        """(k,): those that move such a coefficient."""
+        return np.any(self._moved[self.coefficients.explaining], axis=0)
+
+    @property
+    def whitening(self) -> NDArray[np.bool_]:
+        """(k,): the same."""
+        return np.any(self._moved[self.coefficients.whitening], axis=0)
+
+    @cached_property
+    def _moved(self) -> NDArray[np.bool_]:
+        """(K, k): which parameter moves which coefficient."""
+        return np.asarray(self.model.parametrisation.jacobian != 0.0)
+
+    def own(self) -> Array:
+        """(p,): as many parameters as there are, shared by the outputs as the coefficients are."""
+        of_all = self.coefficients.own()
+        return of_all * (len(self.names) / max(float(np.sum(of_all)), 1.0))
+
+    def record(self, u: Array, y: Array) -> ReparametrisedRecord:
+        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        return ReparametrisedRecord(self.coefficients.record(u, y), self.model.parametrisation)
+
+    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+        """Those of all coefficients, brought back to the parameters, and the `given` one."""
+        found = self.coefficients.holding(~np.any(self._moved, axis=1)).starts(parts, None)
+        about = Records(tuple(self.coefficients.record(*part) for part in parts))
+        points = [self._brought_back(evaluate(about, theta)) for theta in found.points]
+        listed = [given] if given is not None else []
+        return Starts(
+            np.array([*listed, *points]),
+            np.append(np.zeros(len(listed), dtype=np.int64), found.steps),
+            found.tried + len(listed),
+        )
+
+    def _brought_back(self, point: Point) -> Array:
+        """The parameters (k,) whose coefficients are nearest to those of a point."""
+        at = self.model.parametrisation
+        if not np.isfinite(point.cost):
+            return at.theta
+        scale = np.sqrt(np.maximum(np.diag(point.hessian), 1e-300))
+        values, vectors = np.linalg.eigh(point.hessian / np.outer(scale, scale))
+        root = np.sqrt(np.maximum(values, _RIDGE * values[-1]))[:, None] * vectors.T * scale
+        unit = np.maximum(np.abs(at.theta), 1e-3 * max(float(np.max(np.abs(at.theta))), 1e-300))
+
+        def distance(share: Array) -> Array:
+            apart = root @ (at.at(share * unit).coefficients - point.theta)
+            return np.where(np.isfinite(apart), apart, _OUT_OF_BOUNDS)
+
+        def slope(share: Array) -> Array:
+            jacobian = root @ at.at(share * unit).jacobian * unit
+            return np.where(np.isfinite(jacobian), jacobian, 0.0)
+
+        found = scipy.optimize.least_squares(
+            distance, at.theta / unit, jac=slope, x_scale="jac", max_nfev=_MOST_EVALUATIONS
+        )
+        return np.asarray(found.x * unit, dtype=float)
+
+    def holding(self, known: NDArray[np.bool_]) -> ReparametrisedKind:
+        """The same."""
+        return self
+
+    def simulated(
+        self, found: Search, y: Array, lengths: Sequence[int] | None
+    ) -> tuple[Array, Sequence[bool]]:
+        """As the coefficients tell."""
+        return self.coefficients.simulated(self._of_coefficients(found), y, lengths)
+
+    def _of_coefficients(self, found: Search) -> Search:
+        """The same search, its point given by the coefficients."""
+        theta = self.model.parametrisation.at(found.point.theta).coefficients
+        return replace(found, point=replace(found.point, theta=theta))
+
+
+def fit_reparametrised(
+    kind: ReparametrisedKind, u: ArrayLike, y: ArrayLike, start: ArrayLike
+) -> BatchEstimate:
+    """The estimates of many records, each from its one start, without checks.
+
+    Args:
+        kind: of which the structure is meant.
+        u: (N, r) common to all runs, or (runs, N, r).
+        y: (runs, N, p).
+        start: (k,) for all runs, or (runs, k).
+    """
+    outputs = np.asarray(y, dtype=float)
+    inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], kind.model.inputs))
+    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.names)))
+    records = [Records((kind.record(*run),)) for run in zip(inputs, outputs, strict=True)]
+    return fit_records(records, np.array(begin), np.zeros(len(outputs), dtype=np.int64), kind.own())

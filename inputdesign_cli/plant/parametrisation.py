@@ -1,0 +1,74 @@
+"""Coefficients of a model as functions of other parameters, of which some may be known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.expressions import Expression
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class Parametrisation:
+    """m parameters, k of them `free`, and the K coefficients of a model that follow from them.
+
+    Attributes:
+        labels: (m,) what the user calls them; `symbols` (m,) what `terms` (K,) call them.
+        values: (m,); those that are not free are known.
+    """
+
+    labels: tuple[str, ...]
+    symbols: tuple[str, ...]
+    values: Array
+    free: NDArray[np.bool_]
+    terms: tuple[Expression, ...]
+
+    @classmethod
+    def identity(cls, labels: Sequence[str], values: ArrayLike, known: Sequence[str]) -> Parametrisation:
+        """The coefficients themselves, some of them known."""
+        symbols = tuple(f"p{i}" for i in range(len(labels)))
+        free = np.array([label not in known for label in labels], dtype=bool)
+        terms = tuple(Expression(symbol) for symbol in symbols)
+        return cls(tuple(labels), symbols, np.asarray(values, dtype=float), free, terms)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """(k,): labels of the free ones."""
+        return tuple(label for label, free in zip(self.labels, self.free, strict=True) if free)
+
+    @property
+    def theta(self) -> Array:
+        """(k,): values of the free ones."""
+        return self.values[self.free]
+
+    @property
+    def affine(self) -> bool:
+        """Whether every coefficient is affine in the parameters."""
+        return all(term.affine for term in self.terms)
+
+    def at(self, theta: ArrayLike) -> Parametrisation:
+        """The same with other values (k,) of the free ones."""
+        values = self.values.copy()
+        values[self.free] = np.asarray(theta, dtype=float)
+        return replace(self, values=values)
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(K,): not a number where a term is not defined."""
+        return self._image[0]
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """(K, k): of the coefficients in the free parameters."""
+        return self._image[1]
+
+    @cached_property
+    def _image(self) -> tuple[Array, Array]:
+        found = [term.at(self.symbols, self.values) for term in self.terms]
+        slopes = np.array([slope for _, slope in found]).reshape(len(found), len(self.labels))
+        return np.array([value for value, _ in found]), slopes[:, self.free]

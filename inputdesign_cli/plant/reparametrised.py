@@ -1,0 +1,190 @@
+"""Any model in other parameters than its coefficients, of which some may be known, by the chain rule.
+
+dG/dphi = sum_l dG/dtheta_l dtheta_l/dphi: whatever is asked of a model at the parameters phi follows from the
+model of its coefficients theta(phi) and the Jacobian J (K, k) of theta. What is known has no column in J.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.loop import Loop, close_loop
+from inputdesign_cli.plant.model import Fraction, Model
+from inputdesign_cli.plant.parametrisation import Parametrisation
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.transfer import TransferMatrix
+
+# Where in the words of a spec the value of a parameter stands.
+Place = Sequence[str | int]
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a spec says of parameters that have names of their own, to be repeated with other values.
+
+    Attributes:
+        plant: the section as it was written; None where it lists the coefficients, as those of the model do.
+        places: label -> where its value stands in the section.
+        known: of plant and of noise, what is listed as known.
+    """
+
+    plant: Mapping[str, object] | None = None
+    places: Mapping[str, Place] = field(default_factory=dict)
+    known: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reparametrised:
+    """The model `coefficients` at the parameters of `parametrisation`, with k of them free."""
+
+    coefficients: Model
+    parametrisation: Parametrisation
+    words: Words = Words()
+
+    @property
+    def continuous(self) -> bool:
+        """Whether frequencies are in rad per time unit."""
+        return self.coefficients.continuous
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs r."""
+        return self.coefficients.inputs
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.coefficients.outputs
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) of e."""
+        return self.coefficients.covariance
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): what the free parameters are called."""
+        return self.parametrisation.names
+
+    @property
+    def theta(self) -> Array:
+        """(k,): their values."""
+        return self.parametrisation.theta
+
+    @cached_property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
+        return np.any(self.parametrisation.jacobian[self.coefficients.in_plant] != 0.0, axis=0)
+
+    @property
+    def memory(self) -> float:
+        """See `Model`."""
+        return self.coefficients.memory
+
+    @property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        return self.coefficients.singularities
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        return self.coefficients.entry_singularities(output, input)
+
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): what the coefficients of `bends` follow from; all, unless these are affine."""
+        if not self.parametrisation.affine:
+            return np.ones(len(self.names), dtype=bool)
+        rows = self.parametrisation.jacobian[self.coefficients.bends(output, input)]
+        return np.any(rows != 0.0, axis=0)
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """One entry of G as numerator over denominator, gradients (n, k)."""
+        part, J = self.coefficients.entry_fraction(output, input, w), self.parametrisation.jacobian
+        return replace(
+            part,
+            numerator_gradient=part.numerator_gradient @ J,
+            denominator_gradient=part.denominator_gradient @ J,
+        )
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
+        return self.coefficients.plant_at(w)
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dphi (n, k, p, r)."""
+        return self._chained(self.coefficients.plant_gradient(w))
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dphi (n, k, p, r)."""
+        return self._chained(self.coefficients.input_gradient(w))
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dphi (n, k, p, p)."""
+        return self._chained(self.coefficients.noise_gradient(w))
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """(n, k, p, m), see `Model`."""
+        return self._chained(self.coefficients.prediction_gradient(w, y, u, e))
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> Reparametrised:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        moved = self.parametrisation.at(theta)
+        coefficients = self.coefficients.at(moved.coefficients, covariance)
+        return replace(self, coefficients=coefficients, parametrisation=moved)
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        return self.coefficients.simulate(u, e, step)
+
+    def _chained(self, gradient: ComplexArray) -> ComplexArray:
+        """A gradient (n, K, ..) in the coefficients as one (n, k, ..) in the parameters."""
+        moved = np.moveaxis(gradient, 1, -1) @ self.parametrisation.jacobian
+        return np.asarray(np.moveaxis(moved, -1, 1), dtype=complex)
+
+
+@dataclass(frozen=True)
+class ReparametrisedLoop(Loop):
+    """The loop around the model of the coefficients, whatever its kind."""
+
+    model: Reparametrised
+
+    @cached_property
+    def _loop(self) -> Loop:
+        return close_loop(self.model.coefficients, self.controller)
+
+    @property
+    def closed_poles(self) -> ComplexArray:
+        """All poles of the loop in z."""
+        return self._loop.closed_poles
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction."""
+        return self._loop.predictor_poles
+
+    @property
+    def instantaneous(self) -> Array:
+        """(p + r, p + r): what acts without delay."""
+        return self._loop.instantaneous
+
+    def left_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p + r, p + r): the matrix on the left of `Loop`."""
+        return self._loop.left_at(w)
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """R H (n, p, p)."""
+        return self._loop.noise_at(w)
+
+    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
+        return self._loop.signals(r, e)
+
+
+@close_loop.register
+def _(model: Reparametrised, controller: TransferMatrix) -> ReparametrisedLoop:
+    return ReparametrisedLoop(model, controller)

@@ -1,0 +1,29 @@
+"""The model file that `identify` writes, read for what it says of its estimate."""
+
+from __future__ import annotations
+
+from pydantic import ValidationError
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.specification.models.experiment import Estimated
+from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.yaml.files import read_text
+from inputdesign_cli.specification.yaml.reader import read
+
+
+def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
+    """The block `estimate` of a file that the spec names at `key`; nothing else of the file is shown.
+
+    Raises:
+        SpecError: `bad-model-file`.
+    """
+    try:
+        data = read(read_text(spec.resolve_path(name)), name).data
+        return Estimated.model_validate(data.get("estimate") if isinstance(data, dict) else None)
+    except (SpecError, ValidationError) as error:
+        raise spec.complain(
+            "bad-model-file",
+            f"{name} cannot be read as a model that identify wrote: it has no sound block estimate",
+            hint="name a model.yaml, which holds estimate: {parameters: {..}, covariance: [[..]]}",
+            key=key,
+        ) from error

@@ -1,0 +1,176 @@
+"""Named parameters of a plant, and the expressions in them that stand for coefficients."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import core_schema
+
+from inputdesign_cli.expressions import Expression, ExpressionError, is_name
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.specification.wording import nearest
+from inputdesign_cli.specification.yaml.places import Path
+from inputdesign_cli.specification.yaml.plain import Plain
+from inputdesign_cli.specification.yaml.scalars import clip
+
+
+class TakesExpressions:
+    """Tells the JSON schema that texts may stand in place of numbers, which models see as their values."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Plain]:
+        return _with_texts(handler(schema))
+
+
+def _with_texts(node: Plain) -> Plain:
+    if isinstance(node, list):
+        return [_with_texts(part) for part in node]
+    if not isinstance(node, dict):
+        return node
+    if node.get("type") == "number":
+        return {"anyOf": [node, {"type": "string", "minLength": 1}]}
+    return {key: _with_texts(part) for key, part in node.items()}
+
+
+EXPRESSIONS = TakesExpressions()
+
+Texts = tuple[str, ...]
+TextMatrix = tuple[tuple[Texts, ...], ...]
+
+
+@dataclass(frozen=True)
+class CoefficientTexts:
+    """The coefficients of a plant in s, descending, and its dead times, as expressions entry by entry."""
+
+    numerator: TextMatrix
+    denominator: TextMatrix
+    delay: tuple[Texts, ...]
+
+
+@dataclass(frozen=True)
+class NamedParameter:
+    """A parameter with a name of its own.
+
+    Attributes:
+        label: what the user calls it; `symbol` what it is called in expressions.
+        place: where its value stands, seen from the section of the plant.
+    """
+
+    label: str
+    symbol: str
+    value: float
+    place: Path
+
+
+def values_of(parameters: dict[str, Plain]) -> dict[str, float]:
+    """Named values; one that cannot be read, of which pydantic tells, counts as 1 here."""
+    return {str(name): _number(value) for name, value in parameters.items()}
+
+
+def _number(value: Plain) -> float:
+    usable = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+    return float(value) if usable else 1.0
+
+
+def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
+    """Parameters are called so that expressions can name them."""
+    for name in parameters:
+        if not is_name(name):
+            yield PathDiagnostic(
+                "bad-name",
+                f"{clip(name)} is no name of a parameter",
+                "a name is a letter, then letters, digits and _; functions and pi are taken",
+                ("parameters", name),
+                at_key=True,
+            )
+
+
+def check_used(parameters: Mapping[str, float], texts: Iterable[str]) -> Iterator[PathDiagnostic]:
+    """Something depends on every parameter."""
+    used = frozenset[str]().union(*(Expression(text).names for text in texts))
+    for name in parameters:
+        if name not in used:
+            yield PathDiagnostic(
+                "unused-parameter",
+                f"nothing depends on the parameter {name}",
+                "write it into a coefficient, or remove it",
+                ("parameters", name),
+                at_key=True,
+            )
+
+
+def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list[PathDiagnostic]) -> Plain:
+    """Numbers in place of all texts of a nested value; what is wrong with a text is added to `found`."""
+    if isinstance(value, list | tuple):
+        return [worth(part, parameters, (*path, i), found) for i, part in enumerate(value)]
+    if isinstance(value, dict):
+        return {key: worth(part, parameters, (*path, key), found) for key, part in value.items()}
+    if not isinstance(value, str):
+        return value
+    try:
+        expression = Expression.of(value)
+    except ExpressionError as error:
+        found.append(
+            PathDiagnostic("bad-expression", f"{{key}} {error.message}: {clip(value)}", error.hint, path)
+        )
+        return 1.0
+    unknown = sorted(expression.names - parameters.keys())
+    for name in unknown:
+        near = nearest(name, parameters)
+        hint = f'did you mean "{near}"?' if near else f"add {name} and its value to plant.parameters"
+        found.append(
+            PathDiagnostic("unknown-name", f"{{key}} names {name}, which is no parameter", hint, path)
+        )
+    if unknown:
+        return 1.0
+    number, slope = expression.at(list(parameters), np.array(list(parameters.values()), dtype=float))
+    if math.isfinite(number) and np.all(np.isfinite(slope)):
+        return number
+    what = "has no derivative" if math.isfinite(number) else "has no value"
+    found.append(
+        PathDiagnostic(
+            "undefined-expression",
+            f"{{key}} {what} at the nominal parameters: {clip(value)}",
+            "look for a division by zero, or the root or the logarithm of what is not positive",
+            path,
+        )
+    )
+    return 1.0
+
+
+def texts_in(value: Plain) -> list[str]:
+    """Every text of a nested value."""
+    if isinstance(value, str):
+        return [value]
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    return [found for part in parts for found in texts_in(part)]
+
+
+def text(value: Plain) -> Plain:
+    """A nested value of numbers and expressions with every number as a text."""
+    if isinstance(value, list | tuple):
+        return tuple(text(part) for part in value)
+    return value if isinstance(value, str) else repr(float(value))
+
+
+def product_of(factors: Iterable[Texts]) -> Texts:
+    """The product of polynomials whose coefficients are expressions."""
+    result: Texts = ("1.0",)
+    for factor in factors:
+        sums: list[list[str]] = [[] for _ in range(len(result) + len(factor) - 1)]
+        for i, a in enumerate(result):
+            for j, b in enumerate(factor):
+                sums[i + j].append(f"({a})*({b})")
+        result = tuple(" + ".join(terms) for terms in sums)
+    return result
+
+
+def matrix(value: Plain) -> TextMatrix:
+    """One polynomial as a 1 x 1 matrix; a matrix as it is."""
+    return value if depth(value) == 3 else ((value,),)

@@ -1,0 +1,161 @@
+"""Plants in s as engineers write them: gain, time constant or damping and natural frequency, dead time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from inputdesign_cli.expressions import Expression
+from inputdesign_cli.specification.models.fields import NonNegativeGrid, NumberGrid, PositiveGrid
+from inputdesign_cli.specification.models.named import (
+    EXPRESSIONS,
+    CoefficientTexts,
+    NamedParameter,
+    TextMatrix,
+    Texts,
+    text,
+)
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
+from inputdesign_cli.specification.yaml.plain import Plain
+
+QUANTITIES = ("gain", "time_constant", "damping", "natural_frequency", "dead_time")
+Grid = tuple[tuple[float, ...], ...]
+
+
+class ProcessModel(Section, family="continuous", phrase="a process model"):
+    """gain e^(-dead_time s) / (time_constant s + 1), or of second order by damping and natural_frequency.
+
+    Each is a number, or with several channels rows (outputs) of columns (inputs) of numbers.
+    """
+
+    kind: ClassVar[Literal["process"]] = "process"
+
+    gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
+    time_constant: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+        default=None, description="Time constant, in time_unit, of a plant of first order."
+    )
+    damping: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+        default=None, description="Damping ratio of a plant of second order."
+    )
+    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+        default=None, description="Undamped natural frequency of a plant of second order, rad per time_unit."
+    )
+    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+        default=None, description="Dead time, in time_unit; 0 where there is none."
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """It is of first or of second order, some gain is not zero, and all shapes are that of the gain."""
+        if not self.stated("damping"):
+            yield from self.exactly_one("time_constant", "natural_frequency")
+        for one, other in (("damping", "natural_frequency"), ("natural_frequency", "damping")):
+            if self.stated(one) and not self.stated(other) and not self.stated("time_constant"):
+                message = f'{{key}} of second order needs "{other}"'
+                yield PathDiagnostic("missing-key", message, f"add {other}", keys=(other,))
+        if self.stated("time_constant") and self.stated("damping"):
+            yield from self.at_most_one("time_constant", "damping")
+        if not any(any(row) for row in self.grid("gain")):
+            yield PathDiagnostic("zero-polynomial", "{key} is zero: the input has no effect", "", ("gain",))
+        size = [len(row) for row in self.grid("gain")]
+        for name in self.stated(*QUANTITIES):
+            if [len(row) for row in self.grid(name)] != size or len(set(size)) > 1:
+                hint = "write one number, or rows (outputs) of columns (inputs), for all of them alike"
+                yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
+
+    def grid(self, name: str) -> Grid:
+        """A quantity as rows of columns."""
+        value = self.at(name)
+        return value if isinstance(value, tuple) else ((float(str(value)),),)
+
+    @property
+    def numerator_matrix(self) -> PolynomialMatrix:
+        """The numerators as rows of columns, descending in s."""
+        return self._numbers(self.texts().numerator)
+
+    @property
+    def denominator_matrix(self) -> PolynomialMatrix:
+        """The denominators in the same form."""
+        return self._numbers(self.texts().denominator)
+
+    @property
+    def common(self) -> bool:
+        """Every entry has a denominator of its own."""
+        return False
+
+    @property
+    def delays(self) -> Grid:
+        """Dead times as rows of columns; 0 where there is none."""
+        if self.dead_time is None:
+            return tuple(tuple(0.0 for _ in row) for row in self.grid("gain"))
+        return self.grid("dead_time")
+
+    @property
+    def common_delay(self) -> bool:
+        """Every entry has a dead time of its own."""
+        return False
+
+    def own_parameters(self) -> tuple[NamedParameter, ...]:
+        """The quantities, entry by entry; not those of an entry of gain zero, nor dead times of zero."""
+        single = depth(self.gain) == 0
+        found = []
+        for name in self.stated(*QUANTITIES):
+            for i, row in enumerate(self.grid(name)):
+                for j, value in enumerate(row):
+                    if self.grid("gain")[i][j] == 0.0 or (name == "dead_time" and value == 0.0):
+                        continue
+                    label = name if single else f"{name}[{i + 1},{j + 1}]"
+                    place = ("continuous", name) if single else ("continuous", name, i, j)
+                    found.append(NamedParameter(label, self._symbol(name, i, j), value, place))
+        return tuple(found)
+
+    def texts(self, written: Mapping[str, Plain] | None = None) -> CoefficientTexts:
+        """Its coefficients as expressions in its own parameters.
+
+        Args:
+            written: the section, where its values are expressions in other parameters.
+        """
+
+        def of(name: str, i: int, j: int) -> str:
+            if written is None:
+                return self._symbol(name, i, j)
+            value = written[name]
+            return f"({text(value[i][j] if isinstance(value, list | tuple) else value)})"
+
+        above, below, delays = [], [], []
+        for i, row in enumerate(self.grid("gain")):
+            entries = [self._entry(of, i, j) if gain else (("0.0",), ("1.0",)) for j, gain in enumerate(row)]
+            above.append(tuple(top for top, _ in entries))
+            below.append(tuple(bottom for _, bottom in entries))
+            delays.append(
+                tuple(of("dead_time", i, j) if self._delayed(i, j) else "0.0" for j in range(len(row)))
+            )
+        return CoefficientTexts(tuple(above), tuple(below), tuple(delays))
+
+    def _entry(self, of: Callable[[str, int, int], str], i: int, j: int) -> tuple[Texts, Texts]:
+        """Numerator and denominator of an entry, descending in s."""
+        if self.time_constant is not None:
+            return (of("gain", i, j),), (of("time_constant", i, j), "1.0")
+        gain, damping, w = (of(name, i, j) for name in ("gain", "damping", "natural_frequency"))
+        return (f"{gain}*{w}**2",), ("1.0", f"2*{damping}*{w}", f"{w}**2")
+
+    def _delayed(self, i: int, j: int) -> bool:
+        """Whether an entry has a dead time, as a number that is not zero."""
+        return self.delays[i][j] != 0.0
+
+    def _numbers(self, rows: TextMatrix) -> PolynomialMatrix:
+        """The values of such expressions."""
+        own = self.own_parameters()
+        symbols, values = [one.symbol for one in own], np.array([one.value for one in own])
+        return tuple(
+            tuple(tuple(Expression(term).at(symbols, values)[0] for term in entry) for entry in row)
+            for row in rows
+        )
+
+    @staticmethod
+    def _symbol(name: str, i: int, j: int) -> str:
+        return f"{name}_{i + 1}_{j + 1}"

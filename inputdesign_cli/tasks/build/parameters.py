@@ -1,0 +1,152 @@
+"""Spec -> what is estimated: coefficients, some of them known, or named parameters that they follow from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.expressions import Expression
+from inputdesign_cli.plant import (
+    ContinuousModel,
+    Model,
+    Parameter,
+    Parametrisation,
+    PolynomialModel,
+    Reparametrised,
+    SampledModel,
+    Words,
+)
+from inputdesign_cli.plant.model import DELAY
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial_model import Rows
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
+
+_Coefficients = PolynomialModel | ContinuousModel | SampledModel
+
+
+def delays_of(plant: ContinuousPlant) -> Rows:
+    """A list of one dead time for each entry that has one, empty lists for the others; empty if none has.
+
+    An entry has one where it is not zero, or an expression.
+    """
+    values = plant.continuous.delays
+    texts = plant.texts.delay if plant.named_parameters else None
+    rows = tuple(
+        tuple(
+            np.array([value] if value or (texts and Expression(texts[i][j]).names) else [])
+            for j, value in enumerate(row)
+        )
+        for i, row in enumerate(values)
+    )
+    return rows if any(entry.size for row in rows for entry in row) else ()
+
+
+def reparametrised(spec: Spec, plant: PolynomialPlant | ContinuousPlant, model: _Coefficients) -> Model:
+    """The model in the parameters that the spec names and without those that it knows.
+
+    Raises:
+        SpecError: `unknown-parameter`, `nothing-to-estimate`, or `unused-parameter`.
+    """
+    named, known = plant.named_parameters, (*(plant.known or ()), *(spec.noise.known or ()))
+    if not named and not known:
+        return model
+    parameters = model.parameters
+    in_noise = [p.name for p in parameters if p.letter in "cd"]
+    own = [one.label for one in named] or [p.name for p in parameters if p.letter not in "cd"]
+    for key, listed, all_ in (("plant.known", plant.known, own), ("noise.known", spec.noise.known, in_noise)):
+        for name in listed or ():
+            check_known(spec, all_, name, key)
+    words = Words(known={"plant": tuple(plant.known or ()), "noise": tuple(spec.noise.known or ())})
+    if not named:
+        found = Parametrisation.identity(model.names, model.theta, known)
+    else:
+        found = _of_named(spec, plant, parameters)
+        words = Words(plant.written, {one.label: one.place for one in named}, words.known)
+    if not np.any(found.free):
+        raise spec.complain(
+            "nothing-to-estimate",
+            "every parameter of the model is known",
+            hint="take those out of known that the experiment is to find",
+            key="plant.known",
+        )
+    return Reparametrised(model, found, words)
+
+
+def _of_named(
+    spec: Spec, plant: PolynomialPlant | ContinuousPlant, parameters: Sequence[Parameter]
+) -> Parametrisation:
+    """The named parameters of the plant, and those of the noise as they are."""
+    named = plant.named_parameters
+    noise = [p for p in parameters if p.letter in "cd"]
+    symbols = {p.name: f"noise_{i}" for i, p in enumerate(noise)}
+    terms = [symbols[p.name] if p.letter in "cd" else _term(plant, p) for p in parameters]
+    labels = (*(one.label for one in named), *symbols)
+    known = (*(plant.known or ()), *(spec.noise.known or ()))
+    made = Parametrisation(
+        labels,
+        (*(one.symbol for one in named), *symbols.values()),
+        np.array([*(one.value for one in named), *(p.value for p in noise)]),
+        np.ones(len(labels), dtype=bool),
+        tuple(Expression(term) for term in terms),
+    )
+    for label, moves in zip(labels, np.any(made.jacobian != 0.0, axis=0), strict=True):
+        if not moves:
+            raise spec.complain(
+                "unused-parameter",
+                f"no coefficient that is estimated changes with {label} at the nominal parameters",
+                hint="look for a factor that is zero there, or a leading coefficient that vanishes",
+                key="plant.parameters",
+            )
+    return Parametrisation(
+        made.labels, made.symbols, made.values, np.array([x not in known for x in labels]), made.terms
+    )
+
+
+def _term(plant: PolynomialPlant | ContinuousPlant, parameter: Parameter) -> str:
+    """A coefficient of the model as an expression in the named parameters of the plant."""
+    i, j = parameter.places[0]
+    if plant.kind == "polynomial":
+        return plant.coefficients(parameter.letter, i, j)[parameter.power]
+    texts = plant.texts
+    if parameter.letter == DELAY:
+        return texts.delay[i][j]
+    below = texts.denominator[i][j]
+    entry = texts.numerator[i][j] if parameter.letter == "b" else below
+    return f"({entry[-1 - parameter.power]})/({below[0]})"
+
+
+def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:
+    """Raise `SpecError` (`unknown-parameter`) for the name of a parameter that the model does not have."""
+    if name not in known:
+        of_plant = spec.plant.known if spec.plant.kind != "regression" else None
+        fixed = name in (*(of_plant or ()), *(spec.noise.known or ())) and not key.endswith("known")
+        raise spec.complain(
+            "unknown-parameter",
+            f"{name} is known: it is not estimated" if fixed else f'the model has no parameter "{name}"',
+            hint=f"its parameters are {', '.join(known)}" if known else "it has none here",
+            key=key,
+        )
+
+
+def embedded(spec: Spec, known: Sequence[str], matrix: Array, names: Sequence[str] | None, key: str) -> Array:
+    """A matrix over some named parameters (all, when none are named) as one over all `known`: (k, k).
+
+    Raises:
+        SpecError: `unknown-parameter` or `wrong-shape`.
+    """
+    for name in names or ():
+        check_known(spec, known, name, key)
+    listed = tuple(names or known)
+    if len(matrix) != len(listed):
+        raise spec.complain(
+            "wrong-shape",
+            f"the matrix is {len(matrix)} x {len(matrix)}, but there are {len(listed)} parameters",
+            hint=f"order its rows as {', '.join(known)}, or name its parameters",
+            key=key,
+        )
+    full = np.zeros((len(known), len(known)))
+    index = [list(known).index(name) for name in listed]
+    full[np.ix_(index, index)] = matrix
+    return full

@@ -1,0 +1,58 @@
+"""frequency_response.csv: what the data say of G without a model, beside what the model says."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inputdesign_cli.identification import FrequencyResponse
+from inputdesign_cli.plant import Model
+from inputdesign_cli.runs.results import Array, Json, ResponseCurves, ResponsePanel, Table
+from inputdesign_cli.runs.units import Units
+
+_BY_U = (
+    "the frequency response without a model is from u to y in a loop: where the noise is strong it is drawn "
+    "towards -1/C; record the reference as column r, and it is estimated from r"
+)
+
+
+def response_of_data(
+    units: Units, model: Model, found: FrequencyResponse, *, by_reference: bool
+) -> tuple[Table, ResponseCurves, dict[str, Json]]:
+    """The table, its figure, and what `assessment.frequency_response` says of it.
+
+    Args:
+        model: the estimate that it stands beside.
+        by_reference: whether a reference from outside was used.
+    """
+    w = found.frequency / units.sample_time
+    G = model.plant_at(w * units.frequency)
+    columns: dict[str, Array] = {units.frequency_header: w}
+    panels, outside = [], np.zeros(w.size, dtype=bool)
+    for i in range(units.outputs):
+        for j in range(units.inputs):
+            own, radius, modelled = found.G[:, i, j], found.radius[:, i, j], G[:, i, j]
+            listed = {"G_re": own.real, "G_im": own.imag, "G_abs": np.abs(own), "radius": radius}
+            listed["model_abs"] = np.abs(modelled)
+            columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
+            entry = None if units.single else (i, j)
+            panels.append(ResponsePanel(w, np.abs(own), radius, np.abs(modelled), entry))
+            outside |= np.abs(own - modelled) > radius
+    told: dict[str, Json] = {
+        "method": found.method,
+        "excitation": "r" if by_reference else "u",
+        "frequencies": int(w.size),
+        "model_outside": float(np.mean(outside)),
+    }
+    if units.closed_loop and not by_reference:
+        told["caveat"] = _BY_U
+    return Table(columns), ResponseCurves(tuple(panels)), told
+
+
+def response_note(told: dict[str, Json]) -> list[str]:
+    """What a user should know of it, in sentences."""
+    share = told["model_outside"]
+    sentence = (
+        "frequency_response.csv has what the data say of G without a model, with discs of 95 %: the model is "
+        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies"
+    )
+    return [sentence, *([told["caveat"]] if "caveat" in told else [])]

@@ -1,0 +1,92 @@
+"""An earlier estimate counts as the data that it came from."""
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from inputdesign_cli.identification import Earlier, identify, identify_polynomials
+from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
+from tests.support.plants import arx
+from tests.support.records import shifted, simulated
+
+ARX = PolynomialModel.single([0, 1.0, 0.5], A=[1, -1.2, 0.5], variance=0.3)
+JENKINS = PolynomialModel.single([0, 1.0], F=[1, -0.8], C=[1, 0.4], D=[1, -0.6], variance=0.2)
+
+
+def of(found):
+    return Earlier(found.theta, found.information)
+
+
+def test_arx_with_known_noise_is_ridge_regression():
+    rng = np.random.default_rng(1)
+    u, y = (x[0] for x in simulated(ARX, 60, rng))
+    root = rng.standard_normal((4, 4))
+    earlier = Earlier(ARX.theta + 0.1 * rng.standard_normal(4), 50.0 * root @ root.T)
+    found = identify_polynomials(ARX, u, y, noise=[[0.3]], rest=True, earlier=earlier)
+    phi = np.array([shifted(-y[:, 0], 1), shifted(-y[:, 0], 2), shifted(u[:, 0], 1), shifted(u[:, 0], 2)]).T
+    information = phi.T @ phi / 0.3 + earlier.information
+    right = phi.T @ y[:, 0] / 0.3 + earlier.information @ earlier.theta
+    np.testing.assert_allclose(found.theta, np.linalg.solve(information, right), rtol=1e-8)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(information), rtol=1e-8)
+    alone = np.linalg.lstsq(phi, y[:, 0], rcond=None)[0]
+    both = np.linalg.inv(phi.T @ phi / 0.3) + np.linalg.inv(earlier.information)
+    statistic = (alone - earlier.theta) @ np.linalg.solve(both, alone - earlier.theta)
+    assert found.agreement == pytest.approx(scipy.stats.chi2.sf(statistic, 4), rel=1e-6)
+
+
+@pytest.mark.parametrize("model", [ARX, arx()], ids=["one channel", "two by two"])
+def test_one_record_after_the_other_is_both_at_once(model):
+    rng = np.random.default_rng(2)
+    u, y = simulated(model, 150, rng, runs=2)
+    known = {"noise": model.covariance, "rest": True}
+    first = identify_polynomials(model, u[0], y[0], **known)
+    then = identify_polynomials(model, u[1], y[1], **known, earlier=of(first))
+    joint = identify_polynomials(model, np.concatenate(u), np.concatenate(y), **known, lengths=[150, 150])
+    np.testing.assert_allclose(then.theta, joint.theta, atol=1e-7)
+    np.testing.assert_allclose(then.information, joint.information, rtol=1e-8, atol=1e-6)
+
+
+def test_the_same_of_box_and_jenkins_in_the_limit():
+    u, y = simulated(JENKINS, 3000, np.random.default_rng(3), runs=2)
+    first = identify(JENKINS, u[0], y[0], rest=True)
+    then = identify(JENKINS, u[1], y[1], rest=True, earlier=of(first))
+    joint = identify(JENKINS, np.concatenate(u), np.concatenate(y), rest=True, lengths=[3000, 3000])
+    deviation = np.sqrt(np.diag(joint.covariance))
+    assert np.all(np.abs(then.theta - joint.theta) < 0.15 * deviation)
+    np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)
+
+
+def test_the_same_in_s():
+    between = Intersample(0.4, hold=False)
+    model = ContinuousModel.monic(((np.array([2.0]),),), ((np.array([1.0, 0.8, 1.0]),),), np.eye(1))
+    rng = np.random.default_rng(4)
+    u = rng.standard_normal((2, 800, 1))
+    y = np.array([model.driven(x, between) for x in u])
+    y = y + 0.3 * rng.standard_normal(y.shape)
+    first = identify(model, u[0], y[0], 0.4, rest=True)
+    then = identify(model, u[1], y[1], 0.4, rest=True, earlier=of(first))
+    joint = identify(model, np.concatenate(u), np.concatenate(y), 0.4, rest=True, lengths=[800, 800])
+    deviation = np.sqrt(np.diag(joint.covariance))
+    assert np.all(np.abs(then.theta - joint.theta) < 0.15 * deviation)
+    np.testing.assert_allclose(np.sqrt(np.diag(then.covariance)), deviation, rtol=0.05)
+
+
+def test_knowing_nothing_changes_nothing():
+    u, y = (x[0] for x in simulated(JENKINS, 400, np.random.default_rng(5)))
+    plain = identify(JENKINS, u, y)
+    nothing = identify(JENKINS, u, y, earlier=Earlier(JENKINS.theta, np.zeros((4, 4))))
+    np.testing.assert_allclose(nothing.theta, plain.theta, atol=1e-6)
+    np.testing.assert_allclose(nothing.covariance, plain.covariance, rtol=1e-5)
+    assert nothing.agreement == 1.0
+    assert plain.agreement is None
+
+
+def test_what_is_known_of_some_parameters_makes_up_for_excitation():
+    u = np.sin(0.7 * np.arange(300))[:, None]
+    model = PolynomialModel.single([0, 1, 1, 1])
+    y = np.array([shifted(u[:, 0], lag) * b for lag, b in ((1, 1.0), (2, 0.5), (3, 0.2))]).sum(axis=0)
+    y = y[:, None] + 0.1 * np.random.default_rng(6).standard_normal((300, 1))
+    information = np.zeros((3, 3))
+    information[2, 2] = 1e6
+    found = identify(model, u, y, rest=False, earlier=Earlier(np.array([0, 0, 0.2]), information))
+    np.testing.assert_allclose(found.theta, [1.0, 0.5, 0.2], atol=0.06)

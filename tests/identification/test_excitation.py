@@ -1,0 +1,110 @@
+"""Good data are never refused for rounding, poor ones always are, and units change no answer."""
+
+import numpy as np
+import pytest
+import scipy.signal
+from hypothesis import given, settings, strategies as st
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import identify
+from inputdesign_cli.plant import ContinuousModel, Intersample, PolynomialModel
+from tests.support.records import simulated
+
+# A slow pole and noise that nearly vanishes at low frequency: scaled, eigenvalues of M are 1e13 apart.
+SLOW = PolynomialModel.single(
+    [0, 0, 0, 2.2, -0.84, 0.086], F=[1, -2.0885, 1.4, -0.3073], C=[1, -0.98], variance=0.07
+)
+DECADES = st.integers(-6, 6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_collinear_gradients_are_no_lack_of_excitation(seed):
+    u, y = simulated(SLOW, 400, np.random.default_rng(seed))
+    found = identify(SLOW, u[0], y[0])
+    (B,), (F,), C = SLOW.B[0], SLOW.F[0], SLOW.C[0]
+    e = scipy.signal.lfilter([1.0], C, y[0, :, 0] - scipy.signal.lfilter(B, F, u[0, :, 0]))
+    # the likelihood ratio to the truth is chi-squared with 7 degrees of freedom: 40 is one in a million
+    assert 0.0 <= 400 * np.log(e @ e / np.sum(found.errors**2)) < 40
+
+
+def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
+    u, y = simulated(SLOW, 400, np.random.default_rng(0))
+    found = identify(SLOW, u[0], y[0])
+    theta = [float(x) for x in found.theta]
+    B, C, F = [0.0, 0.0, 0.0, *theta[:3]], [1.0, theta[3]], [1.0, *theta[4:]]
+    filtered = scipy.signal.lfilter([1], np.convolve(C, F), u[0, :, 0])
+    second = -scipy.signal.lfilter(np.convolve(B, [1]), F, filtered)
+    errors = scipy.signal.lfilter([1], C, y[0, :, 0] - scipy.signal.lfilter(B, F, u[0, :, 0]))
+    third = scipy.signal.lfilter([1], C, errors)
+
+    def delayed(x, lag):
+        return np.concatenate([np.zeros(lag), x[: x.size - lag]])
+
+    lags = [(filtered, 3), (filtered, 4), (filtered, 5), (third, 1), (second, 1), (second, 2), (second, 3)]
+    psi = np.array([delayed(x, lag) for x, lag in lags]).T
+    half = np.linalg.inv(np.linalg.qr(psi, mode="r"))
+    expected = found.noise[0, 0] * half @ half.T
+    np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
+
+
+@settings(max_examples=6, deadline=None)
+@given(of_u=DECADES, of_y=DECADES)
+@pytest.mark.parametrize("rest", [True, False])
+def test_units_of_signals_change_no_answer(rest, of_u, of_y):
+    u, y = simulated(SLOW, 400, np.random.default_rng(4))
+    one = identify(SLOW, u[0], y[0], start=SLOW.theta, rest=rest)
+    scale = np.where([name[0] == "b" for name in one.names], 10.0 ** (of_y - of_u), 1.0)
+    other = identify(SLOW, 10.0**of_u * u[0], 10.0**of_y * y[0], start=scale * SLOW.theta, rest=rest)
+    deviation = np.sqrt(np.diag(one.covariance))
+    np.testing.assert_allclose(other.theta / scale, one.theta, atol=1e-3 * deviation.min())
+    np.testing.assert_allclose(np.sqrt(np.diag(other.covariance)) / scale, deviation, rtol=1e-3)
+    assert [test.name for test in other.failed] == [test.name for test in one.failed]
+
+
+@settings(max_examples=4, deadline=None)
+@given(of_time=st.integers(-4, 4), of_y=DECADES)
+@pytest.mark.parametrize("rest", [True, False])
+def test_the_unit_of_time_changes_no_answer(rest, of_time, of_y):
+    rng = np.random.default_rng(5)
+    u = rng.standard_normal((600, 1))
+    found = []
+    for unit, gain in ((1.0, 1.0), (10.0**of_time, 10.0**of_y)):
+        # 2 / (s^2 + s + 1) with time counted in other units
+        numerator, denominator = np.array([2.0 * gain * unit**2]), np.array([unit**2, unit, 1.0])
+        model = ContinuousModel.monic(((numerator,),), ((denominator,),), np.eye(1))
+        between = 0.3 / unit
+        y = model.driven(u, Intersample(between, hold=False))
+        noise = 0.05 * gain * np.random.default_rng(6).standard_normal(y.shape)
+        one = identify(model, u, y + noise, between, start=model.theta, rest=rest)
+        found.append((one.theta / model.theta, np.sqrt(np.diag(one.covariance)) / np.abs(model.theta)))
+    np.testing.assert_allclose(found[1][0], found[0][0], atol=1e-3 * found[0][1].min())
+    np.testing.assert_allclose(found[1][1], found[0][1], rtol=1e-3)
+
+
+@settings(max_examples=6, deadline=None)
+@given(of_u=DECADES, of_y=DECADES)
+@pytest.mark.parametrize("kind", ["a sinusoid too few", "two inputs as one", "feedback alone"])
+def test_data_that_cannot_tell_are_refused_in_any_unit(kind, of_u, of_y):
+    rng = np.random.default_rng(7)
+    e = 0.1 * rng.standard_normal(300)
+    match kind:
+        case "a sinusoid too few":
+            u = np.sin(0.7 * np.arange(300))[:, None]
+            model, rest = PolynomialModel.single([0, 1, 1, 1]), False
+            y = scipy.signal.lfilter([0, 1, 0.5, 0.2], [1], u[:, 0]) + e
+        case "two inputs as one":
+            u = rng.standard_normal(300)[:, None] * [1.0, 3.0]
+            model, rest = _two_inputs(), None
+            y = scipy.signal.lfilter([0, 1], [1, -0.7], u[:, 0]) + e
+        case _:
+            y = scipy.signal.lfilter([1], [1, -0.4, 0.2], e)
+            u = np.concatenate([[0.0], -0.3 * y[:-1]])[:, None]
+            model, rest = PolynomialModel.single([0, 1], A=[1, 0, 0]), None
+    with pytest.raises(SpecError) as caught:
+        identify(model, 10.0**of_u * u, 10.0**of_y * y[:, None], rest=rest)
+    assert caught.value.diagnostics[0].code == "not-exciting"
+
+
+def _two_inputs():
+    one, entry, pole = np.ones(1), np.array([0.0, 1.0]), np.array([1.0, -0.7])
+    return PolynomialModel(((entry, entry),), (pole,), ((one, one),), (one,), (one,), np.eye(1))

@@ -1,0 +1,98 @@
+"""The frequency response without a model: exact at lines, unbiased, and its discs hold what they say."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.identification import frequency_response
+
+B, F = [0, 1.0, 0.4], [1, -1.2, 0.6]
+
+
+def plant(w):
+    return scipy.signal.freqz(B, F, worN=w)[1]
+
+
+def test_lines_of_a_periodic_input_without_noise_are_exact():
+    rng = np.random.default_rng(1)
+    lines = np.array([1, 4, 9, 20, 31])
+    angle = 2 * np.pi * np.outer(np.arange(640), lines) / 64
+    u = np.cos(angle + rng.uniform(0, 6, 5)).sum(axis=1)
+    y = scipy.signal.lfilter(B, F, u)
+    found = frequency_response(u[:, None], y[:, None])
+    assert found.method == "lines"
+    np.testing.assert_allclose(found.frequency, 2 * np.pi * lines / 64)
+    # what is left of the transient after the first of ten periods: 0.775^64
+    np.testing.assert_allclose(found.G[:, 0, 0], plant(found.frequency), atol=1e-7)
+    assert found.radius.max() < 1e-6
+
+
+def test_mean_and_variance_at_lines_are_those_of_theory():
+    """Of P periods without the first the variance is Phi_v / ((P - 1) N |U|^2), noise of variance Phi_v."""
+    period = np.random.default_rng(2).choice([-1.0, 1.0], 32)
+    u, power = np.tile(period, 7), 0.3
+    caused = scipy.signal.lfilter(B, F, u)
+    errors, inside = [], []
+    for seed in range(200):
+        noise = np.sqrt(power) * np.random.default_rng(100 + seed).standard_normal(u.size)
+        found = frequency_response(u[:, None], (caused + noise)[:, None])
+        errors.append(found.G[:, 0, 0] - plant(found.frequency))
+        inside.append(np.abs(errors[-1]) < found.radius[:, 0, 0])
+    lines = np.abs(np.fft.rfft(period))[1:16] ** 2
+    variance = np.mean(np.abs(errors) ** 2, axis=0)
+    np.testing.assert_allclose(np.mean(variance * lines), power * 32 / 6, rtol=0.06)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+
+
+def test_white_noise_in_gives_the_plant_within_its_discs():
+    errors, inside = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal(1000)
+        y = scipy.signal.lfilter(B, F, u) + 0.5 * scipy.signal.lfilter(
+            [1], [1, -0.5], rng.standard_normal(1000)
+        )
+        # a record cut out of a longer one: its start is unknown
+        found = frequency_response(u[500:, None], y[500:, None])
+        assert found.method == "local_polynomial"
+        errors.append(found.G[:, 0, 0] - plant(found.frequency))
+        inside.append(np.abs(errors[-1]) < found.radius[:, 0, 0])
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+    mean, deviation = np.mean(errors, axis=0), np.std(errors, axis=0)
+    assert np.mean(np.abs(mean) ** 2 / (deviation**2 / 40)) == pytest.approx(1.0, abs=0.35)
+
+
+def test_two_inputs_and_two_records():
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal((1300, 2))
+    y = np.stack([scipy.signal.lfilter([0, 1], [1, -0.5], u[:, 0]) + 0.5 * u[:, 1], -2.0 * u[:, 1]], axis=1)
+    found = frequency_response(u, y + 0.1 * rng.standard_normal(y.shape), lengths=[800, 500])
+    z = np.exp(-1j * found.frequency)
+    zero = np.zeros_like(z)
+    truth = np.array([[z / (1 - 0.5 * z), zero + 0.5], [zero, zero - 2.0]]).transpose(2, 0, 1)
+    assert np.mean(np.abs(found.G - truth) < found.radius) == pytest.approx(0.95, abs=0.03)
+
+
+def test_in_a_loop_the_reference_keeps_the_noise_out():
+    """By u alone the estimate is drawn towards -1/C where the noise is strong."""
+    rng = np.random.default_rng(4)
+    r, e = rng.standard_normal(4000), 2.0 * rng.standard_normal(4000)
+    u, y = np.zeros(4000), np.zeros(4000)
+    for t in range(4000):
+        y[t] = 0.7 * y[t - 1] + u[t - 1] + e[t] - 0.7 * e[t - 1] if t else e[t]
+        u[t] = r[t] - 0.4 * y[t]
+    z = np.exp(-1j * frequency_response(u[:, None], y[:, None]).frequency)
+    truth = z / (1 - 0.7 * z)
+    by_r = frequency_response(u[:, None], y[:, None], r[:, None])
+    by_u = frequency_response(u[:, None], y[:, None])
+    within = [np.mean(np.abs(one.G[:, 0, 0] - truth) < one.radius[:, 0, 0]) for one in (by_r, by_u)]
+    assert within[0] > 0.9
+    assert within[1] < 0.6
+
+
+def test_too_little_tells_nothing():
+    u = np.random.default_rng(5).standard_normal((20, 1))
+    assert frequency_response(u, u) is None
+    sinusoid = np.sin(0.3 * np.arange(300))[:, None]
+    found = frequency_response(sinusoid, sinusoid)
+    assert found is None or np.all(np.isfinite(found.radius))

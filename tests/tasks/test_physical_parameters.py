@@ -1,0 +1,181 @@
+"""Known and named parameters and dead times: one plant in several words is one design."""
+
+import json
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, simulate, solve
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.identification import identify
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.result.blocks import blocks_of
+
+REST = """
+sample_time: 0.5
+noise: {variance: 0.1}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.1, band: [0.05, 1.5]}}
+spectrum: {type: fir, order: 8}
+solver: {tolerance: 1.0e-10}
+"""
+# One plant: by its gain, time constant and dead time, by expressions, and by its coefficients.
+WORDS = {
+    "process": "{continuous: {gain: 2.0, time_constant: 3.0, dead_time: 1.685}, sample: zoh}",
+    "named": "{parameters: {K: 2.0, T: 3.0, L: 1.685}, sample: zoh, "
+    "continuous: {numerator: [K], denominator: [T, 1], delay: L}}",
+    "logarithms": "{parameters: {lnK: 0.6931471805599453, r: 0.3333333333333333, L: 16.85}, sample: zoh, "
+    "continuous: {numerator: [exp(lnK)*r], denominator: [1, r], delay: L/10}}",
+    "coefficients": "{continuous: {numerator: [2.0], denominator: [3.0, 1], delay: 1.685}, sample: zoh}",
+}
+SECOND = {
+    "process": "{continuous: {gain: 2, damping: 0.4, natural_frequency: 0.8, dead_time: 1}, sample: zoh}",
+    "coefficients": "{continuous: {numerator: [1.28], denominator: [1, 0.64, 0.64], delay: 1}, sample: zoh}",
+}
+IN_Q = {
+    "named": "{parameters: {g: 0.3, p: 0.8}, B: [0, 0, g], F: [1, -p]}",
+    "logarithms": "{parameters: {g: 0.3, T: 4.481420117724551}, B: [0, 0, g], F: [1, -exp(-1/T)]}",
+    "coefficients": "{B: [0, 0, 0.3], F: [1, -0.8]}",
+}
+
+
+def spec_of(plant, rest=REST) -> Spec:
+    return parse_spec(f"plant: {plant}\n{rest}")
+
+
+def designed(plant):
+    found = solve(spec_of(plant))
+    bound = found.tables["bound"]
+    return found.result, np.array(bound.columns["r_u"] if hasattr(bound, "columns") else bound["r_u"])
+
+
+@pytest.mark.parametrize("words", [WORDS, SECOND, IN_Q], ids=["first order", "second order", "in q"])
+def test_reparametrisation_changes_neither_cost_nor_error(words):
+    first, *others = (designed(plant) for plant in words.values())
+    for result, r_u in others:
+        assert result["cost"] == pytest.approx(first[0]["cost"], rel=1e-9)
+        np.testing.assert_allclose(r_u, first[1], rtol=1e-6)
+
+
+def test_the_error_of_one_spectrum_is_the_same_in_all_words():
+    """Without a solver in between: r_u^2 is the largest eigenvalue of T M^-1 T^T."""
+    w, found = np.array([0.03, 0.3, 0.9]), []
+    for plant in WORDS.values():
+        experiment = Experiment(build_model(spec_of(plant)), 300).whitened(1.0)
+        rows = experiment.plant_gradient(w)[:, :, 0, 0]
+        stacked = np.stack([rows.real, rows.imag], axis=1)
+        found.append(np.linalg.eigvalsh(stacked @ stacked.swapaxes(1, 2))[:, -1])
+    np.testing.assert_allclose(found, np.broadcast_to(found[0], np.shape(found)), rtol=1e-9)
+
+
+def test_information_of_a_dead_time_is_that_of_the_closed_form():
+    """G = e^(-tau s) alone: M = N / sigma^2 (1/2 pi) int w^2 Phi, power P flat over [-W, W]: N P W^2 / 3."""
+    text = (
+        "plant: {continuous: {numerator: [1], denominator: [1], delay: 0.7}, known: [b0]}\n"
+        "noise: {variance: 0.1}\nexperiment: {samples: 300}\nlimits: {band: [0, 2]}\nsample_time: 0.5\n"
+        "accuracy: {standard_deviation: {delay: 0.01}}\nspectrum: {type: white}"
+    )
+    power = solve(parse_spec(text)).result["cost"]
+    assert power == pytest.approx(0.1 / (300 * 2.0**2 / 3.0 * 0.01**2), rel=1e-9)
+
+
+def record_of(model, samples=600, seed=0):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], (samples // 4, model.inputs)), 4, axis=0)
+    e = rng.normal(size=(samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    return u, sum(model.simulate(u, e, 1.0))
+
+
+@pytest.mark.parametrize("nominal", ["[2.0, 3.0, 1.685]", "[1.0, 8.0, 9.0]"])
+def test_gain_time_constant_and_dead_time_are_found_from_afar(nominal):
+    """Within four standard deviations, whatever the nominal values."""
+    words = dict(zip(("gain", "time_constant", "dead_time"), json.loads(nominal), strict=True))
+    truth = build_model(spec_of(WORDS["process"]))
+    start = build_model(spec_of(json.dumps({"continuous": words, "sample": "zoh"})))
+    u, y = record_of(truth)
+    found = identify(start, u, y, start=start.theta)
+    assert found.names == ("gain", "time_constant", "dead_time")
+    deviation = np.abs(found.theta - truth.theta) / np.sqrt(np.diag(found.covariance))
+    assert np.all(deviation < 4.0)
+    assert found.failed == ()
+
+
+def test_what_is_known_keeps_its_value():
+    plant = "{B: [0, 1.0, 0.5], F: [1, -0.7], known: [b2]}"
+    rest = "noise: {C: [1, 0.4], variance: 0.1, known: [c1]}\nexperiment: {samples: 300}\n"
+    model = build_model(parse_spec(f"plant: {plant}\n{rest}", design=False))
+    u, y = record_of(model)
+    found = identify(model, u, y, start=model.theta)
+    assert found.names == ("b1", "f1")
+    fitted = model.at(found.theta).coefficients
+    assert (fitted.B[0][0][2], fitted.C[0][1]) == (0.5, 0.4)
+    assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [
+        *WORDS.values(),
+        *IN_Q.values(),
+        "{B: [0, 1, 0.5], F: [1, -0.5], known: [f1]}",
+        "{continuous: {gain: [[1, 0], [2, 3]], time_constant: [[1, 1], [2, 3]], "
+        'dead_time: [[1, 0], [0, 3]]}, sample: zoh, known: ["gain[2,1]"]}',
+        "{continuous: {numerator: [[[1]], [[2]]], denominator: [2, 1], delay: 0.7}, sample: zoh}",
+    ],
+)
+def test_the_words_of_a_model_are_read_back(plant):
+    """What `identify` writes is the model that it found."""
+    rest = "noise: {variance: 0.1}\nsample_time: 0.5\n"
+    model = build_model(parse_spec(f"plant: {plant}\n{rest}", design=False))
+    moved = model.at(1.01 * model.theta)
+    text = "\n".join(f"{key}: {json.dumps(block)}" for key, block in blocks_of(moved).items())
+    again = build_model(parse_spec(f"{text}\nsample_time: 0.5", design=False))
+    assert again.names == model.names
+    np.testing.assert_allclose(again.theta, moved.theta, rtol=1e-12)
+    w = np.array([0.1, 1.0])
+    np.testing.assert_allclose(again.plant_at(w), moved.plant_at(w), rtol=1e-12)
+
+
+def test_a_study_estimates_the_named_parameters():
+    spec = spec_of(WORDS["process"], REST + "simulation: {runs: 20, seed: 1}\n")
+    found = simulate(spec).result["simulation"]["inputs"]["design"]
+    assert set(found["mean_estimate"]) == {"gain", "time_constant", "dead_time"}
+    low, high = found["covariance_eigenvalues"][0], found["covariance_eigenvalues"][-1]
+    assert 0.2 < low < high < 4.0
+
+
+BAD = [
+    ("unknown-name", "{parameters: {K: 1, T: 2}, continuous: {numerator: [Kp], denominator: [T, 1]}}"),
+    ("unused-parameter", "{parameters: {K: 1, T: 2}, continuous: {numerator: [K], denominator: [3, 1]}}"),
+    (
+        "unused-parameter",
+        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*z, K], denominator: [3, 1]}}",
+    ),
+    ("undefined-expression", "{parameters: {K: 0}, continuous: {numerator: [1/K], denominator: [3, 1]}}"),
+    ("bad-expression", "{parameters: {K: 1}, continuous: {numerator: ['K^2'], denominator: [3, 1]}}"),
+    ("bad-name", "{parameters: {exp: 1}, continuous: {numerator: [exp], denominator: [3, 1]}}"),
+    ("out-of-range", "{parameters: {L: -1}, continuous: {numerator: [1], denominator: [3, 1], delay: L}}"),
+    ("delay-beyond-record", "{continuous: {gain: 1, time_constant: 1, dead_time: 151}}"),
+    ("wrong-shape", "{continuous: {gain: 1, time_constant: [[1, 2]]}}"),
+    ("conflicting-keys", "{continuous: {gain: 1, time_constant: 1, damping: 0.1, natural_frequency: 1}}"),
+    ("missing-key", "{continuous: {gain: 1, damping: 0.1}}"),
+    ("unknown-parameter", "{continuous: {gain: 1, time_constant: 1}, known: [K]}"),
+    ("nothing-to-estimate", "{continuous: {gain: 1, time_constant: 1}, known: [gain, time_constant]}"),
+]
+
+
+@pytest.mark.parametrize(("code", "plant"), BAD)
+def test_bad_plants_are_refused_once_with_their_key(code, plant):
+    with pytest.raises(SpecError) as caught:
+        build_task(spec_of(plant[:-1] + ", sample: zoh}"))
+    assert {one.code for one in caught.value.diagnostics} == {code}
+    assert all(one.key.startswith("plant") for one in caught.value.diagnostics)
+
+
+def test_accuracy_of_what_is_known_is_refused():
+    rest = REST.replace("model_error: {relative: 0.1, band: [0.05, 1.5]}", "standard_deviation: {gain: 0.1}")
+    with pytest.raises(SpecError, match="gain is known"):
+        build_task(spec_of("{continuous: {gain: 1, time_constant: 1}, sample: zoh, known: [gain]}", rest))

@@ -1,0 +1,94 @@
+"""How the columns of a record are found, and what is said of files that cannot be read."""
+
+import re
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import identify, parse_spec
+from inputdesign_cli.errors import DataError, SpecError
+
+STRUCTURE = "sample_time: 2\ntime_unit: min\nplant: {B: [0, 1], F: [1, -0.7]}\n"
+U = np.random.default_rng(1).standard_normal(200)
+Y = scipy.signal.lfilter([0, 1], [1, -0.7], U) + 0.1 * np.random.default_rng(2).standard_normal(200)
+
+
+@pytest.fixture
+def estimated(tmp_path):
+    """The estimate from a file with this header and first column."""
+
+    def made(header, first):
+        path = tmp_path / "d.csv"
+        rows = "\n".join(f"{t},{u!r},{y!r}" for t, u, y in zip(first, U.tolist(), Y.tolist(), strict=True))
+        path.write_text(f"{header},u,y\n{rows}\n")
+        return identify(parse_spec(STRUCTURE, design=False), path).result["identification"]["theta"]
+
+    return made
+
+
+@pytest.mark.parametrize("name", ["time", "time_min", "t", "t_min", "timestamp", "Time (min)", "t [min]"])
+def test_times_go_by_several_names(name, estimated):
+    assert estimated(name, 2 * np.arange(200))["b1"] == pytest.approx(1.0, abs=0.1)
+    with pytest.raises(DataError, match="sampled every 3"):
+        estimated(name, 3 * np.arange(200))
+
+
+def test_times_may_be_dates(estimated):
+    moments = [datetime(2024, 2, 28, 23) + timedelta(minutes=2 * k) for k in range(200)]
+    assert estimated("timestamp", [m.isoformat(" ") for m in moments])["b1"] == pytest.approx(1.0, abs=0.1)
+    late = [m + timedelta(minutes=5 * (k > 100)) for k, m in enumerate(moments)]
+    with pytest.raises(DataError, match="advances by 7"):
+        estimated("timestamp", [m.isoformat() for m in late])
+    with pytest.raises(DataError, match="not a finite number"):
+        estimated("timestamp", ["2024-01-01", *["yesterday"] * 199])
+
+
+def test_another_unit_is_told(estimated):
+    with pytest.raises(DataError, match="the times are in ms"):
+        estimated("t_ms", 2 * np.arange(200))
+
+
+def test_a_column_that_only_begins_like_a_time_is_none(estimated):
+    assert estimated("temperature", 7 * np.arange(200))["b1"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"0.1,0.2\n0.3,0.4\n", "no header line.* such as u,y"),
+        (b"PK\x03\x04\x00\x00\xff", "is a spreadsheet.*save the sheet as CSV"),
+        (b"\xd0\xcf\x11\xe0\xff", "is a spreadsheet"),
+    ],
+)
+def test_what_is_no_table_is_told_with_what_to_do(content, said, tmp_path):
+    path = tmp_path / "d.csv"
+    path.write_bytes(content)
+    with pytest.raises(DataError) as caught:
+        identify(parse_spec(STRUCTURE, design=False), path)
+    (found,) = caught.value.diagnostics
+    assert re.search(said, f"{found.message} {found.hint}")
+
+
+def test_the_variance_of_noise_that_is_estimated_need_not_be_stated(estimated):
+    for noise in ("", "noise: {C: [1, 0.1]}\n"):
+        parse_spec(STRUCTURE + noise, design=False)
+        with pytest.raises(SpecError, match="noise"):
+            parse_spec(STRUCTURE + noise)
+    with pytest.raises(SpecError, match="noise"):
+        parse_spec(STRUCTURE + "noise: 3\n", design=False)
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("plant.B=3.6", r"one input and one output write a list"),
+        ("plant.B=[[0, 1, 2]]", r"one input and one output write a list"),
+        ("plant.F=[1, -0,7]", r"write 0\.7: a comma begins the next coefficient"),
+    ],
+)
+def test_hints_name_the_likely_mistake_first(setting, said):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(STRUCTURE, overrides=[setting], design=False)
+    assert re.search(said, caught.value.diagnostics[0].hint)
