@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from inputdesign_cli.figures.bound import draw_bound
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
 from inputdesign_cli.figures.ellipses import draw_ellipses
-from inputdesign_cli.figures.exploration import draw_orders, draw_response
+from inputdesign_cli.figures.exploration import draw_orders
 from inputdesign_cli.figures.moments import draw_error, draw_moments
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal

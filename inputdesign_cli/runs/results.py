@@ -88,12 +88,12 @@ class BoundCurves(Curves):
 
 @dataclass(frozen=True)
 class ResponsePanel:
-    """|G| of one entry from data alone, the radius of its confidence disc, and |G| of a model; all (n,)."""
+    """An entry of G from data alone, the radius of its confidence disc, and that of a model; all (n,)."""
 
     frequency: Array
-    G_abs: Array
+    G: NDArray[np.complex128]
     radius: Array
-    model_abs: Array
+    model: NDArray[np.complex128]
     entry: tuple[int, int] | None = None  # as of `BoundPanel`
 
 
@@ -196,29 +196,6 @@ class ResidualCurves(Curves):
     limit: float
     whiteness: float
     independence: float
-
-
-@dataclass(frozen=True)
-class ResponsePanel:
-    """An entry of G over `frequency` (n,): of a model and, where the inputs have power, without a structure.
-
-    Standard deviations are of |G|; `measured` is at `measured_at` (m,).
-    """
-
-    frequency: Array
-    response: NDArray[np.complex128]
-    deviation: Array
-    measured_at: Array
-    measured: NDArray[np.complex128]
-    measured_deviation: Array
-    entry: tuple[int, int] | None = None  # as in `BoundPanel`
-
-
-@dataclass(frozen=True)
-class ResponseCurves(Curves):
-    """The frequency response of a model before that of the data alone, entry by entry."""
-
-    panels: tuple[ResponsePanel, ...]
 
 
 @dataclass(frozen=True)

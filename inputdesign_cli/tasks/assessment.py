@@ -103,7 +103,7 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
     try:
-        levels = {} if deviations.remove_means else found.deviations.operating_point
+        levels = found.preparation.levels
         topped = _about(found.question.top_up(levels), levels)
     except IdesignError as error:
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))

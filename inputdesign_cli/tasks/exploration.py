@@ -10,31 +10,31 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.identification.explore import (
     Found,
     answers_output,
     explore_records,
     fits,
-    frequency_response,
     order_of_excitation,
 )
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.runs.results import Json, Results
-from inputdesign_cli.runs.units import Header
+from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.log import channels_by_name, read_logs
+from inputdesign_cli.tasks.build.log import Log, channels_by_name, read_logs
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
 from inputdesign_cli.tasks.result.exploration import (
     exploration_entry,
     exploration_notes,
-    response_curves,
     structure_curves,
     validation_curves,
     validation_entry,
 )
+from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 
 # A simulation that explains less than this of data it has not seen is no model.
 _LEAST_FIT = 5.0
@@ -64,13 +64,12 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
-    notes = exploration_notes(log, found, loops, order_of_excitation(log.parts))
-    data = Data(u, y, lengths, (*log.steps, *notes, *(f"no trust: {reason}" for reason in reasons)))
-    identified = _asked(task, Identified(found.estimate, found.model, data, None))
+    heard = exploration_notes(log, found, loops, order_of_excitation(log.parts))
+    notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
+    identified = _asked(
+        task, Identified(found.estimate, found.model, Data(u, y, None, lengths, notes), preparation, None)
+    )
     results = identification_results(task, identified, started)
-    units = task.header.units
-    response = response_curves(units, found, frequency_response(log.parts))
-    orders = structure_curves(found)
     result = {
         **results.result,
         "title": f"What {' and '.join(path.name for path in paths)} tells",
@@ -83,17 +82,38 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         results,
         result=result,
         resolved_spec=text,
-        tables={**results.tables, "response": response[0]},
-        curves={**results.curves, "response": response[1], **orders},
+        curves={**results.curves, **structure_curves(found)},
         files=files,
     )
-    return Exploration(complete, reasons)
+    return Exploration(_without_model(complete, task.header.units, log, found), reasons)
+
+
+def _without_model(explored: Results, units: Units, log: Log, found: Found) -> Results:
+    """The results with the frequency response of the data alone beside the model, where it can be had."""
+    moving = [j for j in range(log.u.shape[1]) if j not in found.still]
+    response = frequency_response(log.u[:, moving], log.y, lengths=log.lengths)
+    if response is None:
+        return explored
+    table, curves, told = response_of_data(units, found.model, response, by_reference=False, inputs=moving)
+    result = explored.result
+    return replace(
+        explored,
+        result={
+            **result,
+            "exploration": {**result["exploration"], "frequency_response": told},
+            "notes": [*result.get("notes", []), *response_note(told)],
+        },
+        tables={**explored.tables, "frequency_response": table},
+        curves={**explored.curves, "frequency_response": curves},
+    )
 
 
 def _asked(task: Identification, identified: Identified) -> Identified:
     """With what the spec asks at the estimate, where it can be asked."""
     try:
-        question = task.at(identified.model, len(identified.data.y), "the estimate")
+        question = task.at(
+            identified.model, len(identified.data.y), identified.estimate.factor, "the estimate"
+        )
     except IdesignError as error:
         return replace(identified, unasked=told(error))
     return replace(identified, question=question)

@@ -84,7 +84,7 @@ class Identified:
     estimate: Estimate
     model: Model
     data: Data
-    deviations: Preparation
+    preparation: Preparation
     question: ModelQuestion | None
     unasked: str = ""
 
@@ -131,10 +131,10 @@ def identification_results(task: Identification, found: Identified, started: flo
     """
     header, question, estimate = task.header, found.question, found.estimate
     result = estimate_result(header.title, estimate)
-    if found.deviations.remove_means:
+    if found.preparation.detrend == "constant":
         result["identification"]["means_removed"] = True
-    elif found.deviations.operating_point:
-        result["identification"]["operating_point"] = dict(found.deviations.operating_point)
+    elif found.preparation.levels:
+        result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
     notes += prior_notes(estimate, stated=task.has_prior)

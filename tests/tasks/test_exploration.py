@@ -66,7 +66,14 @@ def test_the_command_writes_model_spec_figures_and_report(tmp_path):
     assert run.exit_code == 0, run.output
     assert "jitter" in run.stdout
     names = {path.name for path in (tmp_path / "run").iterdir()}
-    assert {"model.yaml", "spec.yaml", "report.html", "response.png", "structures.png", "fit.png"} <= names
+    assert {
+        "model.yaml",
+        "spec.yaml",
+        "report.html",
+        "frequency_response.png",
+        "structures.png",
+        "fit.png",
+    } <= names
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["validation"]["simulation_fit_percent"] > 90.0
     assert load_spec(tmp_path / "run" / "spec.yaml").sample_time == pytest.approx(1.0, abs=0.05)

@@ -11,7 +11,3 @@ from inputdesign_cli.identification.explore.search import (
     Chosen as Chosen,
     explore_structure as explore_structure,
 )
-from inputdesign_cli.identification.explore.spectra import (
-    FrequencyResponse as FrequencyResponse,
-    frequency_response as frequency_response,
-)

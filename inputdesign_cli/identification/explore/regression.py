@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from inputdesign_cli.identification.explore.fits import Parts
 from inputdesign_cli.identification.stability import reflected
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 8
@@ -38,9 +38,9 @@ def output_error(parts: Parts, n: int, b: int, delays: Sequence[int]) -> SharedD
     for _ in range(_ITERATIONS):
         blocks = []
         for u, y in begun:
-            filtered = scipy.signal.lfilter([1.0], F, y)
-            past = [-_lagged(filtered, lag) for lag in range(1, n + 1)]
-            blocks.append((np.stack([*past, *_caused(u, len(y), F, n, b, delays)], axis=1), filtered))
+            smooth = filtered([1.0], F, y)
+            past = [-_lagged(smooth, lag) for lag in range(1, n + 1)]
+            blocks.append((np.stack([*past, *_caused(u, len(y), F, n, b, delays)], axis=1), smooth))
         solution = _solve(blocks, own=n + len(delays) * b)
         if not np.all(np.isfinite(solution)):
             break
@@ -55,10 +55,10 @@ def output_error(parts: Parts, n: int, b: int, delays: Sequence[int]) -> SharedD
 
 def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[int]) -> Iterator[Array]:
     """Through 1/F: the delays of all inputs, a level and n impulses at the start."""
-    for x, delay in zip(scipy.signal.lfilter([1.0], F, u, axis=0).T, delays, strict=True):
+    for x, delay in zip(filtered([1.0], F, u, axis=0).T, delays, strict=True):
         yield from (_lagged(x, delay + lag) for lag in range(b))
-    yield scipy.signal.lfilter([1.0], F, np.ones(samples))
-    impulse = scipy.signal.lfilter([1.0], F, np.eye(1, samples)[0])
+    yield filtered([1.0], F, np.ones(samples))
+    impulse = filtered([1.0], F, np.eye(1, samples)[0])
     yield from (_lagged(impulse, lag) for lag in range(n))
 
 

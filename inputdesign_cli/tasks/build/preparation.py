@@ -41,7 +41,7 @@ class Preparation:
         detrend: what is taken away from the signals of every segment; `auto` a line where it explains much.
         skip: rows to leave out at the beginning.
         span: of times, in the unit of the file, to keep.
-        operating_point: by channel, what is taken away.
+        operating_point: by channel, what is taken away where no trend is.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -52,6 +52,11 @@ class Preparation:
     skip: int = 0
     span: tuple[float, float] | None = None
     operating_point: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def levels(self) -> Mapping[str, float]:
+        """By channel, what the signals were about: the operating point, where it is what was taken away."""
+        return self.operating_point if self.detrend == "none" else {}
 
 
 @dataclass(frozen=True)

@@ -6,22 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Candidate, Fits, Found, FrequencyResponse
+from inputdesign_cli.identification.explore import Candidate, Fits, Found
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import (
-    Curves,
-    FitCurves,
-    FitPanel,
-    Json,
-    OrderCurves,
-    ResponseCurves,
-    ResponsePanel,
-    Table,
-)
+from inputdesign_cli.runs.results import Curves, FitCurves, FitPanel, Json, OrderCurves, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.log import Log
-
-_GRID = 300
 
 
 def validation_entry(found: Fits) -> dict[str, Json]:
@@ -143,46 +132,6 @@ def structure_curves(found: Found) -> dict[str, Curves]:
             fits, mark, None if single else i
         )
     return curves
-
-
-def response_curves(units: Units, found: Found, measured: FrequencyResponse) -> tuple[Table, ResponseCurves]:
-    """response.csv with its figure: G without a structure at its own frequencies, and of the model there."""
-    low = float(measured.w[0])
-    grid = np.geomspace(low, np.pi, _GRID)
-    columns: dict[str, Array] = {units.frequency_header: measured.w / units.frequency}
-    panels = []
-    for i in range(units.outputs):
-        for j in range(units.inputs):
-            if j in found.still:
-                continue
-            suffix = units.suffix(i, j)
-            there = found.model.plant_at(measured.w)[:, i, j]
-            columns |= {
-                f"G{suffix}_re": measured.response[:, i, j].real,
-                f"G{suffix}_im": measured.response[:, i, j].imag,
-                f"G{suffix}_deviation": measured.deviation[:, i, j],
-                f"model{suffix}_re": there.real,
-                f"model{suffix}_im": there.imag,
-            }
-            gradient = found.model.plant_gradient(grid)[:, :, i, j]
-            variance = np.einsum("nk,kl,nl->n", gradient, found.estimate.covariance, gradient.conj()).real
-            panels.append(
-                ResponsePanel(
-                    grid / units.frequency,
-                    found.model.plant_at(grid)[:, i, j],
-                    np.sqrt(np.maximum(variance, 0.0)),
-                    measured.w / units.frequency,
-                    measured.response[:, i, j],
-                    measured.deviation[:, i, j],
-                    None if units.single else (i, j),
-                )
-            )
-    for i in range(units.outputs):
-        number = "" if units.single else f"_{i + 1}"
-        columns[f"noise_spectrum{number}"] = measured.noise[:, i]
-        columns[f"coherence{number}"] = measured.coherence[:, i]
-    kept = np.isfinite(np.column_stack(list(columns.values()))).all(axis=1)
-    return Table({name: values[kept] for name, values in columns.items()}), ResponseCurves(tuple(panels))
 
 
 def validation_curves(units: Units, u: Array, y: Array, found: Fits) -> tuple[Table, FitCurves]:

@@ -1,4 +1,4 @@
-"""Delay and order of simulated plants are found; fits and spectra are those of their definition."""
+"""Delay and order of simulated plants are found; fits are those of their definition."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from inputdesign_cli.identification.explore import (
     explore_records,
     explore_structure,
     fits,
-    frequency_response,
     order_of_excitation,
 )
 from inputdesign_cli.identification.explore.joint import divided
@@ -89,22 +88,6 @@ def test_an_unstable_model_has_no_simulation():
     rng = np.random.default_rng(7)
     u, y = rng.standard_normal((2, 3000, 1))
     assert fits(siso([0.0, 1.0], [1.0, -1.5]), [(u, y)]).simulation[0] < -1e3
-
-
-def test_the_response_without_a_structure_is_unbiased_and_its_confidence_holds():
-    """Of 40 records: the mean is G, and the squared errors have the variance that is stated."""
-    rng = np.random.default_rng(8)
-    errors, stated = [], []
-    for _ in range(40):
-        u, e = rng.standard_normal((2, 4096))
-        y = scipy.signal.lfilter([0.0, 0.5], [1.0, -0.5], u) + 0.3 * e
-        found = frequency_response([(u[:, None], y[:, None])])
-        z = np.exp(-1j * found.w)
-        errors.append(found.response[:, 0, 0] - 0.5 * z / (1 - 0.5 * z))
-        stated.append(found.deviation[:, 0, 0])
-    inner = slice(3, -3)
-    measured = np.sqrt(np.mean(np.abs(np.array(errors)[:, inner]) ** 2))
-    assert measured == pytest.approx(float(np.sqrt(np.mean(np.array(stated)[:, inner] ** 2))), rel=0.15)
 
 
 def test_a_loop_is_noticed_and_an_open_one_is_not():
