@@ -1,8 +1,8 @@
 """From raw logs to models: the simulation fit on the second half, beside the best of a brute-force search.
 
 `python benchmarks/exploration.py [RECORD ..]` gives `idesign explore` the first half of each record of
-docs/data and judges its model.yaml by the second, as the command line does. Beside it stands the best ARX
-model of the first half, orders to 8 and delays to 8, that is chosen on that same second half. The column
+docs/data and judges its model.yaml by the second, by the functions of the command. Beside it stands the best
+ARX model of the first half, orders to 8 and delays to 8, that is chosen on that same second half. The column
 moves one input in each half, so that neither tells the other: its whole record is explored, blocks in turn.
 """
 

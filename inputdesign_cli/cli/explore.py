@@ -53,8 +53,8 @@ def explore(
     """Find a model in a log, and write a spec for the next experiment.
 
     Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
-    judged on the other. Writes model.yaml, a commented spec.yaml that `idesign solve` runs as it is, figures
-    and report.html; prints a summary. Exits with 1, and says why, where no model deserves trust.
+    judged on the other. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and
+    report.html; prints a summary. Exits with 1, and says why, where no model deserves trust.
     """
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks

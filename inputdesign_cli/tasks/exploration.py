@@ -14,6 +14,7 @@ from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.identification.explore import (
     Found,
     answers_output,
+    by_chance,
     explore_records,
     fits,
     order_of_excitation,
@@ -122,12 +123,17 @@ def _asked(task: Identification, identified: Identified) -> Identified:
 def _reasons(found: Found) -> tuple[str, ...]:
     """Why nothing that was found deserves trust."""
     single = found.model.outputs == 1
-    return tuple(
-        f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in data that it has not "
-        "seen: the inputs hardly act on it, or the record is too short or too noisy to tell how"
-        for i, fit in enumerate(found.validation.simulation)
-        if fit < _LEAST_FIT
-    )
+    unseen = len(found.validation.errors)
+    told = []
+    for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
+        chance = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
+        if fit < max(_LEAST_FIT, chance):
+            told.append(
+                f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in {unseen} "
+                f"samples that it has not seen, and of noise alone it may explain {chance:.1f} %: the inputs "
+                "hardly act on it, or the record is too short or too noisy to tell how"
+            )
+    return tuple(told)
 
 
 def judge(

@@ -1,6 +1,6 @@
 """From a record alone to a model: delays, orders and families, judged on data that they have not seen."""
 
-from inputdesign_cli.identification.explore.fits import Fits as Fits, fits as fits
+from inputdesign_cli.identification.explore.fits import Fits as Fits, by_chance as by_chance, fits as fits
 from inputdesign_cli.identification.explore.inputs import (
     answers_output as answers_output,
     order_of_excitation as order_of_excitation,

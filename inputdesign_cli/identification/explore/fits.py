@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.special
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.polynomial_record import PolynomialRecord
@@ -19,6 +20,7 @@ from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 Parts = Sequence[tuple[Array, Array]]
+_BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
 
 
@@ -63,6 +65,16 @@ def _simulated(model: PolynomialModel, parts: Parts) -> tuple[Array, Array, Arra
 def _prediction_errors(structure: Structure, theta: Array, u: Array, y: Array) -> Array:
     record = PolynomialRecord(structure, u - u.mean(axis=0), y - y.mean(axis=0))
     return Records((record,), free=True).at(theta).errors
+
+
+def by_chance(samples: int, unknowns: int, tried: int) -> float:
+    """Per cent that the best of `tried` simulations explains of white noise, with 5 % of probability at most.
+
+    Levels, starts and an agreement by chance take a chi-squared share of its power; the probabilities of
+    the structures that were tried add up at most (Bonferroni).
+    """
+    share = scipy.special.chdtri(unknowns, _BY_CHANCE / tried) / samples
+    return float(100.0 * (1.0 - np.sqrt(max(1.0 - share, 0.0))))
 
 
 def percent(errors: Array, varying: Array) -> tuple[float, ...]:

@@ -40,7 +40,7 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
     source = " and ".join(path.name for path in sources)
     text = f"""\
 # Written by `idesign explore` from {source}.
-# `idesign solve FILE` runs it as it is; every entry can be changed here or by --set key=value.
+# `idesign solve FILE` designs what it asks; every entry can be changed here or by --set key=value.
 title: {json.dumps(f"The next experiment after {source}")}
 
 sample_time: {log.step!r}          # in time_unit; frequencies are in rad per time_unit

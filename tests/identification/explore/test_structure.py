@@ -7,6 +7,7 @@ import scipy.signal
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.explore import (
     answers_output,
+    by_chance,
     explore_records,
     explore_structure,
     fits,
@@ -82,6 +83,20 @@ def test_the_fit_is_that_of_its_definition():
     found = fits(siso([0.0, 1.0], [1.0, -0.5]), [(u[:, None], y[:, None])])
     plain = 100.0 * (1.0 - np.linalg.norm(e) / np.linalg.norm(y - y.mean()))
     assert found.simulation[0] == pytest.approx(plain, abs=0.3)
+
+
+def test_noise_explains_itself_by_chance_as_seldom_as_stated():
+    """The best of 10 sets of three random signals explains that much in 5 % at most."""
+    rng = np.random.default_rng(4)
+    limit, above = by_chance(60, 3, 10), 0
+    for _ in range(1000):
+        y = rng.standard_normal(60)
+        left = []
+        for _ in range(10):
+            basis = np.linalg.qr(rng.standard_normal((60, 3)))[0]
+            left.append(np.linalg.norm(y - basis @ (basis.T @ y)))
+        above += 100.0 * (1.0 - min(left) / np.linalg.norm(y)) > limit
+    assert above <= 65
 
 
 def test_an_unstable_model_has_no_simulation():
