@@ -13,6 +13,7 @@ from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.data import assess, identify
 from inputdesign_cli.cli.designs import analyse, simulate, solve
 from inputdesign_cli.cli.examples import examples
+from inputdesign_cli.cli.explore import explore
 from inputdesign_cli.cli.init import init
 from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
@@ -57,6 +58,7 @@ COMMANDS = (
     solve,
     analyse,
     simulate,
+    explore,
     identify,
     assess,
     sweep,

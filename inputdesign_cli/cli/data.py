@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inputdesign_cli.cli.options import (
+    Columns,
     Confine,
     DataFiles,
+    DetrendWord,
     EstimateOutput,
     Figures,
     Json,
@@ -19,13 +22,21 @@ from inputdesign_cli.cli.options import (
     Overrides,
     Overwrite,
     Quiet,
+    Resample,
+    SampleTime,
+    Skip,
+    Span,
     SpecFile,
+    TimeUnit,
     VerdictOutput,
 )
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
+
+if TYPE_CHECKING:
+    from inputdesign_cli.tasks.build.preparation import Preparation
 
 
 def identify(
@@ -40,6 +51,13 @@ def identify(
     no_output: NoOutput = False,
     remove_means: Means = False,
     operating_point: OperatingPoint = "",
+    columns: Columns = "",
+    sample_time: SampleTime = None,
+    time_unit: TimeUnit = None,
+    resample: Resample = False,
+    detrend: DetrendWord = "none",
+    skip: Skip = 0,
+    span: Span = "",
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -57,7 +75,8 @@ def identify(
             read_spec(spec, overrides, confine, design=False),
             data,
             remove_means=remove_means,
-            operating_point=_levels(operating_point),
+            operating_point=levels(operating_point),
+            preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
         )
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
@@ -73,6 +92,13 @@ def assess(
     no_output: NoOutput = False,
     remove_means: Means = False,
     operating_point: OperatingPoint = "",
+    columns: Columns = "",
+    sample_time: SampleTime = None,
+    time_unit: TimeUnit = None,
+    resample: Resample = False,
+    detrend: DetrendWord = "none",
+    skip: Skip = 0,
+    span: Span = "",
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -91,7 +117,8 @@ def assess(
             read_spec(spec, overrides, confine),
             data,
             remove_means=remove_means,
-            operating_point=_levels(operating_point),
+            operating_point=levels(operating_point),
+            preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
         )
     place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output)
     keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
@@ -99,18 +126,69 @@ def assess(
         raise typer.Exit({"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}[assessment.verdict])
 
 
-def _levels(text: str) -> dict[str, float]:
+def levels(text: str) -> dict[str, float]:
     """`u1=40,y1=52.3` as numbers; u and y are u1 and y1.
 
     Raises:
         typer.BadParameter: The text is something else.
     """
-    levels = {}
-    for part in filter(None, text.split(",")):
-        name, _, value = (piece.strip() for piece in part.partition("="))
+    found = {}
+    for name, value in named(text, "--operating-point", "u1=40,y1=52.3").items():
         try:
-            levels[name if name[1:] else f"{name}1"] = float(value)
+            found[name] = float(value)
         except ValueError:
-            message = f"{part!r} is not a channel and a number, as in u1=40,y1=52.3"
+            message = f"{value!r} is not a number, as in u1=40,y1=52.3"
             raise typer.BadParameter(message, param_hint="--operating-point") from None
-    return levels
+    return found
+
+
+def named(text: str, option: str, example: str) -> dict[str, str]:
+    """`u1=a,y1=b` by channel; u and y are u1 and y1.
+
+    Raises:
+        typer.BadParameter: A part has no `=`, or names nothing.
+    """
+    found = {}
+    for part in filter(None, map(str.strip, text.split(","))):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (name and equals and value):
+            raise typer.BadParameter(f"{part!r} is not of the form {example}", param_hint=option)
+        found[f"{name}1" if name in ("u", "y") else name] = value
+    return found
+
+
+def preparation(
+    columns: str,
+    sample_time: float | None,
+    time_unit: str | None,
+    resample: bool,
+    detrend: str,
+    skip: int,
+    span: str,
+) -> Preparation:
+    """What the options about data say.
+
+    Raises:
+        typer.BadParameter: One of them cannot be read.
+    """
+    from inputdesign_cli.tasks.build.data import TIME_UNITS
+    from inputdesign_cli.tasks.build.preparation import DETRENDS, Preparation
+
+    if sample_time is not None and not 0.0 < sample_time < math.inf:
+        raise typer.BadParameter("it is a positive number", param_hint="--sample-time")
+    if time_unit is not None and time_unit not in TIME_UNITS:
+        raise typer.BadParameter(f"it is one of {', '.join(TIME_UNITS)}", param_hint="--time-unit")
+    begin, _, end = span.partition(":")
+    try:
+        limits = (float(begin or "-inf"), float(end or "inf")) if span else None
+    except ValueError:
+        raise typer.BadParameter("write two times, as in 10:250", param_hint="--range") from None
+    return Preparation(
+        columns=named(columns, "--columns", "u1=Heater 1,y1=4"),
+        sample_time=sample_time,
+        time_unit=time_unit,
+        resample=resample,
+        detrend=DETRENDS[detrend],
+        skip=skip,
+        span=limits,
+    )

@@ -49,7 +49,9 @@ Confine = Annotated[
 DataFiles = Annotated[
     list[Path],
     typer.Argument(
-        metavar="DATA...", help="Records of experiments, CSV files with columns u and y, estimated jointly."
+        metavar="DATA...",
+        help="Records of experiments with columns u and y, estimated jointly: CSV, TSV, .mat, .npz, and with "
+        "the extra data parquet and Excel.",
     ),
 ]
 OperatingPoint = Annotated[
@@ -63,6 +65,36 @@ OperatingPoint = Annotated[
 ]
 Means = Annotated[
     bool, typer.Option("--remove-means", help="Take the means of u and y away (an operating point).")
+]
+Columns = Annotated[
+    str,
+    typer.Option(
+        "--columns",
+        metavar="u1=..,y1=..",
+        help="Which column holds which channel, by name or number: u1=Heater 1,y1=4,time=1.",
+    ),
+]
+SampleTime = Annotated[
+    float | None,
+    typer.Option("--sample-time", metavar="T", help="Time between rows, where the file does not tell it."),
+]
+TimeUnit = Annotated[
+    str | None,
+    typer.Option("--time-unit", metavar="UNIT", help="Of the times in the file: s, ms, us, min, h or d."),
+]
+Resample = Annotated[
+    bool,
+    typer.Option("--resample", help="Even out times that jitter by more than 10 % of the sample time, too."),
+]
+DetrendWord = Annotated[
+    str,
+    one_of(("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"),
+]
+Skip = Annotated[
+    int, typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of every file.")
+]
+Span = Annotated[
+    str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
 ]
 Overrides = Annotated[
     list[str] | None,
@@ -97,6 +129,9 @@ def _into(default: str) -> Any:
 
 Output = Annotated[Path | None, _into("runs/SPEC, without the ending of the file")]
 EstimateOutput = Annotated[Path | None, _into("runs/DATA_identified, without the ending of the file")]
+ExplorationOutput = Annotated[
+    Path | None, _into("runs/DATA_explored, or runs/DATA_validated, without the ending of the file")
+]
 VerdictOutput = Annotated[Path | None, _into("runs/DATA_assessed, without the ending of the file")]
 SweepOutput = Annotated[Path | None, _into("runs/SPEC-sweep, without the ending of the file")]
 NoOutput = Annotated[

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from inputdesign_cli.figures.bound import draw_bound
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
 from inputdesign_cli.figures.ellipses import draw_ellipses
+from inputdesign_cli.figures.exploration import draw_orders
 from inputdesign_cli.figures.moments import draw_error, draw_moments
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
@@ -31,6 +32,7 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.LossCurves: draw_loss,
     of.MomentsCurves: draw_moments,
     of.OptimalityCurves: draw_optimality,
+    of.OrderCurves: draw_orders,
     of.ResidualCurves: draw_residuals,
     of.ResponseCurves: draw_response,
     of.SignalCurves: draw_signal,

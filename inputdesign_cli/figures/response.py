@@ -1,4 +1,4 @@
-"""frequency_response.png: |G| from data alone, beside that of a model."""
+"""frequency_response.png: G from data alone, beside that of a model."""
 
 from __future__ import annotations
 
@@ -8,22 +8,42 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE
+from inputdesign_cli.figures.style import BLACK, BLUE, legend_above
 from inputdesign_cli.runs.results import ResponseCurves, ResponsePanel
 
 
 def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
-    """The magnitudes over frequency, and between which two the true one is with 95 %."""
-    draw_panels(page, curves.panels, _plot, time_unit, magnitude="magnitude")
+    """The magnitudes, and between which two the true one is with 95 %; of a single entry also the phase."""
+    if len(curves.panels) > 1:
+        draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude")
+        return
+    (panel,) = curves.panels
+    above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    legend_above(above, _magnitude(above, panel))
+    above.set_xscale("log")
+    above.set_ylabel("magnitude")
+    _phase(below, panel)
+    below.set_ylabel("phase (degrees)")
+    below.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
 
 
-def _plot(axes: Axes, curves: ResponsePanel) -> list[Artist]:
-    w, size = curves.frequency, curves.G_abs
+def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
+    w, size, modelled = panel.frequency, np.abs(panel.G), np.abs(panel.model)
     axes.set_yscale("log")
     handles: list[Artist] = []
     handles += axes.plot(w, size, ".", color=BLUE, markersize=4, label="$|G|$, data alone")
-    handles += axes.plot(w, curves.model_abs, color=BLACK, linewidth=1.2, label="$|G|$, model")
-    least = 0.1 * min(float(size.min()), float(curves.model_abs.min()))
-    below = np.maximum(size - curves.radius, least)
-    axes.fill_between(w, below, size + curves.radius, color=BLUE, alpha=0.15, linewidth=0)
+    handles += axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="$|G|$, model")
+    least = 0.1 * min(float(size.min()), float(modelled.min()))
+    below = np.maximum(size - panel.radius, least)
+    axes.fill_between(w, below, size + panel.radius, color=BLUE, alpha=0.15, linewidth=0)
     return handles
+
+
+def _phase(axes: Axes, panel: ResponsePanel) -> None:
+    """That of the model without jumps, and of the data, where it is known at all, on the nearest turn."""
+    model = np.degrees(np.unwrap(np.angle(panel.model)))
+    known = panel.radius < np.abs(panel.G)
+    turn = np.degrees(np.angle(panel.G)) - model
+    nearest = model + (turn + 180.0) % 360.0 - 180.0
+    axes.plot(panel.frequency[known], nearest[known], ".", color=BLUE, markersize=4)
+    axes.plot(panel.frequency, model, color=BLACK, linewidth=1.2)

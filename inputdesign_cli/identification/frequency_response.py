@@ -37,12 +37,16 @@ class FrequencyResponse:
         frequency: (n,), rad/sample.
         G: (n, p, r).
         radius: (n, p, r): of the disc about each entry of G that holds the true one with 95 %.
+        noise: (n, p): the spectrum of what the inputs do not explain; that of white noise is its variance.
+        coherence: (n, p): the share of the spectrum of y that the inputs explain.
         method: how it was estimated.
     """
 
     frequency: Array
     G: ComplexArray
     radius: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    coherence: NDArray[np.float64]
     method: Method
 
 
@@ -95,7 +99,14 @@ def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | 
     G = Y.mean(axis=0) / mean
     scatter = np.sum(np.abs(Y - G * U) ** 2, axis=0) / (kept - 1)
     radius = _radius(scatter / (kept * np.abs(mean) ** 2), kept - 1)
-    return FrequencyResponse(2.0 * np.pi * (lines + 1) / period, G[:, :, None], radius[:, :, None], "lines")
+    return FrequencyResponse(
+        2.0 * np.pi * (lines + 1) / period,
+        G[:, :, None],
+        radius[:, :, None],
+        period * scatter,
+        _coherence(np.abs(G * mean) ** 2, scatter),
+        "lines",
+    )
 
 
 def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse | None:
@@ -111,13 +122,14 @@ def _local_polynomial(records: Sequence[tuple[Array, ...]]) -> FrequencyResponse
     for w in _centres(longest):
         one = _at(w, transformed, window, inputs, _PARABOLA)
         if one is not None:
-            G, radius = one
+            G, radius, *more = one
             straight = _at(w, transformed, window, inputs, _PARABOLA - 1)
-            found.append((w, G, radius + (0.0 if straight is None else _bent(G - straight[0], radius))))
+            bent = 0.0 if straight is None else _bent(G - straight[0], radius)
+            found.append((w, G, radius + bent, *more))
     if not found:
         return None
-    w, G, radius = (np.array(values) for values in zip(*found, strict=True))
-    return FrequencyResponse(w, G, radius, "local_polynomial")
+    w, G, radius, noise, coherence = (np.array(values) for values in zip(*found, strict=True))
+    return FrequencyResponse(w, G, radius, noise, coherence, "local_polynomial")
 
 
 def _transforms(*signals: Array) -> tuple[NDArray, ...]:
@@ -138,8 +150,12 @@ def _centres(samples: int) -> Array:
 
 def _at(
     w: float, transformed: Sequence[tuple[NDArray, ...]], window: int, inputs: int, terms: int
-) -> tuple[ComplexArray, NDArray[np.float64]] | None:
-    """G (p, r) and its radius at w, by polynomials of so many terms; None where inputs are not told apart."""
+) -> tuple[ComplexArray, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+    """G (p, r) and its radius, noise and coherence (p,) at w; None where inputs cannot be told apart.
+
+    Args:
+        terms: of the polynomials.
+    """
     rows, targets = [], []
     for number, (lines, X, U, Y) in enumerate(transformed):
         last = (lines.size - 1) // 2
@@ -171,7 +187,12 @@ def _at(
     freedom = len(matrix) - matrix.shape[1]
     power = np.sum(np.abs(errors) ** 2, axis=0) / freedom
     spread = np.sum(np.abs(back.T @ inverse[:inputs]) ** 2, axis=1)
-    return G, _radius(np.outer(power, spread), freedom)
+    explained = np.mean(np.abs(target[:, outputs:] @ G.T) ** 2, axis=0)
+    return G, _radius(np.outer(power, spread), freedom), power, _coherence(explained, power)
+
+
+def _coherence(explained: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(explained / np.maximum(explained + noise, 1e-300))
 
 
 def _bent(apart: ComplexArray, radius: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from inputdesign_cli.report.numbers import BREAK, Fact, Rows, listed, shown, spoken
-from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.results import Json, Result
 
 _SPREAD = "{:.4g} ± {:.2g}"
 
@@ -31,14 +31,25 @@ def estimate_facts(result: Result) -> Iterator[Fact]:
             yield "noise", f"variance {value:.5g}", ""
     fit = found.get("fit_percent")
     if fit is not None:
-        each = fit if isinstance(fit, list) else [fit]
-        text = " and ".join("-" if value is None else f"{value:.1f}" for value in each)
-        yield "fit", f"simulation explains {text} % of the output{'s' * isinstance(fit, list)}", ""
+        yield "fit", f"simulation explains {_per_cent(fit)} of the output{'s' * isinstance(fit, list)}", ""
+    unseen = result.get("validation")
+    if unseen is not None:
+        simulation, prediction = (
+            _per_cent(unseen[f"{way}_fit_percent"]) for way in ("simulation", "prediction")
+        )
+        text = f"simulation explains {simulation}, one-step prediction {prediction} of data not used before"
+        yield "validated", text, ""
     tests = [
         f"{name} {found[name]['probability']:.2g}" for name in ("whiteness", "independence") if name in found
     ]
     if tests:
         yield "residuals", f"probability of {', of '.join(tests)}", ""
+
+
+def _per_cent(fit: Json) -> str:
+    """Of one output, or of each; a dash where a model cannot be simulated."""
+    each = fit if isinstance(fit, list) else [fit]
+    return " and ".join("-" if value is None else f"{value:.1f}" for value in each) + " %"
 
 
 def estimate_answer(result: Result) -> str:

@@ -88,12 +88,12 @@ class BoundCurves(Curves):
 
 @dataclass(frozen=True)
 class ResponsePanel:
-    """|G| of one entry from data alone, the radius of its confidence disc, and |G| of a model; all (n,)."""
+    """An entry of G from data alone, the radius of its confidence disc, and that of a model; all (n,)."""
 
     frequency: Array
-    G_abs: Array
+    G: NDArray[np.complex128]
     radius: Array
-    model_abs: Array
+    model: NDArray[np.complex128]
     entry: tuple[int, int] | None = None  # as of `BoundPanel`
 
 
@@ -196,6 +196,15 @@ class ResidualCurves(Curves):
     limit: float
     whiteness: float
     independence: float
+
+
+@dataclass(frozen=True)
+class OrderCurves(Curves):
+    """How well structures simulate data that they have not seen: per family the fit over the parameters."""
+
+    fits: Mapping[str, tuple[Array, Array]]  # family -> numbers of parameters, per cent
+    chosen: tuple[float, float]
+    output: int | None = None  # from zero; None: the only one
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from inputdesign_cli.compute.executor import Executor
@@ -13,10 +14,13 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
-from inputdesign_cli.tasks.build.data import Deviations
+from inputdesign_cli.tasks.build.exploration import model_to_judge
 from inputdesign_cli.tasks.build.given import build_given
+from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
 
 Files = str | Path | Sequence[str | Path]
@@ -65,46 +69,85 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
 
 
 def identify(
-    spec: Spec, data: Files, *, remove_means: bool = False, operating_point: Mapping[str, float] | None = None
+    spec: Spec,
+    data: Files,
+    *,
+    remove_means: bool = False,
+    operating_point: Mapping[str, float] | None = None,
+    preparation: Preparation | None = None,
 ) -> Results:
     """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
 
     Args:
         spec: its plant and noise; it need not ask for a design (`load_spec(.., design=False)`).
-        data: a CSV file, or several, which are estimated jointly.
+        data: a data file, or several, which are estimated jointly.
         remove_means: whether to take the means of u and y away, file by file.
         operating_point: what to take away from a channel, by name: {"u1": 40, "y1": 52.3}.
+        preparation: what else to do to the records before.
 
     Raises:
         SpecError: the plant is not supported.
         DataError: the file cannot be used, or the data do not determine the parameters.
     """
     with _placed(spec):
-        deviations = Deviations(operating_point or {}, remove_means)
-        found = identify_records(build_identification(spec), _paths(data), deviations)
+        known = _prepared(preparation, operating_point, remove_means)
+        found = identify_records(build_identification(spec), _paths(data), known)
         return finite(found, most_extreme(spec.content))
 
 
 def assess(
-    spec: Spec, data: Files, *, remove_means: bool = False, operating_point: Mapping[str, float] | None = None
+    spec: Spec,
+    data: Files,
+    *,
+    remove_means: bool = False,
+    operating_point: Mapping[str, float] | None = None,
+    preparation: Preparation | None = None,
 ) -> Assessment:
     """Identify the model from real experiments, compare what the data buy with what is asked, and top up.
 
     Args:
         spec: what is asked.
-        data, remove_means, operating_point: see `identify`.
+        data, remove_means, operating_point, preparation: see `identify`.
 
     Raises:
         SpecError: nothing is asked that data could meet; see `identify`.
         DataError: a file cannot be used.
     """
     with _placed(spec):
-        deviations = Deviations(operating_point or {}, remove_means)
-        return assess_records(build_identification(spec), _paths(data), deviations)
+        known = _prepared(preparation, operating_point, remove_means)
+        return assess_records(build_identification(spec), _paths(data), known)
+
+
+def explore(data: Files, preparation: Preparation | None = None, *, model: Spec | None = None) -> Exploration:
+    """Find a model in a log, without a spec; or judge a given model by it.
+
+    Args:
+        data: a data file, or several of the same experiment.
+        preparation: which column is which, and what to do to the record before.
+        model: to judge, as a spec (`load_spec(.., design=False)`).
+
+    Raises:
+        SpecError: the model cannot be judged.
+        DataError: the log cannot be used, or tells no model at all.
+    """
+    prepared = preparation or Preparation()
+    if model is None:
+        return explore_log(_paths(data), prepared)
+    with _placed(model):
+        return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
 
 
 def _paths(data: Files) -> list[Path]:
     return [Path(data)] if isinstance(data, str | Path) else [Path(one) for one in data]
+
+
+def _prepared(
+    preparation: Preparation | None, operating_point: Mapping[str, float] | None, remove_means: bool
+) -> Preparation:
+    given = preparation or Preparation()
+    point = {**given.operating_point, **(operating_point or {})}
+    detrend = "constant" if remove_means and given.detrend == "none" else given.detrend
+    return replace(given, operating_point=point, detrend=detrend)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.build.data import Deviations
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import (
     Identification,
     Identified,
@@ -57,7 +57,7 @@ class Assessment:
         return self.verdict == "met"
 
 
-def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Assessment:
+def assess(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Assessment:
     """Identify the model from real experiments and compare what the data buy with what is asked.
 
     Both sides are evaluated at the new estimate: r_u by the information of the data themselves, r_adm by the
@@ -77,7 +77,7 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
             key="accuracy",
         )
     started = time.perf_counter()
-    found = identified(task, paths, deviations)
+    found = identified(task, paths, preparation)
     identification = identification_results(task, found, started)
     listed: list[dict[str, Json]] = []
     if found.question is not None:
@@ -103,7 +103,7 @@ def assess(task: Identification, paths: Sequence[Path], deviations: Deviations) 
     if verdict != "missed" or found.question is None or found.question.top_up is None:
         return Assessment(verdict, judged)
     try:
-        levels = {} if deviations.remove_means else found.deviations.operating_point
+        levels = found.preparation.levels
         topped = _about(found.question.top_up(levels), levels)
     except IdesignError as error:
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))

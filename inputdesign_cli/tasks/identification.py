@@ -17,7 +17,8 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
-from inputdesign_cli.tasks.build.data import Data, Deviations, blaming_columns, read_data
+from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
 from inputdesign_cli.tasks.result.estimates import (
@@ -83,20 +84,20 @@ class Identified:
     estimate: Estimate
     model: Model
     data: Data
-    deviations: Deviations
+    preparation: Preparation
     question: ModelQuestion | None
     unasked: str = ""
 
 
-def identified(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Identified:
+def identified(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Identified:
     """The estimate from the data in `paths`, jointly; the nominal parameters are one of the starts.
 
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
     """
     units, nominal = task.header.units, task.nominal
-    known = {**task.operating_point, **deviations.operating_point}
-    taken = replace(deviations, operating_point=known)
+    known = {**task.operating_point, **preparation.operating_point}
+    taken = replace(preparation, operating_point=known)
     data = read_data(paths, units, taken)
     with blaming_columns(paths[0]):
         estimate = estimate_model(
@@ -130,10 +131,10 @@ def identification_results(task: Identification, found: Identified, started: flo
     """
     header, question, estimate = task.header, found.question, found.estimate
     result = estimate_result(header.title, estimate)
-    if found.deviations.remove_means:
+    if found.preparation.detrend == "constant":
         result["identification"]["means_removed"] = True
-    elif found.deviations.operating_point:
-        result["identification"]["operating_point"] = dict(found.deviations.operating_point)
+    elif found.preparation.levels:
+        result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
     notes += prior_notes(estimate, stated=task.has_prior)
@@ -151,11 +152,11 @@ def identification_results(task: Identification, found: Identified, started: flo
     return Results(result, header.resolved_spec, header.units.time_unit, tables, curves, files)
 
 
-def identify(task: Identification, paths: Sequence[Path], deviations: Deviations) -> Results:
+def identify(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Results:
     """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
 
     Raises:
         DataError: see `identified`.
     """
     started = time.perf_counter()
-    return identification_results(task, identified(task, paths, deviations), started)
+    return identification_results(task, identified(task, paths, preparation), started)

@@ -62,6 +62,23 @@ def test_white_noise_in_gives_the_plant_within_its_discs():
     assert np.mean(np.abs(mean) ** 2 / (deviation**2 / 40)) == pytest.approx(1.0, abs=0.35)
 
 
+@pytest.mark.parametrize("periodic", [False, True])
+def test_noise_and_coherence_are_those_of_theory(periodic):
+    """White noise of variance v has the spectrum v; the coherence is |G|^2 / (|G|^2 + v) of a white input."""
+    rng = np.random.default_rng(6)
+    u = np.tile(rng.choice([-1.0, 1.0], 400), 10) if periodic else rng.standard_normal(4000)
+    y = scipy.signal.lfilter(B, F, u) + np.sqrt(0.3) * rng.standard_normal(4000)
+    found = frequency_response(u[:, None], y[:, None])
+    assert found.method == ("lines" if periodic else "local_polynomial")
+    assert np.mean(found.noise) == pytest.approx(0.3, rel=0.1)
+    size = np.abs(plant(found.frequency)) ** 2
+    if periodic:
+        size = size * np.abs(np.fft.rfft(u[:400])[1:200]) ** 2 / 400
+    error = found.coherence[:, 0] - size / (size + 0.3)
+    assert abs(np.mean(error)) < 0.03
+    assert np.all((found.coherence >= 0.0) & (found.coherence <= 1.0))
+
+
 def test_two_inputs_and_two_records():
     rng = np.random.default_rng(3)
     u = rng.standard_normal((1300, 2))

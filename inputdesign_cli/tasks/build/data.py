@@ -1,11 +1,11 @@
-"""Recorded experiments: u and y from CSV files, their columns, units and times checked, outliers named."""
+"""Recorded experiments: u and y from data files, their columns, units and times checked, outliers named."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,24 +13,27 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.build.tables import read_columns, read_header, read_times
+from inputdesign_cli.tasks.build.files import Sheet, read_sheet
+from inputdesign_cli.tasks.build.preparation import (
+    EVEN,
+    MOST_JITTER,
+    Preparation,
+    Segment,
+    jitter,
+    limits_of_sensor,
+    outliers,
+    resampled,
+    trend,
+    whole_segments,
+)
+from inputdesign_cli.tasks.build.tables import columns_of, is_dated
 
-_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
-# What a column of times is called, with or without a unit: time_s, t (ms), timestamp.
-_TIMES = re.compile(r"(time|t|timestamp)(?:[_ ]?[(\[]?([a-z]*)[)\]]?)?")
-# Times may jitter by this share of the sample time.
-_JITTER = 1e-3
-# Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
-_OUTLYING = 8.0
-_SHOWN = 5
-
-
-@dataclass(frozen=True)
-class Deviations:
-    """What is taken away from signals: a known `operating_point` by channel (`u1`, `y1`), or the means."""
-
-    operating_point: Mapping[str, float] = field(default_factory=dict)
-    remove_means: bool = False
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
+TIME_UNITS = tuple(_SECONDS)
+_UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
+    unit: unit for unit in TIME_UNITS
+}
+_TIME = re.compile(r"(sampling[ _]|elapsed[ _])?(time|t|timestamp)(?![a-z0-9]).*")
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Data:
 
     Attributes:
         r: (samples, r), the reference of a loop; None where some file does not have it.
-        lengths: the samples of each experiment.
+        lengths: the samples of each stretch without gaps.
+        notes: what was done to the record and what was seen in it.
     """
 
     u: Array
@@ -49,58 +53,210 @@ class Data:
     notes: tuple[str, ...]
 
 
-def read_data(paths: Sequence[Path], units: Units, deviations: Deviations) -> Data:
+def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Data:
     """The columns u1, u2, .., y1, y2, .. of all channels of the plant and, if there is one, time.
 
     The only input may be called u, the only output y.
 
     Raises:
-        SpecError: `unknown-channel`, the operating point is that of a channel that the plant does not have.
-        DataError: a file cannot be read, lacks a column, holds text or gaps, or is sampled otherwise than
-            the spec says.
+        SpecError: `unknown-channel`, a channel is named that the plant does not have.
+        DataError: a file cannot be read, lacks a column, holds text, or is sampled otherwise than the spec
+            says.
     """
     channels = [f"u{i + 1}" for i in range(units.inputs)] + [f"y{i + 1}" for i in range(units.outputs)]
-    for name in deviations.operating_point:
-        if name not in channels:
-            raise bad_spec(
-                "unknown-channel",
-                f"the operating point names {name}, but the plant has no such channel",
-                hint=f"its channels are {', '.join(channels)}: write --operating-point {channels[0]}=1.5",
-            )
-    parts = [_read(path, units, deviations, named=len(paths) > 1) for path in paths]
-    references = [r for _, _, r, _ in parts if r is not None]
+    for what, option, names in (
+        ("operating point names", f"--operating-point {channels[0]}=1.5", preparation.operating_point),
+        ("columns name", f"--columns {channels[0]}=2", set(preparation.columns) - {"time"}),
+    ):
+        for name in names:
+            if name not in channels:
+                raise bad_spec(
+                    "unknown-channel",
+                    f"the {what} {name}, but the plant has no such channel",
+                    hint=f"its channels are {', '.join(channels)}: write {option}",
+                )
+    parts = [_read(path, units, preparation, named=len(paths) > 1) for path in paths]
+    references = [part.r for part in parts if part.r is not None]
     return Data(
-        np.concatenate([u for u, _, _, _ in parts]),
-        np.concatenate([y for _, y, _, _ in parts]),
+        np.concatenate([part.u for part in parts]),
+        np.concatenate([part.y for part in parts]),
         np.concatenate(references) if len(references) == len(parts) else None,
-        tuple(len(y) for _, y, _, _ in parts),
-        tuple(note for _, _, _, notes in parts for note in notes),
+        tuple(length for part in parts for length in part.lengths),
+        tuple(note for part in parts for note in part.notes),
     )
 
 
-def _read(
-    path: Path, units: Units, deviations: Deviations, *, named: bool
-) -> tuple[Array, Array, Array | None, list[str]]:
-    """u, y, the reference of a loop and notes of one file, which the notes name if asked to."""
-    header = read_header(path, key="")
-    channels = {"u": _names("u", units.inputs, header), "y": _names("y", units.outputs, header)}
-    wanted = {name: column for names in channels.values() for name, column in names.items()}
-    timed = _timed(header)
-    if timed:
-        _check_unit(path, units, *timed)
-    references = _references(units, header)
-    columns = read_columns(path, {**wanted, **{name: name for name in references}}, key="")
-    if timed:
-        _check_times(path, units, read_times(path, timed[0], _UNITS[units.time_unit]))
-    notes = []
-    for name in wanted:
-        x = columns[name]
-        notes += _outliers(name, x)
-        level = deviations.operating_point.get(name if name[1:] else f"{name}1", 0.0)
-        columns[name] = x - (x.mean() if deviations.remove_means else level)
-    u, y = (np.stack([columns[name] for name in names], axis=1) for names in channels.values())
-    r = np.stack([columns[name] for name in references], axis=1) if references else None
-    return u, y, r, [f"{path.name}: {note}" for note in notes] if named else notes
+@dataclass(frozen=True)
+class Signals:
+    """What stands in the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
+
+    Attributes:
+        time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
+        dated: whether the times stand as dates; they are counted in seconds then.
+        inputs, outputs: what notes call the columns of u and y.
+    """
+
+    sheet: Sheet
+    time: Array
+    name: str
+    dated: bool
+    u: Array
+    y: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+def signals_of(
+    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Sequence[str] = ()
+) -> Signals:
+    """The columns of so many channels; those of `references` follow the inputs.
+
+    Raises:
+        DataError: a column is missing, or holds text or nothing.
+    """
+    wanted = {
+        **_channels("u", inputs, sheet, preparation),
+        **_channels("y", outputs, sheet, preparation),
+        **{name: name for name in references},
+        **time_column(sheet, preparation),
+    }
+    found = columns_of(sheet, wanted)
+    for role, numbers in found.items():
+        if np.isnan(numbers).all():
+            message = f"the column {wanted[role]} holds no number"
+            raise DataError(sheet.error("data-not-a-number", message, "is it another column?", 0))
+    rows = np.arange(preparation.skip, len(sheet.lines))
+    time = found.get("time", np.arange(len(sheet.lines), dtype=float))
+    if preparation.span is not None:
+        begin, end = preparation.span
+        scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
+        rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
+    if not rows.size:
+        message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
+        raise DataError.because("data-unreadable", message, "mind --skip and --range", sheet.key)
+    kept = replace(
+        sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
+    )
+    driving = (*_labels("u", inputs), *references)
+    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
+    y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
+    name = wanted.get("time", "")
+    dated = bool(name) and is_dated(sheet, name)
+    return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
+
+
+def _labels(letter: str, count: int) -> tuple[str, ...]:
+    """What notes call channels: u, or u1, u2, .. of several."""
+    return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
+
+
+def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
+    """`time` -> the name of its column, if there is one.
+
+    Raises:
+        DataError: there are several.
+    """
+    if "time" in preparation.columns:
+        return {"time": preparation.columns["time"]}
+    timed = [name for name in sheet.header if _TIME.fullmatch(name)]
+    if len(timed) > 1:
+        message = f"{sheet.path.name} has several columns of times: {', '.join(timed)}"
+        hint = f"say which one counts: --columns time={timed[0]}"
+        raise DataError(sheet.error("data-missing-column", message, hint))
+    return {"time": timed[0]} if timed else {}
+
+
+def time_unit_of(name: str) -> str | None:
+    """The unit in the name of a column of times: `time_ms`, `Time (sec)`."""
+    words = re.findall(r"[a-z]+", name.lower())
+    return _UNITS.get(words[-1]) if len(words) > 1 else None
+
+
+def prepared(
+    signals: Signals, step: float, time_unit: str, preparation: Preparation
+) -> tuple[list[Segment], list[str]]:
+    """Segments with even steps, their trends taken away, and what was done and seen.
+
+    Args:
+        step: the sample time.
+        time_unit: of the times, for messages.
+
+    Raises:
+        DataError: `data-not-uniform`, the times run backwards or jitter too much.
+    """
+    sheet, rows, told = signals.sheet, signals.sheet.lines, list[str]()
+    time = signals.time if signals.name else signals.time * step
+    backwards = np.flatnonzero(np.diff(time) <= 0.0)
+    if backwards.size:
+        row = int(backwards[0]) + 1
+        message = f"the time goes from {time[row - 1]:.10g} to {time[row]:.10g} {time_unit}"
+        hint = "sort the rows, and keep one of those with the same time"
+        raise DataError(sheet.error("data-not-uniform", message, hint, row))
+    for names, values in ((signals.inputs, signals.u), (signals.outputs, signals.y)):
+        for name, x in zip(names, values.T, strict=True):
+            there = ~np.isnan(x)
+            told += outliers(name, x[there], rows[there])
+            told += limits_of_sensor(name, x[there]) if names is signals.outputs else []
+    segments, cuts = whole_segments(time, signals.u, signals.y, step, resample=preparation.resample)
+    told = [*cuts, *told]
+    off = jitter(segments, step)
+    if off > EVEN:
+        if off > MOST_JITTER and not preparation.resample:
+            row = _worst_step(signals.time, step)
+            message = (
+                f"the steps of time differ from {step:.6g} {time_unit} by up to {100 * off:.3g} %, and more "
+                f"than {100 * MOST_JITTER:g} % is not evened out unasked"
+            )
+            hint = "add --resample to interpolate all the same, or give the sample time that holds"
+            raise DataError(sheet.error("data-not-uniform", message, hint, row))
+        segments = [resampled(part, step) for part in segments]
+        told.insert(
+            0,
+            f"the steps of time jitter by up to {100 * off:.2g} % of {step:.6g} {time_unit}: resampled "
+            "(outputs by interpolation, inputs at the nearest sample)",
+        )
+    taken = [_detrended(part, signals, preparation) for part in segments]
+    return [part for part, _ in taken], [*told, *dict.fromkeys(n for _, notes in taken for n in notes)]
+
+
+def _detrended(part: Segment, signals: Signals, preparation: Preparation) -> tuple[Segment, list[str]]:
+    told = []
+    found = {}
+    for letter, names, values in (("u", signals.inputs, part.u), ("y", signals.outputs, part.y)):
+        columns = []
+        for name, x in zip(names, values.T, strict=True):
+            level = preparation.operating_point.get(name if name[1:] else f"{name}1", 0.0)
+            if preparation.detrend == "none":
+                columns.append(x - level)
+                continue
+            away, what = trend(x, preparation.detrend)
+            told.append(f"{what} was taken away from {name}")
+            columns.append(x - away)
+        found[letter] = np.column_stack(columns)
+    return Segment(part.time, found["u"], found["y"]), told
+
+
+def _worst_step(time: Array, step: float) -> int:
+    return int(np.nanargmax(np.abs(np.diff(time) - step))) + 1
+
+
+def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) -> Data:
+    """One file, which the notes name if asked to."""
+    sheet = read_sheet(path, key="")
+    references = _references(units, sheet.header)
+    signals = signals_of(sheet, units.inputs, units.outputs, preparation, references)
+    if signals.dated:
+        signals = replace(signals, time=signals.time / _SECONDS[units.time_unit])
+    _check_steps(signals, units, preparation)
+    segments, told = prepared(signals, units.sample_time, units.time_unit, preparation)
+    inputs = np.concatenate([part.u for part in segments])
+    return Data(
+        inputs[:, : units.inputs],
+        np.concatenate([part.y for part in segments]),
+        inputs[:, units.inputs :] if references else None,
+        tuple(len(part.y) for part in segments),
+        tuple(f"{path.name}: {note}" if named else note for note in told),
+    )
 
 
 def _references(units: Units, header: Sequence[str]) -> Sequence[str]:
@@ -122,7 +278,7 @@ def blaming_columns(path: Path) -> Iterator[None]:
     try:
         yield
     except SpecError as error:
-        header = read_header(path, key="")
+        header = read_sheet(path, key="").header
 
         def placed(diagnostic: Diagnostic) -> Diagnostic:
             named = [name for name in header if name.startswith(diagnostic.key or "u")]
@@ -133,66 +289,38 @@ def blaming_columns(path: Path) -> Iterator[None]:
         raise DataError([placed(diagnostic) for diagnostic in error.diagnostics]) from error
 
 
-def _names(letter: str, channels: int, header: list[str]) -> dict[str, str]:
-    """How the channels are called, and how their columns begin: u1, u2, ..; u or u1 for one channel."""
-    if channels == 1:
-        numbered = f"{letter}1"
-        return {letter: numbered if any(name.startswith(numbered) for name in header) else letter}
-    return {f"{letter}{i + 1}": f"{letter}{i + 1}" for i in range(channels)}
+def _channels(letter: str, count: int, sheet: Sheet, preparation: Preparation) -> dict[str, str]:
+    """Channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user said."""
+    found = {}
+    for name in (f"{letter}{i + 1}" for i in range(count)):
+        plain = count == 1 and not any(header.startswith(name) for header in sheet.header)
+        found[name] = preparation.columns.get(name, letter if plain else name)
+    return found
 
 
-def _timed(header: Sequence[str]) -> tuple[str, str] | None:
-    """The column of times and its unit, which may be empty; `time` before the other names."""
-    found = [(name, *match.groups()) for name in header if (match := _TIMES.fullmatch(name))]
-    named = [one for one in found if not one[2] or one[2] in _UNITS or one[1] == "time"]
-    named.sort(key=lambda one: ("time", "t", "timestamp").index(one[1]))
-    return (named[0][0], named[0][2] or "") if named else None
+def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> None:
+    """The file is sampled as the spec says.
 
-
-def _check_unit(path: Path, units: Units, name: str, unit: str) -> None:
-    if unit in _UNITS and unit != units.time_unit:
-        raise DataError.because(
-            "data-wrong-unit",
-            f"the times are in {unit}, but the spec counts in {units.time_unit}",
-            f"set time_unit: {unit} (and sample_time in it), or convert the column",
-            "time_unit",
-            Location(str(path), 1, 1, name),
-        )
-
-
-def _check_times(path: Path, units: Units, time: Array) -> None:
-    steps = np.diff(time)
-    off = np.abs(steps - units.sample_time) > _JITTER * units.sample_time
-    if not np.any(off):
+    Raises:
+        DataError: `data-wrong-unit` or `data-not-uniform`.
+    """
+    sheet = signals.sheet
+    unit = None if signals.dated else preparation.time_unit or time_unit_of(signals.name)
+    if unit is not None and unit != units.time_unit:
+        message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
+        hint = f"set time_unit: {unit} (and sample_time in it), or convert the column"
+        place = Location(str(sheet.path), 1, 1, signals.name)
+        raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
+    steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
+    stated = preparation.sample_time or sheet.sample_time
+    typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
+    if abs(typical - units.sample_time) <= (EVEN if stated else MOST_JITTER) * units.sample_time:
         return
-    row = int(np.argmax(off))
-    typical = float(np.median(steps))
-    if abs(typical - units.sample_time) > _JITTER * units.sample_time:
-        message = f"the data are sampled every {typical:.6g} {units.time_unit}"
-        hint = f"if that is right, set sample_time: {typical:.6g} and design anew"
-    else:
-        message = (
-            f"the time advances by {steps[row]:.6g} {units.time_unit} here ({int(off.sum())} such places)"
-        )
-        hint = "fill the gap, or use a part of the record without gaps"
     raise DataError.because(
         "data-not-uniform",
-        f"{message}, but sample_time is {units.sample_time:g} {units.time_unit}",
-        hint,
+        f"the data are sampled every {typical:.6g} {units.time_unit}, but sample_time is "
+        f"{units.sample_time:g} {units.time_unit}",
+        f"if that is right, set sample_time: {typical:.6g} and design anew",
         "sample_time",
-        Location(str(path), row + 3, 1, f"{time[row + 1]:.10g}"),
+        Location(str(sheet.path), int(sheet.lines[min(1, len(sheet.lines) - 1)]), 1, ""),
     )
-
-
-def _outliers(name: str, x: Array) -> list[str]:
-    middle = np.median(x)
-    spread = 1.4826 * np.median(np.abs(x - middle))
-    if spread <= 0.0:
-        return []
-    found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
-    if not found.size:
-        return []
-    rows = ", ".join(str(row + 2) for row in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
-    return [
-        f"{name} has {found.size} outlying value{'s' * (found.size > 1)} (row {rows}): look at the record"
-    ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from inputdesign_cli.identification import FrequencyResponse
@@ -16,27 +18,35 @@ _BY_U = (
 
 
 def response_of_data(
-    units: Units, model: Model, found: FrequencyResponse, *, by_reference: bool
+    units: Units,
+    model: Model,
+    found: FrequencyResponse,
+    *,
+    by_reference: bool,
+    inputs: Sequence[int] | None = None,
 ) -> tuple[Table, ResponseCurves, dict[str, Json]]:
-    """The table, its figure, and what `assessment.frequency_response` says of it.
+    """The table, its figure, and what `frequency_response` of the result says of it.
 
     Args:
         model: the estimate that it stands beside.
         by_reference: whether a reference from outside was used.
+        inputs: those (from zero) that `found` has; None: all.
     """
     w = found.frequency / units.sample_time
     G = model.plant_at(w * units.frequency)
     columns: dict[str, Array] = {units.frequency_header: w}
     panels, outside = [], np.zeros(w.size, dtype=bool)
     for i in range(units.outputs):
-        for j in range(units.inputs):
-            own, radius, modelled = found.G[:, i, j], found.radius[:, i, j], G[:, i, j]
+        for k, j in enumerate(range(units.inputs) if inputs is None else inputs):
+            own, radius, modelled = found.G[:, i, k], found.radius[:, i, k], G[:, i, j]
             listed = {"G_re": own.real, "G_im": own.imag, "G_abs": np.abs(own), "radius": radius}
             listed["model_abs"] = np.abs(modelled)
             columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
             entry = None if units.single else (i, j)
-            panels.append(ResponsePanel(w, np.abs(own), radius, np.abs(modelled), entry))
+            panels.append(ResponsePanel(w, own, radius, modelled, entry))
             outside |= np.abs(own - modelled) > radius
+        number = "" if units.single else f"_{i + 1}"
+        columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}
     told: dict[str, Json] = {
         "method": found.method,
         "excitation": "r" if by_reference else "u",

@@ -1,0 +1,163 @@
+"""From raw logs to models: the simulation fit on the second half, beside the best of a brute-force search.
+
+`python benchmarks/exploration.py [RECORD ..]` gives `idesign explore` the first half of each record of
+docs/data and judges its model.yaml by the second, by the functions of the command. Beside it stands the best
+ARX model of the first half, orders to 8 and delays to 8, that is chosen on that same second half. The column
+moves one input in each half, so that neither tells the other: its whole record is explored, blocks in turn.
+"""
+
+import argparse
+import itertools
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.identification.explore import fits
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.specification import load_spec
+from inputdesign_cli.tasks import explore
+from inputdesign_cli.tasks.build.log import read_log
+from inputdesign_cli.tasks.build.preparation import Preparation
+
+DATA = Path(__file__).parents[1] / "docs" / "data"
+HIGHEST = 8
+
+# Name -> files (one is cut into halves), columns, whether there is a header.
+RECORDS = {
+    "two heaters": (
+        ["tclab/two_heaters.txt"],
+        {"u1": "Heater 1", "u2": "Heater 2", "y1": "Temperature 1", "y2": "Temperature 2"},
+        True,
+    ),
+    "heater step": (["tclab/step.csv"], {"time": "1", "u1": "2", "y1": "3"}, False),
+    "converter": (["buck_converter/buck_id.csv"], {"u1": "input", "y1": "y"}, True),
+    "converter, two files": (
+        ["buck_converter/buck_id.csv", "buck_converter/buck_valid.csv"],
+        {"u1": "input", "y1": "y"},
+        True,
+    ),
+    "cylinders": (
+        ["cylinders/MultivariableCylinders.csv"],
+        {"time": "1", "u1": "2", "u2": "3", "y1": "4", "y2": "5"},
+        False,
+    ),
+    "column": (["wood_berry/record.csv"], {"u1": "u1", "u2": "u2", "y1": "y1", "y2": "y2"}, True),
+}
+
+
+def halves(name: str, folder: Path) -> list[Path]:
+    """The two halves of a record as files."""
+    files, _, headed = RECORDS[name]
+    if len(files) == 2:
+        return [DATA / file for file in files]
+    lines = (DATA / files[0]).read_text().splitlines()
+    head, rows = (lines[:1], lines[1:]) if headed else ([], lines)
+    middle = len(rows) // 2
+    found = []
+    for part, some in (("first", rows[:middle]), ("second", rows[middle:])):
+        found.append(folder / f"{part}.csv")
+        found[-1].write_text("\n".join([*head, *some]) + "\n")
+    return found
+
+
+def brute_force(first, second) -> float:
+    """The best fit of one output on `second`, of ARX models that least squares finds on `first`."""
+    u, y = first
+    best = -np.inf
+    for a, b, delay in itertools.product(range(1, HIGHEST + 1), range(1, HIGHEST + 1), range(HIGHEST + 1)):
+        begin = max(a, b + delay - 1)
+        rows = len(y) - begin
+        if rows <= a + b * u.shape[1]:
+            continue
+        columns = [-y[begin - lag : len(y) - lag, 0] for lag in range(1, a + 1)]
+        for j in range(u.shape[1]):
+            columns += [u[begin - lag : len(u) - lag, j] for lag in range(delay, delay + b)]
+        theta = np.linalg.lstsq(np.stack([*columns, np.ones(rows)], 1), y[begin:, 0], rcond=None)[0]
+        parts = np.split(theta[a:-1], u.shape[1])
+        one = (np.ones(1),)
+        model = PolynomialModel(
+            (tuple(np.concatenate([np.zeros(delay), part]) for part in parts),),
+            (np.concatenate([[1.0], theta[:a]]),),
+            ((np.ones(1),) * u.shape[1],),
+            one,
+            one,
+            np.eye(1),
+        )
+        if all(np.any(part) for part in parts):
+            best = max(best, fits(model, [second]).simulation[0])
+    return best
+
+
+def model_of(result, output: int) -> str:
+    """The structure that was chosen for an output."""
+    structure = result["exploration"]["outputs"][output]["structure"]
+    orders = " ".join(f"{letter}{n}" for letter, n in structure["orders"].items())
+    return f"{structure['family']} {orders}, delay {' and '.join(map(str, structure['delay']))}"
+
+
+def compared(name: str) -> None:
+    """Print the rows of one record."""
+    files, columns, _ = RECORDS[name]
+    if name == "column":
+        started = time.perf_counter()
+        result = explore([DATA / file for file in files], Preparation(columns=columns)).results.result
+        seconds = time.perf_counter() - started
+        for i, fit in enumerate(result["validation"]["simulation_fit_percent"]):
+            print(
+                f"| {name} | y{i + 1} | {model_of(result, i)} | {fit:.1f} | | | {seconds:.0f} |", flush=True
+            )
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        first, second = halves(name, Path(folder))
+        started = time.perf_counter()
+        found = explore([first], Preparation(columns=columns))
+        seconds = time.perf_counter() - started
+        model = Path(folder) / "model.yaml"
+        model.write_bytes(found.results.files["model.yaml"])
+        judged = explore(
+            [second], Preparation(columns=columns), model=load_spec(model, design=False)
+        ).results.result["validation"]["simulation_fit_percent"]
+        logs = [read_log(file, Preparation(columns=columns)) for file in (first, second)]
+        for i, fit in enumerate(judged if isinstance(judged, list) else [judged]):
+            best = brute_force(*[(log.u, log.y[:, i : i + 1]) for log in logs])
+            row = [name, f"y{i + 1}", model_of(found.results.result, i), f"{fit:.1f}", f"{best:.1f}"]
+            print("|", " | ".join([*row, f"{fit - best:+.1f}", f"{seconds:.0f}"]), "|", flush=True)
+
+
+def long_record(rows: int) -> None:
+    """Time and memory of a record of so many rows."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], rows // 5 + 1), 5)[:rows]
+    y = np.zeros(rows)
+    for k in range(3, rows):
+        y[k] = 1.5 * y[k - 1] - 0.56 * y[k - 2] + 0.1 * u[k - 3]
+    y += 0.3 * rng.standard_normal(rows)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "long.csv"
+        np.savetxt(path, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+        started = time.perf_counter()
+        explore([path], Preparation())
+        seconds = time.perf_counter() - started
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"\n{rows} rows: {seconds:.1f} s, {memory:.0f} MB")
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("records", nargs="*", default=list(RECORDS), help=f"of {', '.join(RECORDS)}")
+    parser.add_argument("--rows", type=int, default=0, help="also a simulated record of so many rows")
+    chosen = parser.parse_args()
+    print("| record | output | model | fit % | brute force % | difference | seconds |")
+    print("|---|---|---|---|---|---|---|")
+    for name in chosen.records:
+        compared(name)
+    if chosen.rows:
+        long_record(chosen.rows)
+
+
+if __name__ == "__main__":
+    main()

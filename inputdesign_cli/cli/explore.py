@@ -1,0 +1,76 @@
+"""`idesign explore`: a log in, a model and a spec out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inputdesign_cli.cli.data import preparation
+from inputdesign_cli.cli.options import (
+    Columns,
+    DataFiles,
+    DetrendWord,
+    ExplorationOutput,
+    Figures,
+    Json,
+    NoOutput,
+    Overwrite,
+    Quiet,
+    Resample,
+    SampleTime,
+    Skip,
+    Span,
+    TimeUnit,
+)
+from inputdesign_cli.cli.reading import read_spec
+from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.errors import EXIT_MISSED
+
+
+def explore(
+    data: DataFiles,
+    columns: Columns = "",
+    validate: Annotated[
+        Path | None,
+        typer.Option("--validate", metavar="MODEL", help="Judge this model by the data; look for no other."),
+    ] = None,
+    sample_time: SampleTime = None,
+    time_unit: TimeUnit = None,
+    resample: Resample = False,
+    detrend: DetrendWord = "none",
+    skip: Skip = 0,
+    span: Span = "",
+    output: ExplorationOutput = None,
+    overwrite: Overwrite = False,
+    no_output: NoOutput = False,
+    figures: Figures = True,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find a model in a log, and write a spec for the next experiment.
+
+    Needs no spec. Delays, orders and the family of the model are estimated on one part of the record and
+    judged on the other. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and
+    report.html; prints a summary. Exits with 1, and says why, where no model deserves trust.
+    """
+    with status(f"{data[0]}: computing ...", quiet=quiet):
+        from inputdesign_cli import tasks
+
+        prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span)
+        model = None if validate is None else read_spec(validate, None, None, design=False)
+        found = tasks.explore(data, prepared, model=model)
+    ending = "explored" if validate is None else "validated"
+    sources = [*([validate] if validate is not None else []), *data]
+    place = Place(output, f"{data[0].stem}_{ending}", sources, overwrite, no_output)
+    keep(found.results, place, figures=figures, json_output=json_output, quiet=quiet)
+    if not no_output and validate is None:
+        from inputdesign_cli.report.render import report_text
+        from inputdesign_cli.runs.record import PAGE
+        from inputdesign_cli.runs.run_directory import replace_text
+
+        replace_text(place.directory / PAGE, report_text(place.directory))
+    if found.reasons:
+        raise typer.Exit(EXIT_MISSED)

@@ -1,0 +1,113 @@
+"""How well a model explains records: by simulation from the inputs, and one step ahead.
+
+fit = 100 (1 - |y - y_hat| / |y - mean y|), the level and the state at the start of every record estimated
+along: of a simulation so that it is best, as those of an output-error model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.special
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.polynomial_record import PolynomialRecord
+from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.polynomial import Array
+
+Parts = Sequence[tuple[Array, Array]]
+_BY_CHANCE = 0.05
+_DEPENDENT = 1e-9
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Per cent, output by output; -inf where the model is unstable and has no simulation.
+
+    Attributes:
+        simulated, errors: the simulations (N, p) of all records, and their prediction errors.
+    """
+
+    simulation: tuple[float, ...]
+    prediction: tuple[float, ...]
+    simulated: Array
+    errors: Array
+
+
+def fits(model: PolynomialModel, parts: Parts) -> Fits:
+    """The fits of a model to records u (n, r), y (n, p)."""
+    measured, varying, simulated = _simulated(model, parts)
+    structure = Structure.of(model)
+    with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
+        errors = np.concatenate([_prediction_errors(structure, model.theta, u, y) for u, y in parts])
+    return Fits(percent(measured - simulated, varying), percent(errors, varying), simulated, errors)
+
+
+def simulation_fit(model: PolynomialModel, parts: Parts) -> tuple[float, ...]:
+    """The first of them alone."""
+    measured, varying, simulated = _simulated(model, parts)
+    return percent(measured - simulated, varying)
+
+
+def _simulated(model: PolynomialModel, parts: Parts) -> tuple[Array, Array, Array]:
+    """(N, p) each: the outputs, what of them varies in each record, and the simulations."""
+    return (
+        np.concatenate([y for _, y in parts]),
+        np.concatenate([y - y.mean(axis=0) for _, y in parts]),
+        np.concatenate([simulate_free(model, u - u.mean(axis=0), y) for u, y in parts]),
+    )
+
+
+def _prediction_errors(structure: Structure, theta: Array, u: Array, y: Array) -> Array:
+    record = PolynomialRecord(structure, u - u.mean(axis=0), y - y.mean(axis=0))
+    return Records((record,), free=True).at(theta).errors
+
+
+def by_chance(samples: int, unknowns: int, tried: int) -> float:
+    """Per cent that the best of `tried` simulations explains of white noise, with 5 % of probability at most.
+
+    Levels, starts and an agreement by chance take a chi-squared share of its power; the probabilities of
+    the structures that were tried add up at most (Bonferroni).
+    """
+    share = scipy.special.chdtri(unknowns, _BY_CHANCE / tried) / samples
+    return float(100.0 * (1.0 - np.sqrt(max(1.0 - share, 0.0))))
+
+
+def percent(errors: Array, varying: Array) -> tuple[float, ...]:
+    """Of the rms of what varies (N, p) the share that errors (N, p) do not leave."""
+    with np.errstate(over="ignore"):
+        left = np.linalg.norm(errors, axis=0) / np.maximum(np.linalg.norm(varying, axis=0), 1e-300)
+    return tuple(float(100.0 * (1.0 - x)) if np.isfinite(x) else -np.inf for x in left)
+
+
+def simulate_free(model: PolynomialModel, u: Array, y: Array) -> Array:
+    """(n, p): the simulation from u (n, r), its level and start such that it is nearest to y (n, p)."""
+    error_form = output_error_form(model)
+    record = PolynomialRecord(Structure.of(error_form), u, y)
+    with np.errstate(over="ignore", invalid="ignore"):
+        caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
+        starts = record.free_responses(error_form.theta)
+        for i, responses in enumerate(starts):
+            caused[:, i] += begun(responses, y[:, i] - caused[:, i])
+    return caused
+
+
+def begun(responses: NDArray[np.float64], left: Array) -> Array:
+    """The combination of responses (m, n) that is nearest to what is left (n,); infinite where they are."""
+    if not (np.all(np.isfinite(responses)) and np.all(np.isfinite(left))):
+        return np.full(left.shape, np.inf)
+    columns = responses.T / np.maximum(np.linalg.norm(responses, axis=1), 1e-300)
+    return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
+
+
+def output_error_form(model: PolynomialModel) -> PolynomialModel:
+    """The plant of a model, its A multiplied into every F, with white noise on the output."""
+    rows = [
+        tuple(np.convolve(a, f) for f in fs) for a, fs in zip(model.per_output(model.A), model.F, strict=True)
+    ]
+    one = (np.ones(1),)
+    return PolynomialModel(model.B, one, tuple(rows), one, one, model.covariance)

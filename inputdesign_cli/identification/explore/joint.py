@@ -1,0 +1,186 @@
+"""All outputs: the structure of each found by itself, then one model of all of them on the whole record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.identification.checks import check_varying, signal_name
+from inputdesign_cli.identification.estimate import Estimate
+from inputdesign_cli.identification.explore.fits import Fits, Parts, fits
+from inputdesign_cli.identification.explore.search import Candidate, Chosen, busiest, explore_structure
+from inputdesign_cli.identification.polynomials import identify_polynomials
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.polynomial import Array
+
+_SHARE = 0.6
+_BLOCKS = 10
+# An input that moves less than this share of what it does in the whole record is still in that part.
+_STILL = 0.02
+_FEWEST = 30
+_MOST_SAMPLES = 20_000
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a record tells.
+
+    Attributes:
+        outputs: what was found for each; `taken` is the candidate that the model is made of.
+        model: of all channels, estimated on the whole record; inputs that never move have no part in it.
+        estimate: its estimate; `used` are the records that it was made from.
+        validation: the fits of the same structures, estimated on one part, to the other.
+        interleaved: whether the parts are blocks that take turns, instead of beginning and end.
+        still: inputs (from zero) that never move.
+    """
+
+    outputs: tuple[Chosen, ...]
+    taken: tuple[Candidate, ...]
+    model: PolynomialModel
+    estimate: Estimate
+    used: Parts
+    validation: Fits
+    interleaved: bool
+    still: tuple[int, ...]
+
+
+def explore_records(parts: Parts, *, feedback: bool = False) -> Found:
+    """The model that records u (n, r), y (n, p) speak for.
+
+    Raises:
+        SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
+    """
+    u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
+    still = tuple(int(j) for j in np.flatnonzero(np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0)))
+    if len(still) == u.shape[1]:
+        check_varying(("a gain", "its dynamics"), u, y)
+    moving = [j for j in range(u.shape[1]) if j not in still]
+    check_varying(("a gain", "its dynamics"), u[:, moving], y)
+    needed = _FEWEST * (len(moving) + 1) // 2
+    if len(y) < needed:
+        raise bad_spec(
+            "too-few-samples",
+            f"{len(y)} samples are too few to choose a structure and to judge it: take {needed} at least",
+            hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
+            key="u",
+        )
+    moved = [(part_u[:, moving], part_y) for part_u, part_y in parts]
+    first, second, interleaved = divided(moved)
+    found = []
+    for i in range(y.shape[1]):
+        own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
+        chosen = explore_structure(own[0], own[1], feedback=feedback)
+        if chosen is None:
+            name = signal_name("y", i, y.shape[1])
+            raise bad_spec(
+                "no-structure",
+                f"no model of {name} could be estimated: the record does not tell its parameters",
+                hint="the input moves too little or too simply: apply steps of several lengths, or a PRBS",
+                key=name,
+            )
+        found.append(chosen)
+    used = busiest(moved, _MOST_SAMPLES)
+    taken, estimate, model = _estimated(found, used)
+    on_first = rows([c.orders.model().at(c.theta) for c in taken])
+    validation = fits(on_first, second)
+    whole = embedded(model, u.shape[1], moving)
+    return Found(
+        tuple(found),
+        taken,
+        whole,
+        replace(estimate, names=whole.names),
+        busiest(parts, _MOST_SAMPLES),
+        validation,
+        interleaved,
+        still,
+    )
+
+
+def _estimated(
+    found: Sequence[Chosen], used: Parts
+) -> tuple[tuple[Candidate, ...], Estimate, PolynomialModel]:
+    """The best structures on the whole record; simpler ones where these cannot be estimated there."""
+    simplest = tuple(min(chosen.candidates, key=lambda c: c.orders.size) for chosen in found)
+    u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
+    reason: SpecError | None = None
+    for taken in (tuple(chosen.best for chosen in found), tuple(_second(c) for c in found), simplest):
+        structure = rows([c.orders.model().at(c.theta) for c in taken])
+        try:
+            estimate = identify_polynomials(
+                structure, u, y, start=structure.theta, lengths=[len(part) for _, part in used], rest=False
+            )
+        except SpecError as error:
+            reason = error
+            continue
+        model = structure.at(estimate.theta, estimate.noise)
+        if all(model.stable_outputs):
+            return taken, estimate, model
+    raise reason or bad_spec(
+        "no-structure",
+        "no stable model explains the record",
+        hint="record it in a loop, or remove the drift: --detrend linear",
+        key="y",
+    )
+
+
+def _second(chosen: Chosen) -> Candidate:
+    return chosen.candidates[min(1, len(chosen.candidates) - 1)]
+
+
+def divided(parts: Parts) -> tuple[Parts, Parts, bool]:
+    """Beginning and end of the records, or blocks in turn where an input rests in one of these."""
+    total = sum(len(y) for _, y in parts)
+    first: list[tuple[Array, Array]] = []
+    second: list[tuple[Array, Array]] = []
+    left = int(_SHARE * total)
+    for u, y in parts:
+        at = min(max(left, 0), len(y))
+        left -= len(y)
+        for some, piece in ((first, slice(0, at)), (second, slice(at, None))):
+            if len(y[piece]):
+                some.append((u[piece], y[piece]))
+    if _moves(first, parts) and _moves(second, parts):
+        return first, second, False
+    length = max(total // _BLOCKS, 1)
+    blocks = [
+        (u[begin : begin + length], y[begin : begin + length])
+        for u, y in parts
+        for begin in range(0, len(y), length)
+        if len(y) - begin >= length // 2
+    ]
+    return blocks[::2], blocks[1::2], True
+
+
+def _moves(some: Parts, whole: Parts) -> bool:
+    """Whether all inputs move in a part, as they do in the whole."""
+    if not some:
+        return False
+    spread, of_all = (np.concatenate([u for u, _ in records]).std(axis=0) for records in (some, whole))
+    return bool(np.all(spread > _STILL * of_all))
+
+
+def rows(models: Sequence[PolynomialModel]) -> PolynomialModel:
+    """Models of one output each, of the same inputs, as one model."""
+    return PolynomialModel(
+        tuple(model.B[0] for model in models),
+        tuple(model.A[0] for model in models),
+        tuple(model.F[0] for model in models),
+        tuple(model.C[0] for model in models),
+        tuple(model.D[0] for model in models),
+        np.diag([float(model.covariance[0, 0]) for model in models]),
+    )
+
+
+def embedded(model: PolynomialModel, inputs: int, moving: Sequence[int]) -> PolynomialModel:
+    """The same model among `inputs` inputs, of which those that are not `moving` have no effect."""
+    if len(moving) == inputs:
+        return model
+    B = [[np.zeros(1)] * inputs for _ in range(model.outputs)]
+    F = [[np.ones(1)] * inputs for _ in range(model.outputs)]
+    for i in range(model.outputs):
+        for k, j in enumerate(moving):
+            B[i][j], F[i][j] = model.B[i][k], model.F[i][k]
+    return replace(model, B=tuple(map(tuple, B)), F=tuple(map(tuple, F)))

@@ -1,0 +1,65 @@
+"""Structures that are tried: a family, its orders, and the delay of every input, for one output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Of A y = sum_j (B_j / F_j) u_j + (C / D) e; B_j has `b` coefficients from the lag `delays[j]` on."""
+
+    family: str
+    delays: tuple[int, ...]
+    b: int
+    a: int = 0
+    c: int = 0
+    d: int = 0
+    f: int = 0
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.a + self.c + self.d + len(self.delays) * (self.b + self.f)
+
+    @property
+    def order(self) -> int:
+        """Of the plant, input by input."""
+        return self.a + self.f
+
+    @property
+    def numbers(self) -> dict[str, int]:
+        """The orders of the polynomials that the family has."""
+        every = {"A": self.a, "B": self.b, "C": self.c, "D": self.d, "F": self.f}
+        return {letter: order for letter, order in every.items() if order}
+
+    def model(self) -> PolynomialModel:
+        """The structure, with numbers that mean nothing."""
+        B = tuple(np.concatenate([np.zeros(delay), np.ones(self.b)]) for delay in self.delays)
+        F = tuple(_monic(self.f) for _ in self.delays)
+        return PolynomialModel((B,), (_monic(self.a),), (F,), (_monic(self.c),), (_monic(self.d),), np.eye(1))
+
+
+def arx(delays: tuple[int, ...], a: int, b: int) -> Orders:
+    """A y = B u + e."""
+    return Orders("ARX", delays, b, a=a)
+
+
+def plant_order(n: int, delays: tuple[int, ...]) -> list[Orders]:
+    """The families with a plant of this order; B has one coefficient more than that at order one."""
+    b = max(n, 2)
+    return [Orders("ARX", delays, b, a=n), Orders("ARMAX", delays, b, a=n, c=n), Orders("OE", delays, b, f=n)]
+
+
+def box_jenkins(of: Orders) -> list[Orders]:
+    """A plant of the same orders with coloured noise."""
+    return [Orders("BJ", of.delays, of.b, c=n, d=n, f=of.order) for n in (1, 2)]
+
+
+def _monic(order: int) -> Array:
+    return np.concatenate([[1.0], np.zeros(order)])

@@ -1,0 +1,180 @@
+"""Estimates by linear regression that need no start: ARX, and output-error models with one denominator.
+
+The second are those of [steiglitz-mcbride-1965]; B, the level and the state at the start are eliminated
+from the cost, which is that of the output error. Before a record the inputs are taken for what they are at
+its beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.stability import reflected
+from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.plant.polynomial import Array
+
+_ITERATIONS = 8
+_RIDGE = 1e-12
+_COARSE = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150)
+
+
+@dataclass(frozen=True)
+class SharedDenominator:
+    """y = sum_j (B_j / F) u_j + level + start: F (n + 1,), the loss (mean square of the output error)."""
+
+    F: Array
+    delays: tuple[int, ...]
+    loss: float
+
+
+def output_error(parts: Parts, n: int, b: int, delays: Sequence[int]) -> SharedDenominator:
+    """The estimate of one output, y (N, 1), with one denominator of order n for all inputs."""
+    begun = _begun(parts)
+    F, best, least = np.array([1.0]), np.array([1.0]), np.inf
+    for _ in range(_ITERATIONS):
+        blocks = []
+        for u, y in begun:
+            smooth = filtered([1.0], F, y)
+            past = [-_lagged(smooth, lag) for lag in range(1, n + 1)]
+            blocks.append((np.stack([*past, *_caused(u, len(y), F, n, b, delays)], axis=1), smooth))
+        solution = _solve(blocks, own=n + len(delays) * b)
+        if not np.all(np.isfinite(solution)):
+            break
+        F = reflected(np.concatenate([[1.0], solution[:n]]))
+        loss = _loss(begun, F, n, b, delays)
+        if loss < least * (1.0 - 1e-6):
+            best, least = F, loss
+        elif loss > 1.5 * least:
+            break
+    return SharedDenominator(best, tuple(delays), least)
+
+
+def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[int]) -> Iterator[Array]:
+    """Through 1/F: the delays of all inputs, a level and n impulses at the start."""
+    for x, delay in zip(filtered([1.0], F, u, axis=0).T, delays, strict=True):
+        yield from (_lagged(x, delay + lag) for lag in range(b))
+    yield filtered([1.0], F, np.ones(samples))
+    impulse = filtered([1.0], F, np.eye(1, samples)[0])
+    yield from (_lagged(impulse, lag) for lag in range(n))
+
+
+def _loss(parts: Sequence[tuple[Array, Array]], F: Array, n: int, b: int, delays: Sequence[int]) -> float:
+    """Mean square of the output error at F."""
+    left, samples = 0.0, 0
+    for (_, y), (caused, begun) in zip(parts, _explained(parts, F, n, b, delays), strict=True):
+        left += float(np.sum((y - caused - begun) ** 2))
+        samples += len(y)
+    return left / samples if np.isfinite(left) else np.inf
+
+
+def _explained(
+    parts: Sequence[tuple[Array, Array]], F: Array, n: int, b: int, delays: Sequence[int]
+) -> list[tuple[Array, Array]]:
+    """Of each record (n,), by least squares at F: what the inputs cause, and what level and start do."""
+    blocks = [(np.stack([*_caused(u, len(y), F, n, b, delays)], axis=1), y) for u, y in parts]
+    own = len(delays) * b
+    solution = _solve(blocks, own=own)
+    found, offset = [], own
+    for columns, _ in blocks:
+        extra = columns.shape[1] - own
+        begun = columns[:, own:] @ solution[offset : offset + extra]
+        found.append((columns[:, :own] @ solution[:own], begun))
+        offset += extra
+    return found
+
+
+def from_rest(parts: Parts, shared: SharedDenominator, b: int) -> list[tuple[Array, Array]]:
+    """Records with inputs counted from their first values, and outputs (n, 1) without level and start."""
+    begun = _begun(parts)
+    found = _explained(begun, shared.F, shared.F.size - 1, b, shared.delays)
+    return [(u, (y - start)[:, None]) for (u, y), (_, start) in zip(begun, found, strict=True)]
+
+
+def _begun(parts: Parts) -> list[tuple[Array, Array]]:
+    return [(u - u[0], y[:, 0] - y[:, 0].mean()) for u, y in parts]
+
+
+def _solve(blocks: Sequence[tuple[Array, Array]], *, own: int) -> Array:
+    """Least squares; the first `own` columns are shared by the blocks, the others belong to each alone."""
+    extra = [columns.shape[1] - own for columns, _ in blocks]
+    size = own + sum(extra)
+    gram, moment = np.zeros((size, size)), np.zeros(size)
+    offset = own
+    with np.errstate(over="ignore", invalid="ignore"):
+        for (columns, y), more in zip(blocks, extra, strict=True):
+            at = np.concatenate([np.arange(own), np.arange(offset, offset + more)])
+            gram[np.ix_(at, at)] += columns.T @ columns
+            moment[at] += columns.T @ y
+            offset += more
+    return normal_solution(gram, moment)
+
+
+def normal_solution(gram: Array, moment: Array) -> Array:
+    """Of normal equations, columns scaled; NaN where they overflow."""
+    if not (np.all(np.isfinite(gram)) and np.all(np.isfinite(moment))):
+        return np.full(moment.shape, np.nan)
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scaled = gram / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
+    return np.asarray(np.linalg.solve(scaled, moment / scale) / scale)
+
+
+def best_delays(parts: Parts, n: int, b: int, most: int, begin: Sequence[int]) -> SharedDenominator:
+    """The delays of all inputs with the least output error, one input after the other, twice round.
+
+    The loss is looked at on a coarse set of delays first, and then near the best of them.
+    """
+    best = output_error(parts, n, b, begin)
+    for _ in range(2 if len(begin) > 1 else 1):
+        for j in range(len(begin)):
+            tried = {best.delays[j]}
+            steps = [delay for delay in _COARSE if delay <= most]
+            while steps:
+                for delay in steps:
+                    tried.add(delay)
+                    delays = (*best.delays[:j], delay, *best.delays[j + 1 :])
+                    found = output_error(parts, n, b, delays)
+                    if found.loss < best.loss:
+                        best = found
+                at = best.delays[j]
+                below = max((d for d in tried if d < at), default=-1)
+                above = min((d for d in tried if d > at), default=most + 1)
+                steps = sorted({(below + at) // 2, (at + above + 1) // 2, at - 1, at + 1})
+                steps = [d for d in steps if below < d < above and d != at and 0 <= d <= most]
+    return best
+
+
+def arx_grid(
+    parts: Parts, most: int, delays: Sequence[tuple[int, ...]]
+) -> Iterator[tuple[int, int, tuple[int, ...], Array]]:
+    """All ARX models with orders of A and B up to `most`: (a, b, delays, coefficients), y being (N, 1)."""
+    for lags in delays:
+        size = most * (len(lags) + 1) + 1
+        gram, moment, rows = np.zeros((size, size)), np.zeros(size), 0
+        first = most + max(lags)
+        for u, y in parts:
+            if len(y) <= first + 1:
+                continue
+            x, out = u - u.mean(axis=0), y[:, 0] - y[:, 0].mean()
+            columns = [-_lagged(out, lag) for lag in range(1, most + 1)]
+            for j, delay in enumerate(lags):
+                columns += [_lagged(x[:, j], delay + lag) for lag in range(most)]
+            block = np.stack([*columns, np.ones(len(out))], axis=1)[first:]
+            gram, moment = gram + block.T @ block, moment + block.T @ out[first:]
+            rows += len(block)
+        if rows <= size:
+            continue
+        for a in range(1, most + 1):
+            for b in range(1, most + 1):
+                at = [*range(a)]
+                for j in range(len(lags)):
+                    at += range(most * (j + 1), most * (j + 1) + b)
+                at.append(most * (len(lags) + 1))
+                yield a, b, lags, normal_solution(gram[np.ix_(at, at)], moment[at])[:-1]
+
+
+def _lagged(x: Array, lag: int) -> Array:
+    return np.concatenate([np.zeros(min(lag, x.size)), x[: max(x.size - lag, 0)]])

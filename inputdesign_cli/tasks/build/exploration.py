@@ -1,0 +1,98 @@
+"""A model that was found in a log -> a complete spec, commented, and what `identify` makes of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.identification.explore import Found
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.tasks.build.identification import build_identification
+from inputdesign_cli.tasks.build.log import Log
+from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.tasks.identification import Identification
+from inputdesign_cli.tasks.result.blocks import blocks_of
+
+_MOST_SAMPLES = 100_000
+
+
+def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
+    """A spec that `idesign solve` accepts: the model, and the most informative input of that power."""
+    power = [float(x) for x in np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)]
+    most = max(power)
+    power = [x if x > 0.0 else most for x in power]
+    levels = [float(f"{x:.6g}") for x in log.u.mean(axis=0)]
+    single = len(power) == 1
+    blocks = blocks_of(found.model)
+    structures = ", ".join(
+        f"{'y' if found.model.outputs == 1 else f'y{i + 1}'}: {c.orders.family}"
+        for i, c in enumerate(found.taken)
+    )
+    names = ", ".join(f"{channel} is {column}" for channel, column in log.names.items() if channel != "time")
+    samples = min(len(log.y), _MOST_SAMPLES)
+    limit = _number(power[0]) if single else f"[{', '.join(map(_number, power))}]"
+    offset = levels[0] if single else levels
+    source = " and ".join(path.name for path in sources)
+    text = f"""\
+# Written by `idesign explore` from {source}.
+# `idesign solve FILE` designs what it asks; every entry can be changed here or by --set key=value.
+title: {json.dumps(f"The next experiment after {source}")}
+
+sample_time: {log.step!r}          # in time_unit; frequencies are in rad per time_unit
+time_unit: {log.time_unit}
+
+# What the record tells: A y = (B/F) u + (C/D) e, polynomials in q^-1 ({structures}).
+# {names}
+"""
+    for key, block in blocks.items():
+        text += "\n".join([f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())])
+        text += "\n"
+    text += f"""
+experiment:
+  samples: {samples}              # as long as the record; how long may the next one be?
+
+# What the next experiment is for. D: the most informative one within the limits. To ask for an accuracy at
+# the least cost instead, replace these lines by
+#   accuracy: {{model_error: {{relative: 0.05, confidence: 0.95}}}}  # add band: [..] if you like
+accuracy: {{criterion: D}}
+limits:
+  input_power: {limit}            # mean square about the level, as in the record
+  # amplitude: {_number(3.0 * max(power) ** 0.5)}         # what the actuator can do about its level
+
+# The family of spectra to search, and the signal to apply: about the level of the record.
+spectrum: {{type: fir, order: 20}}
+signal: {{type: filtered_noise, seed: 1, offset: {json.dumps(offset)}}}
+"""
+    return text
+
+
+def _number(x: float) -> str:
+    return f"{x:.6g}"
+
+
+def build_explored(text: str) -> Identification:
+    """What `identify` runs on, of a spec that was written for a log."""
+    return build_identification(parse_spec(text, "spec.yaml"))
+
+
+def model_to_judge(spec: Spec) -> PolynomialModel:
+    """The model of a spec that is to be judged by data.
+
+    Raises:
+        SpecError: it is not one of polynomials in q^-1.
+    """
+    match build_model(spec):
+        case PolynomialModel() as model:
+            return model
+        case _:
+            raise bad_spec(
+                "not-supported",
+                "models in s cannot be judged by data in this version",
+                hint="idesign identify DATA --spec MODEL estimates them anew and shows the fit",
+                key="plant",
+            )

@@ -1,0 +1,111 @@
+"""Columns of numbers with their names, whatever file they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import DataError, Diagnostic, Location
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Column:
+    """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
+
+    Dates, as ISO 8601 writes them, are `dated`: seconds since the first.
+    """
+
+    numbers: Array
+    fault: tuple[int, str] | None = None
+    dated: bool = False
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What a file holds.
+
+    Attributes:
+        path, key: of the file, and the key of the spec that names it.
+        names: of the columns; empty where the file has none.
+        columns: as many as names, or as each row has fields.
+        lines: (n,) of the text file, or of rows counted from one.
+        head: line and text of the header, for diagnostics.
+        texts: what the rows say, for diagnostics; empty where a file is no text.
+        shown: whether messages may show what the file holds: it is a table of numbers, and no secret.
+        sample_time: as the file says itself; None where it does not.
+    """
+
+    path: Path
+    key: str
+    names: tuple[str, ...]
+    columns: tuple[Column, ...]
+    lines: NDArray[np.int64]
+    head: tuple[int, str] = (1, "")
+    texts: Sequence[str] = ()
+    shown: bool = True
+    sample_time: float | None = None
+
+    @property
+    def header(self) -> list[str]:
+        """The names in small letters."""
+        return [name.strip().lower() for name in self.names]
+
+    def error(self, code: str, message: str, hint: str, row: int | None = None) -> Diagnostic:
+        """A diagnostic that points at a row, or at the header."""
+        line, text = self.head
+        if row is not None:
+            line, text = int(self.lines[row]), self.texts[row] if self.texts else ""
+        return Diagnostic(
+            code, message, hint, self.key, Location(str(self.path), line, 1, text if self.shown else "")
+        )
+
+
+def unreadable(path: Path, key: str, what: str, hint: str) -> DataError:
+    """The error about a file that cannot be read at all."""
+    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key)
+
+
+def of_arrays(
+    path: Path, key: str, arrays: Sequence[tuple[str, Array]], sample_time: float | None = None
+) -> Sheet:
+    """Named arrays, (n,) or (n, m), as columns: those of one array are called x1, x2, ..
+
+    Raises:
+        DataError: the arrays have no rows, or not as many as each other.
+    """
+    names: list[str] = []
+    columns: list[Column] = []
+    for name, array in arrays:
+        wide = np.asarray(array, dtype=float)
+        wide = wide[:, None] if wide.ndim == 1 else wide
+        wide = wide.T if wide.shape[0] == 1 else wide
+        single = wide.shape[1] == 1
+        names += [name if single else f"{name}{i + 1}" for i in range(wide.shape[1])]
+        columns += [Column(column, _infinite(column)) for column in wide.T]
+    lengths = {len(column.numbers) for column in columns}
+    if lengths in (set(), {0}):
+        raise unreadable(path, key, "holds no rows of numbers", "save the signals as arrays u, y and time")
+    if len(lengths) > 1:
+        told = ", ".join(f"{name} {len(c.numbers)}" for name, c in zip(names, columns, strict=True))
+        hint = "keep the signals of one experiment in a file, all of one length"
+        raise unreadable(path, key, f"holds columns of different lengths ({told})", hint)
+    return Sheet(
+        path,
+        key,
+        tuple(names),
+        tuple(columns),
+        np.arange(1, lengths.pop() + 1),
+        (1, ", ".join(names)),
+        sample_time=sample_time,
+    )
+
+
+def _infinite(numbers: Array) -> tuple[int, str] | None:
+    found = np.flatnonzero(np.isinf(numbers))
+    return (int(found[0]), "inf") if found.size else None

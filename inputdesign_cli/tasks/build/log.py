@@ -1,0 +1,174 @@
+"""A log without a spec: channels, sample time and unit are those that its columns tell."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.build.data import prepared, signals_of, time_unit_of
+from inputdesign_cli.tasks.build.files import Sheet, read_sheet
+from inputdesign_cli.tasks.build.preparation import Preparation
+
+_CHANNELS = {
+    "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
+    "y": re.compile(r"(y|output)[ _]?(\d*)(?![a-z0-9]).*"),
+}
+# Steps of time differ from a round number by less than this share of it by rounding alone.
+_ROUND = 1e-4
+
+
+@dataclass(frozen=True)
+class Log:
+    """Records of one experiment, its segments one after the other.
+
+    Attributes:
+        u, y: (N, r), (N, p) as logged, without gaps.
+        lengths: the samples of each segment.
+        names: of the columns, by channel.
+        step, time_unit: the sample time.
+        steps: what was done to the record, and what was seen in it.
+    """
+
+    u: Array
+    y: Array
+    lengths: tuple[int, ...]
+    names: dict[str, str]
+    step: float
+    time_unit: str
+    steps: tuple[str, ...]
+
+    @property
+    def parts(self) -> list[tuple[Array, Array]]:
+        """The segments."""
+        at = np.cumsum(self.lengths)[:-1]
+        return list(zip(np.split(self.u, at), np.split(self.y, at), strict=True))
+
+
+def read_log(path: Path, preparation: Preparation) -> Log:
+    """The channels that `preparation.columns` names, or else u1, u2, .., y1, y2, .. of the header.
+
+    Raises:
+        DataError: the file cannot be read, or does not tell its inputs and outputs.
+    """
+    sheet = read_sheet(path, key="")
+    columns = dict(preparation.columns) or channels_by_name(sheet)
+    counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
+    given = Preparation(**{**vars(preparation), "columns": columns})
+    signals = signals_of(sheet, counts["u"], counts["y"], given)
+    unit = preparation.time_unit or time_unit_of(signals.name) or "s"
+    told = []
+    stated = preparation.sample_time or sheet.sample_time
+    if signals.name and not preparation.sample_time:
+        step = _typical(signals.time)
+    elif stated:
+        step = stated
+    else:
+        step = 1.0
+        told.append("the file has no times and no --sample-time was given: the sample time is taken for 1")
+    if not np.isfinite(step) or step <= 0.0:
+        message = f"the times of {path.name} do not increase"
+        hint = "sort the rows, or say which column holds the time: --columns time=1"
+        raise DataError(sheet.error("data-not-uniform", message, hint, 0))
+    segments, notes = prepared(signals, step, unit, given)
+    return Log(
+        np.concatenate([part.u for part in segments]),
+        np.concatenate([part.y for part in segments]),
+        tuple(len(part.y) for part in segments),
+        {name: _shown(sheet, column) for name, column in columns.items()},
+        step,
+        unit,
+        (*told, *notes),
+    )
+
+
+def channels_by_name(sheet: Sheet) -> dict[str, str]:
+    """Channels whose columns are called u, u1, input, .., y, y1, output, .."""
+    found = {}
+    for letter, pattern in _CHANNELS.items():
+        for name in sheet.header:
+            matched = pattern.fullmatch(name)
+            if matched:
+                found[f"{letter}{matched[2] or 1}"] = name
+    return found
+
+
+def _count(sheet: Sheet, letter: str, columns: dict[str, str]) -> int:
+    """How many inputs or outputs; they are numbered from one on.
+
+    Raises:
+        DataError: there is none, or a number is left out.
+    """
+    named = [name for name in columns if name.startswith(letter)]
+    wanted = {f"{letter}{i + 1}" for i in range(len(named))}
+    if named and set(named) == wanted:
+        return len(named)
+    what = "input" if letter == "u" else "output"
+    header = f"its header is: {', '.join(sheet.header)}" if sheet.names else "it has no header"
+    shown = f" ({header}; {len(sheet.columns)} columns)" if sheet.shown else ""
+    message = f"which column of {sheet.path.name} is the {what}?{shown}"
+    if named:
+        listed = ", ".join(sorted(named))
+        message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
+    hint = 'name them, or give their numbers: --columns "time=1,u1=2,y1=3"'
+    raise DataError(sheet.error("data-missing-column", message, hint))
+
+
+def _shown(sheet: Sheet, column: str) -> str:
+    number = int(column) if column.isdecimal() else 0
+    return sheet.names[number - 1] if 0 < number <= len(sheet.names) else column
+
+
+def _typical(time: Array) -> float:
+    """The mean step of time, gaps apart, rounded where rounding alone may be the difference."""
+    steps = np.diff(time[~np.isnan(time)])
+    if not steps.size:
+        return np.nan
+    middle = float(np.median(steps))
+    near = steps[np.abs(steps - middle) < 0.5 * abs(middle)]
+    if middle <= 0.0 or not near.size:
+        return np.nan
+    mean = float(near.mean())
+    for digits in range(1, 7):
+        rounded = float(f"{mean:.{digits - 1}e}")
+        if abs(rounded - mean) <= _ROUND * mean:
+            return rounded
+    return mean
+
+
+def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
+    """Several files of the same channels and sample time, one after the other.
+
+    Raises:
+        DataError: see `read_log`; or the files differ.
+    """
+    logs = [read_log(path, preparation) for path in paths]
+    first = logs[0]
+    for path, log in zip(paths[1:], logs[1:], strict=True):
+        alike = (log.u.shape[1], log.y.shape[1], log.time_unit) == (
+            first.u.shape[1],
+            first.y.shape[1],
+            first.time_unit,
+        )
+        if not alike or abs(log.step - first.step) > 1e-3 * first.step:
+            message = f"{path.name} has other channels or another sample time than {paths[0].name}"
+            hint = "explore one experiment at a time, or say --columns and --sample-time"
+            raise DataError.because("data-not-uniform", message, hint)
+    return Log(
+        np.concatenate([log.u for log in logs]),
+        np.concatenate([log.y for log in logs]),
+        tuple(length for log in logs for length in log.lengths),
+        first.names,
+        first.step,
+        first.time_unit,
+        tuple(
+            f"{path.name}: {step}" if len(paths) > 1 else step
+            for path, log in zip(paths, logs, strict=True)
+            for step in log.steps
+        ),
+    )

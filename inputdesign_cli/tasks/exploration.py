@@ -1,0 +1,169 @@
+"""A log -> a model, what speaks for and against it, and a spec for the next experiment; or a verdict."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification.explore import (
+    Found,
+    answers_output,
+    by_chance,
+    explore_records,
+    fits,
+    order_of_excitation,
+)
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.units import Header, Units
+from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
+from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
+from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.log import Log, channels_by_name, read_logs
+from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
+from inputdesign_cli.tasks.result.exploration import (
+    exploration_entry,
+    exploration_notes,
+    structure_curves,
+    validation_curves,
+    validation_entry,
+)
+from inputdesign_cli.tasks.result.responses import response_note, response_of_data
+
+# A simulation that explains less than this of data it has not seen is no model.
+_LEAST_FIT = 5.0
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """The results, and why no model deserves trust; nothing where one does."""
+
+    results: Results
+    reasons: tuple[str, ...] = ()
+
+
+def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
+    """Find a model of the plant that a log is of.
+
+    Raises:
+        DataError: the log cannot be read, or tells no model at all.
+    """
+    started = time.perf_counter()
+    log = read_logs(paths, preparation)
+    loops = answers_output(log.parts)
+    with blaming_columns(paths[0]):
+        found = explore_records(log.parts, feedback=bool(loops))
+    reasons = _reasons(found)
+    text = spec_text(log, found, paths)
+    task = build_explored(text)
+    u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
+    lengths = tuple(len(part) for _, part in found.used)
+    heard = exploration_notes(log, found, loops, order_of_excitation(log.parts))
+    notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
+    identified = _asked(
+        task, Identified(found.estimate, found.model, Data(u, y, None, lengths, notes), preparation, None)
+    )
+    results = identification_results(task, identified, started)
+    result = {
+        **results.result,
+        "title": f"What {' and '.join(path.name for path in paths)} tells",
+        "exploration": exploration_entry(log, found, loops, reasons),
+        "validation": validation_entry(found.validation),
+    }
+    head = f"sample_time: {log.step!r}\ntime_unit: {log.time_unit}\n".encode()
+    files = {**results.files, "model.yaml": head + results.files["model.yaml"]}
+    complete = replace(
+        results,
+        result=result,
+        resolved_spec=text,
+        curves={**results.curves, **structure_curves(found)},
+        files=files,
+    )
+    return Exploration(_without_model(complete, task.header.units, log, found), reasons)
+
+
+def _without_model(explored: Results, units: Units, log: Log, found: Found) -> Results:
+    """The results with the frequency response of the data alone beside the model, where it can be had."""
+    moving = [j for j in range(log.u.shape[1]) if j not in found.still]
+    response = frequency_response(log.u[:, moving], log.y, lengths=log.lengths)
+    if response is None:
+        return explored
+    table, curves, told = response_of_data(units, found.model, response, by_reference=False, inputs=moving)
+    result = explored.result
+    return replace(
+        explored,
+        result={
+            **result,
+            "exploration": {**result["exploration"], "frequency_response": told},
+            "notes": [*result.get("notes", []), *response_note(told)],
+        },
+        tables={**explored.tables, "frequency_response": table},
+        curves={**explored.curves, "frequency_response": curves},
+    )
+
+
+def _asked(task: Identification, identified: Identified) -> Identified:
+    """With what the spec asks at the estimate, where it can be asked."""
+    try:
+        question = task.at(
+            identified.model, len(identified.data.y), identified.estimate.factor, "the estimate"
+        )
+    except IdesignError as error:
+        return replace(identified, unasked=told(error))
+    return replace(identified, question=question)
+
+
+def _reasons(found: Found) -> tuple[str, ...]:
+    """Why nothing that was found deserves trust."""
+    single = found.model.outputs == 1
+    unseen = len(found.validation.errors)
+    told = []
+    for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
+        chance = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))
+        if fit < max(_LEAST_FIT, chance):
+            told.append(
+                f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in {unseen} "
+                f"samples that it has not seen, and of noise alone it may explain {chance:.1f} %: the inputs "
+                "hardly act on it, or the record is too short or too noisy to tell how"
+            )
+    return tuple(told)
+
+
+def judge(
+    model: PolynomialModel, header: Header, paths: Sequence[Path], preparation: Preparation
+) -> Exploration:
+    """How a given model does on other data.
+
+    Raises:
+        DataError: the data cannot be used.
+    """
+    started = time.perf_counter()
+    if not preparation.columns:
+        found_columns = channels_by_name(read_sheet(paths[0], key=""))
+        counts = {"u": header.units.inputs, "y": header.units.outputs}
+        own = {name: c for name, c in found_columns.items() if int(name[1:]) <= counts[name[0]]}
+        preparation = replace(preparation, columns=own)
+    data = read_data(paths, header.units, preparation)
+    at = np.cumsum(data.lengths)[:-1]
+    parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
+    found = fits(model, parts)
+    table, curves = validation_curves(header.units, data.u, data.y, found)
+    result: dict[str, Json] = {
+        "format": 1,
+        "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",
+        "status": "validated",
+        "samples": len(data.y),
+        "validation": validation_entry(found),
+        "notes": list(data.notes),
+        "timing_s": {"validation": time.perf_counter() - started},
+    }
+    return Exploration(
+        Results(result, header.resolved_spec, header.units.time_unit, {"fit": table}, {"fit": curves})
+    )

@@ -1,0 +1,159 @@
+"""What `result.json`, tables and figures say of an exploration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.identification.explore import Candidate, Fits, Found
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Curves, FitCurves, FitPanel, Json, OrderCurves, Table
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.log import Log
+
+
+def validation_entry(found: Fits) -> dict[str, Json]:
+    """`validation` of `result.json`: numbers for one output, else lists."""
+    return {
+        "simulation_fit_percent": _finite(found.simulation),
+        "prediction_fit_percent": _finite(found.prediction),
+    }
+
+
+def _finite(values: Sequence[float]) -> Json:
+    listed = [value if np.isfinite(value) else None for value in values]
+    return listed[0] if len(listed) == 1 else listed
+
+
+def exploration_entry(
+    log: Log, found: Found, loops: Sequence[tuple[int, float]], reasons: Sequence[str]
+) -> dict[str, Json]:
+    """`exploration` of `result.json`."""
+    return {
+        "channels": dict(log.names),
+        "sample_time": log.step,
+        "time_unit": log.time_unit,
+        "samples": len(log.y),
+        "segments": list(log.lengths),
+        "steps": list(log.steps),
+        "split": "blocks in turn" if found.interleaved else "the first 60 % and the rest",
+        "loop": [{"input": f"u{j + 1}", "probability": p} for j, p in loops],
+        "outputs": [
+            {
+                "output": f"y{i + 1}",
+                "structure": _structure(taken),
+                "delay": list(taken.orders.delays),
+                "delay_range": [list(pair) for pair in chosen.ranges],
+                "output_error_by_order": {str(n): rms for n, rms in chosen.by_order.items()},
+                "structures": [_structure(candidate) for candidate in chosen.candidates],
+            }
+            for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True))
+        ],
+        "trusted": not reasons,
+        "reasons": list(reasons),
+    }
+
+
+def _structure(candidate: Candidate) -> dict[str, Json]:
+    return {
+        "family": candidate.orders.family,
+        "orders": candidate.orders.numbers,
+        "delay": list(candidate.orders.delays),
+        "parameters": candidate.orders.size,
+        "estimation_fit_percent": _finite([candidate.estimation]),
+        "simulation_fit_percent": _finite([candidate.validation]),
+        "prediction_fit_percent": _finite([candidate.prediction]),
+        "criterion": candidate.criterion,
+        "failed": list(candidate.failed),
+        "converged": candidate.converged,
+    }
+
+
+def exploration_notes(
+    log: Log, found: Found, loops: Sequence[tuple[int, float]], excitation: int
+) -> list[str]:
+    """What a user should know of the record and of how the model was chosen."""
+    single, alone = found.model.outputs == 1, found.model.inputs == 1
+    notes = []
+    for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
+        name = "y" if single else f"y{i + 1}"
+        orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
+        moving = [j for j in range(found.model.inputs) if j not in found.still]
+        delays = " and ".join(
+            f"{delay} from {'u' if alone else f'u{j + 1}'} (95 %: {low} to {high})"
+            for j, delay, (low, high) in zip(moving, taken.orders.delays, chosen.ranges, strict=False)
+        )
+        notes.append(
+            f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; estimated on one part it "
+            f"simulates {taken.validation:.1f} % of the other, best of {len(chosen.candidates)} structures"
+        )
+    notes += [
+        f"u{j + 1} never moves in this record: the model has no part of it, and an experiment must move it"
+        for j in found.still
+    ]
+    notes += [
+        f"past outputs help to predict {'u' if alone else f'u{j + 1}'} (probability {p:.1e} by chance): the "
+        "data may come from a loop. The direct method is used; the noise model must then be right, and "
+        "without a reference that moves the plant may not be identifiable: add a reference or dither, and "
+        "write experiment.controller"
+        for j, p in loops
+    ]
+    needed = max(candidate.orders.b + candidate.orders.order for candidate in found.taken)
+    if excitation < needed:
+        notes.append(
+            f"the input is persistently exciting of order {excitation} only, and the model needs {needed}: "
+            "other models explain this record as well; apply an input that moves more"
+        )
+    used = sum(len(y) for _, y in found.used)
+    if used < len(log.y):
+        notes.append(f"the model is estimated from the {used} samples in which the inputs move most")
+    if found.interleaved:
+        notes.append("an input rests in one part of the record: blocks in turn estimate and judge")
+    return notes
+
+
+def structure_curves(found: Found) -> dict[str, Curves]:
+    """structures.png, one an output."""
+    curves: dict[str, Curves] = {}
+    for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
+        usable = [c for c in chosen.candidates if np.isfinite(c.validation)]
+        families = sorted({c.orders.family for c in usable})
+        fits = {
+            family: (
+                np.array([float(c.orders.size) for c in usable if c.orders.family == family]),
+                np.array([c.validation for c in usable if c.orders.family == family]),
+            )
+            for family in families
+        }
+        single = len(found.outputs) == 1
+        mark = (float(taken.orders.size), taken.validation)
+        curves["structures" if single else f"structures_{i + 1}"] = OrderCurves(
+            fits, mark, None if single else i
+        )
+    return curves
+
+
+def validation_curves(units: Units, u: Array, y: Array, found: Fits) -> tuple[Table, FitCurves]:
+    """fit.csv with its figure: a given model against data."""
+    instants = units.sample_time * np.arange(len(y), dtype=np.float64)
+    columns = {units.time_header: instants}
+    panels = []
+    for j, values in enumerate(u.T):
+        columns["u" if units.single else f"u{j + 1}"] = values
+    for i, values in enumerate(y.T):
+        name = "y" if units.single else f"y{i + 1}"
+        predicted = values - found.errors[:, i]
+        runs = np.all(np.isfinite(found.simulated[:, i]))
+        columns |= {name: values, f"{name}_predicted": predicted}
+        columns |= {f"{name}_simulated": found.simulated[:, i]} if runs else {}
+        panels.append(
+            FitPanel(
+                values,
+                predicted,
+                found.simulated[:, i] if runs else None,
+                found.simulation[i] if runs else None,
+                i,
+            )
+        )
+    return Table(columns), FitCurves(instants, tuple(panels))

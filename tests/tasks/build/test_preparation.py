@@ -1,0 +1,96 @@
+"""Records are cut at gaps and evened out; what was done is told, and what was not asked is not done."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.data import read_data
+from inputdesign_cli.tasks.build.preparation import Preparation, limits_of_sensor, trend
+
+UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+N = 60
+TIME = np.arange(float(N))
+U = np.where(np.arange(N) // 7 % 2, 1.0, -1.0)
+Y = 5.0 + np.sin(0.1 * TIME)
+
+
+def read(path, time=TIME, u=U, y=Y, **preparation):
+    table = np.column_stack([time, u, y])
+    path.write_text("time,u,y\n" + "\n".join(",".join(f"{x:.12g}" for x in row) for row in table) + "\n")
+    return read_data([path], UNITS, Preparation(**preparation))
+
+
+def test_missing_numbers_and_gaps_cut_the_record(tmp_path):
+    y, time = Y.copy(), TIME + 5.0 * (TIME >= 40)
+    y[20] = np.nan
+    found = read(tmp_path / "a.csv", time=time, y=y)
+    assert found.lengths == (20, 19, 20)
+    np.testing.assert_allclose(found.y[:, 0], np.delete(Y, 20))
+    told = " ".join(found.notes)
+    assert "1 rows with a missing number" in told
+    assert "1 gaps" in told
+    assert "3 segments" in told
+
+
+def test_an_even_record_is_left_alone(tmp_path):
+    found = read(tmp_path / "a.csv")
+    assert found.lengths == (N,)
+    assert found.notes == ()
+    np.testing.assert_allclose(found.y[:, 0], Y, atol=1e-11)
+
+
+def test_jitter_is_told_and_evened_out(tmp_path):
+    """A straight line is what interpolation gives back exactly."""
+    time = TIME + 0.03 * np.sin(3.0 * TIME)
+    found = read(tmp_path / "a.csv", time=time, y=2.0 * time)
+    np.testing.assert_allclose(np.diff(found.y[:, 0]), 2.0, atol=1e-9)
+    np.testing.assert_array_equal(found.u[:, 0], U)
+    assert "jitter by up to 6 %" in found.notes[0]
+
+
+def test_much_jitter_is_evened_out_on_request_only(tmp_path):
+    time = TIME + 0.2 * np.sin(3.0 * TIME)
+    with pytest.raises(DataError, match="unasked") as caught:
+        read(tmp_path / "a.csv", time=time)
+    assert "--resample" in caught.value.diagnostics[0].hint
+    found = read(tmp_path / "a.csv", time=time, y=2.0 * time, resample=True)
+    np.testing.assert_allclose(np.diff(found.y[:, 0]), 2.0, atol=1e-9)
+
+
+def test_rows_are_left_out_on_request(tmp_path):
+    np.testing.assert_allclose(read(tmp_path / "a.csv", skip=10).y[:, 0], Y[10:], atol=1e-11)
+    found = read(tmp_path / "a.csv", span=(5.0, 30.0))
+    np.testing.assert_allclose(found.y[:, 0], Y[5:31], atol=1e-11)
+    with pytest.raises(DataError, match="nothing is left"):
+        read(tmp_path / "a.csv", span=(500.0, 600.0))
+
+
+def test_trends_are_taken_away():
+    x = 3.0 + 0.5 * np.arange(50.0)
+    np.testing.assert_allclose(x - trend(x, "linear")[0], 0.0, atol=1e-11)
+    np.testing.assert_allclose(x - trend(x, "auto")[0], 0.0, atol=1e-11)
+    wave = np.sin(np.arange(50.0))
+    np.testing.assert_allclose(trend(wave, "auto")[0], wave.mean())
+
+
+def test_saturation_and_rounding_are_seen():
+    x = np.sin(0.05 * np.arange(400.0))
+    assert limits_of_sensor("y", x) == []
+    assert "saturated" in limits_of_sensor("y", np.minimum(x, 0.8))[0]
+    assert "rounded to steps of 0.25" in limits_of_sensor("y", np.round(4 * x) / 4)[0]
+
+
+def test_columns_that_the_plant_has_not_are_refused(tmp_path):
+    from inputdesign_cli.errors import SpecError
+
+    with pytest.raises(SpecError, match="no such channel"):
+        read(tmp_path / "a.csv", columns={"u3": "1"})
+
+
+def test_two_columns_of_times_are_a_question(tmp_path):
+    (tmp_path / "a.csv").write_text("time,t,u,y\n" + "\n".join(f"{i},{i},{i % 3},1" for i in range(20)))
+    with pytest.raises(DataError, match="several columns of times"):
+        read_data([tmp_path / "a.csv"], UNITS, Preparation())
+    found = read_data([tmp_path / "a.csv"], UNITS, Preparation(columns={"time": "t"}))
+    assert found.lengths == (20,)
