@@ -18,9 +18,10 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
     rows = 2 if single else len(curves.panels)
     axes = page.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[2, 1] if single else None)[:, 0]
     time = curves.time[:SHOWN]
+    unit = time_unit
     if curves.time.size > SHOWN:
-        axes[0].set_title(f"first {SHOWN} of {curves.time.size}", loc="right", color=GREY)
-    axes[-1].set_xlabel(f"time ({time_unit})")
+        unit = f"{time_unit}; first {SHOWN} of {curves.time.size} samples"
+    axes[-1].set_xlabel(f"time ({unit})")
     axes[-1].set_xlim(time[0], time[-1])
     if single:
         (panel,) = curves.panels

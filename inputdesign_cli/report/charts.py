@@ -100,6 +100,7 @@ def _caption_by_kind(stem: str) -> str | None:
         "residuals": "Correlations of the residuals with themselves and with past inputs; chance leaves them "
         "within the grey.",
         "bound": "The error r_u that these data leave, against the admitted error r_adm.",
+        "structures": "How well each structure that was tried simulates data that it has not seen.",
     }.get(stem.removeprefix("data_"))
 
 

@@ -75,7 +75,7 @@ def _system(spec: Spec) -> str:
     size = f"{_count(plant.inputs, 'input')} and {_count(plant.outputs, 'output')}"
     kind = _structure(plant, spec.noise) if plant.kind == "polynomial" else "continuous-time"
     clock = f", sampled every {spec.sample_time:g} {spec.time_unit}" if plant.sampled else ""
-    article = "an" if kind[0] in "AEFIO" else "a"
+    article = "an" if kind[0] in "AEFIOaeio" else "a"
     return f"The system is {article} {kind} system with {size}{clock}."
 
 

@@ -99,6 +99,7 @@ def run_page(run: Path) -> dict[str, Json]:
         "run_charts": runs,
         "assumptions": assumptions(question, result),
         "command": _command(verb, result),
+        "explored": "exploration" in result,
         "files": _data_files(result),
         "spec": text,
         "provenance": provenance(
@@ -138,6 +139,11 @@ def _data_files(result: Result) -> list[str]:
 
 def _command(verb: str, result: Result) -> str:
     """What makes the run again, with the names of the data and what was taken away from them."""
+    if "exploration" in result:
+        names = [Path(str(name)).name for name in result.get("made_from", [])] or ["DATA"]
+        found = result["exploration"]
+        columns = ",".join(f"{role}={column}" for role, column in found.get("channels", {}).items())
+        return shlex.join(["idesign", "explore", *names, *(["--columns", columns] if columns else [])])
     if verb not in ("assess", "identify"):
         return f"idesign {verb} spec.yaml"
     data, found = _data_files(result) or ["DATA"], result["identification"]

@@ -35,7 +35,9 @@ def assumptions(question: Question, result: Result) -> list[str]:
     """What the numbers rest on, beyond the arithmetic."""
     rests = "The design is best" if "objective" in result else "The figures hold"
     if "identification" in result:
-        said = ["Orders and delay are those of the spec; the numbers were estimated from the data."]
+        from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."
+        chosen = "Orders and delays were chosen by what the model simulates of data that it has not seen."
+        said = [chosen if "exploration" in result else from_spec]
     else:
         said = [
             f"The plant and the noise are as the spec has them. {rests} for this nominal system; the "

@@ -78,7 +78,7 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     codes = set()
     for delay in (0.05, 0.1, 0.3, 0.6):
         process = subprocess.Popen(
-            [sys.executable, "-c", START, "solve", ROOT / "specs" / "distillation_column.yaml", "-o", "r"],
+            [sys.executable, "-c", START, "simulate", SPEC, "-o", "r", "--set", "simulation={runs: 1000000}"],
             cwd=tmp_path,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
