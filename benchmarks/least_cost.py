@@ -149,7 +149,7 @@ def compare(bound: str, order: int) -> dict[str, float | str]:
         "textbook_with_binding_frequencies": checked,
         "difference_on_grid": abs(on_grid - mine.objective) / mine.objective,
         "difference_with_binding_frequencies": abs(checked - mine.objective) / mine.objective,
-        "worst_ratio": problem.worst_ratio(mine.information).ratio,
+        "worst_ratio": problem.worst_ratio(mine.informations).ratio,
     }
 
 

@@ -128,16 +128,20 @@ class Experiment(Coordinates):
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
         """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x or x, of all channels or of one."""
-        if kind == "output" or (kind == "input" and self.loop is not None):
+        if self.depends_on_plant(kind):
             G = self.response(kind, w)
             rows = G if channel is None else G[:, channel : channel + 1]
             return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
         return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
 
+    def depends_on_plant(self, kind: PowerKind) -> bool:
+        """Whether a power is that of a signal that the plant takes part in, not of x itself."""
+        return kind == "output" or (kind == "input" and self.loop is not None)
+
     def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
         """(n, p or r, r): from x to the outputs, the inputs or x itself."""
-        if kind == "excitation" or (kind == "input" and self.loop is None):
+        if not self.depends_on_plant(kind):
             return np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
         if self.loop is None:
             return self.model.plant_at(w)

@@ -2,6 +2,7 @@
 
 from inputdesign_cli.plant.continuous_model import ContinuousModel as ContinuousModel
 from inputdesign_cli.plant.frequencies import (
+    common_grid as common_grid,
     graded_grid as graded_grid,
     local_maxima as local_maxima,
     logarithmic_distance as logarithmic_distance,

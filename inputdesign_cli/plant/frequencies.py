@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +52,26 @@ def graded_grid(
             parts += [s.real + offsets, s.real - offsets]
     grid = np.unique(np.concatenate(parts))
     return grid[(grid >= lo) & (grid <= hi)]
+
+
+def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
+    """One grid for several plants, everywhere about as fine as the finest of theirs.
+
+    Poles that lie side by side share their points: the number of points grows with the places at which there
+    are poles, not with the number of plants.
+    """
+    parts = [np.empty(0), *(graded_grid(singularities, lo, hi) for singularities in plants)]
+    grid = np.unique(np.concatenate(parts))
+    finest = np.full(grid.size - 1, np.inf)
+    for own in parts[1:]:
+        steps = np.diff(own)
+        middle = np.clip(np.searchsorted(own, 0.5 * (grid[1:] + grid[:-1])) - 1, 0, steps.size - 1)
+        finest = np.minimum(finest, steps[middle])
+    # A point for each unit of sum of (gap / finest step there); gaps wider than that step do not occur.
+    passed = np.floor(np.concatenate([[0.0], np.cumsum(np.diff(grid) / finest)]) * (1.0 - _FLAT))
+    kept = np.concatenate([[True], np.diff(passed) > 0.0])
+    kept[-1] = True
+    return grid[kept]
 
 
 def local_maxima(

@@ -274,7 +274,7 @@ class ConvexTask:
             basis=basis,
             x=answer.x,
             objective=answer.cost,
-            information=problem.information(answer.x),
+            informations=problem.informations(answer.x),
             certificate=answer.certificate,
             active=(),
         )
@@ -287,7 +287,7 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
-        longest = replace(self.question, experiment=replace(self.experiment, samples=most), goal="factor")
+        longest = replace(self.question.of_length(most), goal="factor")
         best = solve_design(longest, tolerance=self.tolerance)
         problem = best.problem.on(best.result.basis)
         bought = Bought(self.header.units, self.stated, self.question.limits, problem, best.result)
@@ -334,7 +334,7 @@ class ConvexTask:
         curves: dict[str, Curves] = {"spectrum": spectrum[1]}
         if not found.x.any():
             return tables, curves
-        white = design.white.information / (design.white.s if problem.goal == "factor" else 1.0)
+        white = design.white.informations[0] / (design.white.s if problem.goal == "factor" else 1.0)
         asked = (*problem.requirements, *problem.side)
         errors = model_errors(asked)
         unstated = [replace(error, experiment=done.experiment) for error in self.unstated]

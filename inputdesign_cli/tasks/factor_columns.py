@@ -42,9 +42,9 @@ def restrict_columns(asked: FewColumns, design: Design) -> tuple[Design, dict[st
     found = hill_climb(quadratic, columns, starts=_STARTS, rng=rng, guesses=[root])
     S = found.factor @ found.factor.conj().T
     climbed = hvec(S) if basis.hermitian else svec(S.real)
-    information = problem.information(climbed)
-    objective = 1.0 / criterion.level(information)
-    result = replace(design.result, x=climbed, information=information, objective=objective, s=objective)
+    informations = problem.informations(climbed)
+    objective = 1.0 / criterion.level(informations[0])
+    result = replace(design.result, x=climbed, informations=informations, objective=objective, s=objective)
     reached = [history[-1] for history in found.histories]
     how: dict[str, Json] = {"method": "hill_climb", "status": "lower_bound", "starts": reached}
     return replace(design, result=result), how

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
@@ -24,23 +25,23 @@ _MIXINGS = 12
 
 @dataclass(frozen=True)
 class Candidate:
-    """A feasible design: z (size,), s, M' (k, k) and the objective (the cost, or s).
+    """A feasible design: z (size,), s, M' (S, k, k) of every scenario and the objective (the cost, or s).
 
     The spectrum is z / s; goals without s have s = 1.
     """
 
     z: Array
     s: float
-    information: Array
+    informations: NDArray[np.float64]
     objective: float
 
 
 def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
     """The candidate with these unknowns, whatever it meets."""
-    information = problem.fixed_information + problem.excited_information(z)
+    informations = problem.fixed_information + problem.excited(z)
     if problem.scaled:
-        information = information + s * problem.scaled_information
-    return Candidate(z, s, information, s if problem.scaled else problem.price.at(z))
+        informations = informations + s * problem.scaled_information
+    return Candidate(z, s, informations, s if problem.scaled else problem.price.at(z))
 
 
 def least_scale(problem: Problem, z: Array) -> float:
@@ -66,14 +67,14 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
         s = max(least_scale(problem, z), s if problem.goal == "samples" else 0.0)
     if problem.goal == "factor":
         # All of M' scales, so that one look at the ratios gives the factor, above or below one.
-        information = candidate_at(problem, z, s).information
-        factor = max((v.ratio for _, v in problem.violations(information)), default=1.0) ** 2
+        informations = candidate_at(problem, z, s).informations
+        factor = max((v.ratio for _, v in problem.violations(informations)), default=1.0) ** 2
         return candidate_at(problem, factor * z, factor * s)
     factor, at = 1.0, set(places)
     for _ in range(12):
         factor = _smallest_factor(problem, z, s, at, factor)
-        information = candidate_at(problem, factor * z, factor * s).information
-        missed = [(i, v) for i, v in problem.violations(information, above=1.0) if v.ratio > 1.0 + _MEETS]
+        informations = candidate_at(problem, factor * z, factor * s).informations
+        missed = [(i, v) for i, v in problem.violations(informations, above=1.0) if v.ratio > 1.0 + _MEETS]
         if not missed:
             break
         at |= {(i, v.frequency) for i, v in missed}
@@ -95,14 +96,17 @@ def missing_floor(problem: Problem, z: Array) -> float:
 
 
 def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], factor: float) -> float:
-    excited = problem.excited_information(z) + (s * problem.scaled_information if problem.scaled else 0.0)
-    places: dict[int, list[float | None]] = {}
+    excited = problem.excited(z) + (s * problem.scaled_information if problem.scaled else 0.0)
+    fixed, places = problem.fixed_information, dict[int, list[float | None]]()
     for index, frequency in at:
         places.setdefault(index, []).append(frequency)
 
     def excess(f: float) -> float:
-        information = problem.fixed_information + f * excited
-        ratios = [problem.requirements[i].ratios(information, np.array(w)).max() for i, w in places.items()]
+        ratios = [
+            problem.requirement(i).ratios(fixed[n] + f * excited[n], np.array(w)).max()
+            for i, w in places.items()
+            for n in (problem.asked[i].scenario,)
+        ]
         return float(max(ratios, default=0.0)) ** 2 - 1.0
 
     value = excess(factor)
@@ -117,10 +121,10 @@ def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], facto
 
 def excess(problem: Problem, candidate: Candidate) -> float:
     """How far the worst condition is missed, negative when all are met: requirements and limits alike."""
-    z, s, information = candidate.z, candidate.s, candidate.information
+    z, s, informations = candidate.z, candidate.s, candidate.informations
     try:
-        ratios = [v.ratio**2 for _, v in problem.violations(information)]
-        ratios += [s * v.ratio**2 for _, v in problem.side_violations(information)]
+        ratios = [v.ratio**2 for _, v in problem.violations(informations)]
+        ratios += [s * v.ratio**2 for _, v in problem.violations(informations, side=True)]
     except np.linalg.LinAlgError:
         return np.inf
     for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True):

@@ -1,13 +1,14 @@
 """Lower bounds that we prove ourselves: dual points, evaluated and made exactly feasible.
 
-Every cut gives tr(Y M') >= r for all admissible M'; every limit a(z) <= b (times s) takes a weight
-w >= 0. With price = cost + sum w a over the upper limits and value = tr(Y M(.)) + sum w a over the lower
-ones, let t be the largest number with price - t value >= 0 on the whole cone of spectra. Then, for the
-goal "cost",
+Every cut gives tr(Y M') >= r for all admissible M' of its scenario; every limit a(z) <= b (times s) takes a
+weight w >= 0. With price = cost + sum w a over the upper limits and value = sum_s tr(Y_s M_s(.)) + sum w a
+over the lower ones, let t be the largest number with price - t value >= 0 on the whole cone of spectra. Then,
+for the goal "cost",
 
-    cost(z) >= t (sum r - tr(Y M0) + sum_lower w b) - sum_upper w b
+    cost(z) >= t (sum r - sum_s tr(Y_s M0_s) + sum_lower w b) - sum_upper w b
 
-and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0,
+and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0, with the
+sum over the scenarios understood,
 
     s >= t (sum r - tr(Y M_fixed)) / (sum_upper w b - t sum_lower w b + t tr(Y M_scaled) - t sum_side r).
 
@@ -20,9 +21,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.master import Proof, Row
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Problem, weighty_ones
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Functional
 
@@ -36,36 +38,34 @@ _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
 class Certificate:
     """A proved lower bound on the objective, and the dual point that proves it.
 
-    `weight` Y (k, k) and `limits` (a weight for each power limit) are scaled such that
+    `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled such that
     price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
     the spectra for which that is tightest (see `spectrum.Pricing`).
     """
 
     bound: float
-    weight: Array
+    weights: NDArray[np.float64]
     directions: Array
     limits: Array
     price: Functional | None = None
     value: Functional | None = None
 
 
-def certify(
-    problem: Problem, proof: Proof, sides: Sequence[bool] = (), rows: Sequence[Row] = ()
-) -> Certificate:
+def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certificate:
     """The bound that these multipliers prove for the spectra of the problem.
 
     Args:
-        sides: for each cut of the proof whether it is a side requirement's; missing means that none is.
         rows: the limits that the weights `proof.rows` belong to.
     """
-    k = problem.experiment.size
-    weight = sum((Y for Y, _ in proof.cuts), np.zeros((k, k)))
-    value = problem.value(weight)
-    found = _certified(problem, proof, weight, value, sides, rows, _LEAST_SHARES[0])
+    weights = np.zeros_like(problem.baselines)
+    for cut in proof.cuts:
+        weights[cut.scenario] += cut.weight
+    value = problem.value(weights)
+    found = _certified(problem, proof, weights, value, rows, _LEAST_SHARES[0])
     if problem.goal == "cost":
         return found
     for share in _LEAST_SHARES[1:]:
-        other = _certified(problem, proof, weight, value, sides, rows, share)
+        other = _certified(problem, proof, weights, value, rows, share)
         if other.bound <= found.bound:
             break
         found = other
@@ -75,19 +75,17 @@ def certify(
 def _certified(
     problem: Problem,
     proof: Proof,
-    weight: Array,
+    weights: NDArray[np.float64],
     value: Functional,
-    sides: Sequence[bool],
     rows: Sequence[Row],
     share: float,
 ) -> Certificate:
-    sides = sides or [False] * len(proof.cuts)
-    required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if not side)
-    scaled_required = sum(r for (_, r), side in zip(proof.cuts, sides, strict=True) if side)
-    weights = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
+    required = sum(cut.level for cut in proof.cuts if not cut.side)
+    scaled_required = sum(cut.level for cut in proof.cuts if cut.side)
+    of_rows = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
     price: Functional | None = problem.price if problem.goal == "cost" else None
     upper = lower = fixed_lower = 0.0
-    for row, w in zip(rows, weights, strict=True):
+    for row, w in zip(rows, of_rows, strict=True):
         if w == 0.0:
             continue
         if row.upper:
@@ -101,24 +99,24 @@ def _certified(
                 fixed_lower += w * row.bound
     if price is None:
         raise ValueError("a goal with s needs an upper limit")
-    pricing = problem.basis.price(price, value, problem.grid)
-    gain = required - float(np.sum(weight * problem.fixed_information)) + fixed_lower
+    pricing = problem.basis.price(price, value, problem.grid_of(weighty_ones(weights)))
+    gain = required - float(np.sum(weights * problem.fixed_information)) + fixed_lower
     t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
     if problem.goal == "cost":
         bound, unit = t * gain - upper, 1.0
     else:
-        scaled = float(np.sum(weight * problem.scaled_information))
+        scaled = float(np.sum(weights * problem.scaled_information))
         spent = upper + t * (scaled - lower - scaled_required)
         bound, unit = (t * gain / spent, 1.0 / spent) if spent > 0 else (0.0, 0.0)
     if bound <= 0.0:
         t = 0.0
     shares = np.zeros(len(problem.limits))
-    for row, w in zip(rows, weights, strict=True):
+    for row, w in zip(rows, of_rows, strict=True):
         if row.limit is not None:
             shares[row.limit] = w * unit * (1.0 if row.upper else t)
     return Certificate(
         bound=max(bound, 0.0),
-        weight=t * unit * weight,
+        weights=t * unit * weights,
         directions=pricing.directions,
         limits=shares,
         price=price * unit,

@@ -25,7 +25,7 @@ from inputdesign_cli.design.convex.certificate import Certificate
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.feasible import strictly_feasible
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
-from inputdesign_cli.design.convex.problem import Goal, Problem, RequirementFactory, Weight
+from inputdesign_cli.design.convex.problem import Goal, Problem, RequirementFactory, Scenario, Weight
 from inputdesign_cli.design.convex.white import least_white_power
 from inputdesign_cli.errors import InfeasibleError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
@@ -43,11 +43,26 @@ _UNSUITED = 1e8  # a condition beyond which coordinates do not suit
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """Another plant that the design must serve, in raw parameters; see `Question`."""
+
+    experiment: Experiment
+    requirements: Sequence[RequirementFactory]
+    side: Sequence[RequirementFactory] = ()
+
+    def at(self, coordinates: Experiment) -> Scenario:
+        """Its requirements in the coordinates of this experiment."""
+        required = tuple(make(coordinates) for make in self.requirements)
+        return Scenario(coordinates, required, tuple(make(coordinates) for make in self.side))
+
+
+@dataclass(frozen=True)
 class Question:
     """What is asked, in raw parameters: requirements are made for the coordinates of a design.
 
     `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
-    `side` must hold besides. The other goals meet all of them.
+    `side` must hold besides. The other goals meet all of them. All of that is asked of the nominal plant,
+    that of `experiment`, and of each of the `others`; `mean_cost` as in `Problem`.
     """
 
     experiment: Experiment
@@ -58,16 +73,33 @@ class Question:
     cost: Mapping[PowerKind, Weight] = field(default_factory=dict)
     limits: Sequence[PowerLimit] = ()
     densities: Sequence[DensityLimit] = ()
+    others: Sequence[Alternative] = ()
+    mean_cost: bool = False
+
+    @property
+    def plants(self) -> list[Alternative]:
+        """All that must be served, the nominal plant first."""
+        return [Alternative(self.experiment, self.requirements, self.side), *self.others]
 
     def at_alpha(self, alpha: float) -> Question:
         """The same question with another confidence factor of the model errors."""
 
-        def changed(make: RequirementFactory) -> RequirementFactory:
+        def changed(makers: Sequence[RequirementFactory]) -> list[RequirementFactory]:
+            return [at(make) for make in makers]
+
+        def at(make: RequirementFactory) -> RequirementFactory:
             return lambda experiment: with_alpha([make(experiment)], alpha)[0]
 
-        return replace(
-            self, requirements=list(map(changed, self.requirements)), side=list(map(changed, self.side))
-        )
+        others = [
+            replace(one, requirements=changed(one.requirements), side=changed(one.side))
+            for one in self.others
+        ]
+        return replace(self, requirements=changed(self.requirements), side=changed(self.side), others=others)
+
+    def of_length(self, samples: int) -> Question:
+        """The same question of experiments with so many samples."""
+        others = [replace(one, experiment=replace(one.experiment, samples=samples)) for one in self.others]
+        return replace(self, experiment=replace(self.experiment, samples=samples), others=others)
 
 
 @dataclass(frozen=True)
@@ -125,9 +157,13 @@ def solve_design(
 
 
 def white_power(question: Question) -> float:
-    """The power of white excitation that answers the question, 0 where none is needed."""
+    """The power of white excitation that answers the question at the nominal plant, 0 where none is needed.
+
+    Where the nominal plant needs none it is that of the first scenario that does.
+    """
     if question.goal == "cost":
-        return least_white_power(question.experiment, question.requirements)
+        powers = (least_white_power(one.experiment, one.requirements) for one in question.plants)
+        return next((power for power in powers if power > 0.0), 0.0)
     unit = whitened_problem(
         replace(question, basis=flat_basis(question.experiment)),
         np.full(question.experiment.inputs, 1.0 / question.experiment.inputs),
@@ -154,16 +190,22 @@ def balanced_powers(question: Question, power: float) -> Array:
 
 
 def whitened_problem(question: Question, powers: Array) -> Problem:
-    """The problem in coordinates where flat excitation of these powers gives M = I."""
-    return _restated(_stated(question, question.experiment), question, question.experiment.whitened(powers))
+    """The problem in coordinates where flat excitation of these powers gives M = I, each plant in its own."""
+    whitened = [one.experiment.whitened(powers) for one in question.plants]
+    return _restated(_stated(question, question.experiment), question, whitened)
 
 
-def _restated(problem: Problem, question: Question, coordinates: Experiment) -> Problem:
+def _restated(problem: Problem, question: Question, coordinates: Sequence[Experiment]) -> Problem:
+    """The problem with everything that is required, each plant in the coordinates of its experiment."""
+    nominal, *others = (
+        one.at(experiment) for one, experiment in zip(question.plants, coordinates, strict=True)
+    )
     return replace(
         problem,
-        experiment=coordinates,
-        requirements=tuple(make(coordinates) for make in question.requirements),
-        side=tuple(make(coordinates) for make in question.side),
+        experiment=nominal.experiment,
+        requirements=nominal.requirements,
+        side=nominal.side,
+        others=tuple(others),
     )
 
 
@@ -173,16 +215,25 @@ def _suited(problem: Problem, question: Question, start: Array) -> Problem:
     A pole next to the unit circle may dominate what flat excitation tells: lines away from it then tell
     little of all parameters, and yet tell them apart. Otherwise, the problem itself.
     """
-    if np.linalg.cond(problem.information(start)) < _UNSUITED:
+    informations = problem.informations(start)
+    if np.all(np.linalg.cond(informations) < _UNSUITED):
         return problem
+    pairs = zip(problem.scenarios, informations, strict=True)
+    coordinates = [_suited_to(problem, one.experiment, told, start) for one, told in pairs]
+    return _restated(problem, question, coordinates)
+
+
+def _suited_to(problem: Problem, experiment: Experiment, information: Array, start: Array) -> Experiment:
+    """One plant's experiment in such coordinates; `information` (k, k) is what `start` tells of it."""
+    if np.linalg.cond(information) < _UNSUITED:
+        return experiment
     # Parameters in units of their own: of what the start tells, and only by their sizes.
-    raw = problem.experiment.to_raw(problem.information(start))
-    unit = np.diag(np.sqrt(np.maximum(np.diag(raw), _FAINT)))
-    scaled = replace(problem, experiment=replace(problem.experiment, factor=unit)).information(start)
+    unit = np.diag(np.sqrt(np.maximum(np.diag(experiment.to_raw(information)), _FAINT)))
+    in_units = replace(experiment, factor=unit)
+    scaled = replace(problem, experiment=in_units, others=(), finer=None).information(start)
     if not np.linalg.cond(scaled) < _UNSUITED:
-        return problem
-    own = replace(problem.experiment, factor=unit @ np.linalg.cholesky(scaled))
-    return _restated(problem, question, own)
+        return experiment
+    return replace(experiment, factor=unit @ np.linalg.cholesky(scaled))
 
 
 def _stated(question: Question, experiment: Experiment) -> Problem:
@@ -197,6 +248,7 @@ def _stated(question: Question, experiment: Experiment) -> Problem:
         limits=(*question.limits, *implied),
         densities=densities,
         goal=question.goal,
+        mean_cost=question.mean_cost,
     )
 
 
@@ -251,24 +303,26 @@ def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeRes
     if found.basis.has_density or problem.has_floors or not found.x.any():
         return found
     at = problem.on(found.basis)
-    told = found.x * np.linalg.norm(at.information_map, axis=(1, 2))
-    least = max(float(np.linalg.eigvalsh(found.information)[0]), 0.0)
+    least = np.linalg.eigvalsh(found.informations)[:, 0]
+    if least.min() <= 0.0:
+        return found
+    told = found.x * np.max(np.linalg.norm(at.information_maps, axis=(2, 3)) / least, axis=1)
     order = np.argsort(told)
     lost = np.cumsum(told[order])
-    faint = lost <= (_ROUNDING if problem.scaled else _FAINT) * least
+    faint = lost <= (_ROUNDING if problem.scaled else _FAINT)
     if not np.any(faint):
         return found
     x = found.x.copy()
     x[order[faint]] = 0.0
     if problem.scaled:
         return replace(found, x=x)
-    x *= 1.0 + 2.0 * lost[faint][-1] / least
-    return replace(found, x=x, objective=at.price.at(x), information=at.information(x))
+    x *= 1.0 + 2.0 * lost[faint][-1]
+    return replace(found, x=x, objective=at.price.at(x), informations=at.informations(x))
 
 
 def _white(question: Question, flat: Problem, power: float) -> Candidate:
     if question.goal == "cost":
-        return candidate_at(flat, np.array([power]), 1.0)
+        return scaled_up(flat, np.array([power]), 1.0, [])
     # From far below, since what meets the requirements with room to spare is not scaled down.
     return scaled_up(replace(flat, floors_fixed=False), np.array([_FAR_BELOW * power]), 0.0, [])
 
@@ -299,11 +353,11 @@ def _check_reachable(problem: Problem, start: Array) -> None:
     """
     if problem.goal != "cost" or problem.basis.has_density:
         return
-    excited = np.linalg.eigvalsh(problem.excited_information(start))
+    excited = np.linalg.eigvalsh(problem.excited(start)[0])
     if excited[0] > _UNEXCITED * excited[-1]:
         return
     try:
-        ratio = problem.worst_ratio(problem.information(_PLENTY * start)).ratio
+        ratio = problem.worst_ratio(problem.informations(_PLENTY * start)).ratio
     except np.linalg.LinAlgError:
         ratio = np.inf
     if ratio > 1.0:
@@ -319,14 +373,13 @@ def _check_reachable(problem: Problem, start: Array) -> None:
 
 def _nothing(problem: Problem) -> ExchangeResult:
     """The answer when what is known already meets every requirement: no excitation at all."""
-    k = problem.experiment.size
-    none = Certificate(0.0, np.zeros((k, k)), np.zeros(0), np.zeros(len(problem.limits)))
+    none = Certificate(0.0, np.zeros_like(problem.baselines), np.zeros(0), np.zeros(len(problem.limits)))
     return ExchangeResult(
         basis=problem.basis,
         x=np.zeros(problem.basis.size),
         s=1.0,
         objective=0.0,
-        information=problem.baseline_information,
+        informations=problem.baselines,
         certificate=none,
         active=(),
         rounds=0,

@@ -1,10 +1,10 @@
 """The exchange method: a finite conic program, enlarged by whatever it violates, until a proof closes.
 
-Both the cone of spectra and most requirements hold infinitely many conditions: a semi-infinite program
-([hettich-kortanek-1993]). Each round solves with a finite selection, whose optimum is a relaxation, asks
-every piece for its worst violations, and adds those. Upper bound: the iterate, repaired until everything
-holds (`candidate`). Lower bound: its multipliers, made exactly dual feasible (`certificate`). Their
-distance is the proof.
+Both the cone of spectra and most requirements hold infinitely many conditions, and each scenario has its own:
+a semi-infinite program ([hettich-kortanek-1993]). Each round solves with a finite selection, whose optimum is
+a relaxation, asks every piece for its worst violations, and adds those. Upper bound: the iterate, repaired
+until everything holds (`candidate`). Lower bound: its multipliers, made exactly dual feasible
+(`certificate`). Their distance is the proof.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, Violation
 from inputdesign_cli.compute.time_limit import OutOfTimeError
@@ -28,7 +29,7 @@ from inputdesign_cli.design.convex.candidate import (
 )
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.limits import DensityBreach
-from inputdesign_cli.design.convex.master import Proof, Row, solve_master
+from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.rows import alike, density_row, first_density_rows, on_basis, power_rows
 from inputdesign_cli.plant.polynomial import Array
@@ -39,6 +40,7 @@ MAX_ROUNDS = 60
 _WORTH_REPAIRING = 1.5
 _FIRST_CUTS = 0.3
 _MORE_CUTS = 6
+_FEW_SCENARIOS = 4
 _HALVINGS = 6
 _BINDS = 1e-5
 _PROGRESS = 1e-5
@@ -57,18 +59,23 @@ class ExchangeResult:
     """A spectrum `x` of `basis` that meets everything, its information, and the proved bound.
 
     `objective` is what was minimised: the cost, or s (see `Problem`); `certificate.bound` is its proved
-    lower bound. `information` (k, k) is M(x); for the goal "samples" that of the s samples.
+    lower bound. `informations` (S, k, k) are the M_s(x); for the goal "samples" those of the s samples.
     """
 
     basis: Basis
     x: Array
     s: float
     objective: float
-    information: Array
+    informations: NDArray[np.float64]
     certificate: Certificate
     active: tuple[Place, ...]  # (requirement, frequency) with a positive multiplier, the largest first
     rounds: int
     cuts: int
+
+    @property
+    def information(self) -> Array:
+        """(k, k): that of the nominal plant."""
+        return self.informations[0]
 
     @property
     def active_frequencies(self) -> Array:
@@ -145,7 +152,7 @@ def exchange(
         x=best.z / best.s,
         s=best.s,
         objective=best.objective,
-        information=best.information if whole else best.information / best.s,
+        informations=best.informations if whole else best.informations / best.s,
         certificate=state.certificate,
         active=state.active,
         rounds=rounds,
@@ -174,17 +181,18 @@ class _State:
         return (self.best.objective - self.certificate.bound) / self.best.objective
 
     @property
-    def sides(self) -> list[bool]:
-        return [index >= len(self.problem.requirements) for index, _ in self.keys]
+    def placed(self) -> list[PlacedCut]:
+        """The cuts with their scenarios."""
+        asked = [self.problem.asked[index] for index, _ in self.keys]
+        return [PlacedCut(cut, a.scenario, a.side) for cut, a in zip(self.cuts, asked, strict=True)]
 
     def improve(self, tolerance: float) -> bool:
         """One round: solve, prove, repair, enlarge. False when another could not improve anything."""
         problem, face, best, cuts = self.problem, self.face, self.best, len(self.cuts)
-        tagged = list(zip(self.cuts, self.sides, strict=True))
         answer = solve_master(
             problem,
             self.face,
-            tagged,
+            self.placed,
             self.rows,
             self.best,
             tolerance=tolerance,
@@ -194,7 +202,7 @@ class _State:
             return False
         before = (self.best.objective, self.certificate.bound)
         self.solved, self.proof = (self.face, answer.y), answer.proof
-        proved = certify(problem, answer.proof, self.sides, self.rows)
+        proved = certify(problem, answer.proof, self.rows)
         moves = proved.bound > (1.0 + _PROGRESS) * self.certificate.bound
         if proved.bound > self.certificate.bound:
             self.certificate = proved
@@ -210,7 +218,7 @@ class _State:
             places = [(i, v.frequency) for i, v in found]
             with suppress(np.linalg.LinAlgError):  # singular on the way up: the best so far stays
                 self.best = min(self.best, scaled_up(problem, z, s, places), key=lambda c: c.objective)
-        self._add(_most_violated(found, self.keys, 2 * problem.experiment.size + _MORE_CUTS))
+        self._add(_most_violated(problem, found, self.keys))
         self._add_rows(breaches)
         basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
         if basis is not problem.basis:
@@ -223,17 +231,17 @@ class _State:
 
     def _misses(self, z: Array, s: float) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
         problem = self.problem
-        information = candidate_at(problem, z, s).information
-        found = problem.violations(information, above=1.0)
+        informations = candidate_at(problem, z, s).informations
+        found = problem.violations(informations, above=1.0)
         if problem.side:
             root = np.sqrt(s)
-            sides = problem.side_violations(information, above=1.0 / root)
+            sides = problem.violations(informations, above=1.0 / root, side=True)
             found += [(i, replace(v, ratio=root * v.ratio)) for i, v in sides]
         return found, problem.density_breaches(z, s, above=1.0)
 
     def _prune(self, proof: Proof) -> None:
         """Drop the cuts that do not bind; each costs the solver a k x k cone, and can come back."""
-        weights = np.array([np.trace(Y) for Y, _ in proof.cuts])
+        weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
         kept = np.flatnonzero(weights > _BINDS * weights.sum())
         self.keys = [self.keys[i] for i in kept]
         self.cuts = [self.cuts[i] for i in kept]
@@ -245,7 +253,7 @@ class _State:
             return z, s
         for _ in range(_HALVINGS):
             try:
-                np.linalg.cholesky(candidate_at(self.problem, z, s).information)
+                np.linalg.cholesky(candidate_at(self.problem, z, s).informations)
             except np.linalg.LinAlgError:
                 z, s = 0.5 * (z + self.best.z), 0.5 * (s + self.best.s)
             else:
@@ -266,9 +274,8 @@ class _State:
         assert self.solved is not None
         assert self.proof is not None
         z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
-        count = len(self.proof.cuts)
         rows = [on_basis(problem, row) for row in self.rows]
-        proved = certify(problem, self.proof, self.sides[:count], rows[: self.proof.rows.size])
+        proved = certify(problem, self.proof, rows[: self.proof.rows.size])
         _, face = problem.basis.enlarge(*self.solved, proved.directions, problem.price)
         best = candidate_at(problem, z, self.best.s)
         return replace(self, problem=problem, face=face, best=best, certificate=proved, rows=rows)
@@ -292,7 +299,6 @@ def _first_state(problem: Problem, start: Array, interior: Array | None, known: 
         best = inner
     else:
         best = scaled_up(problem, start[:size], 0.0, [])
-    k = problem.experiment.size
     state = _State(
         problem=problem,
         face=problem.basis.first_face(problem.price),
@@ -302,15 +308,18 @@ def _first_state(problem: Problem, start: Array, interior: Array | None, known: 
         cuts=[],
         rows=power_rows(problem),
         certificate=Certificate(
-            0.0, np.zeros((k, k)), np.zeros((problem.basis.size, 0)), np.zeros(len(problem.limits))
+            0.0,
+            np.zeros_like(problem.baselines),
+            np.zeros((problem.basis.size, 0)),
+            np.zeros(len(problem.limits)),
         ),
     )
     state._add(list(known))
-    nearly = problem.violations(best.information, above=_FIRST_CUTS)
-    state._add(_most_violated(nearly, state.keys, 2 * problem.experiment.size + _MORE_CUTS))
+    nearly = problem.violations(best.informations, above=_FIRST_CUTS)
+    state._add(_most_violated(problem, nearly, state.keys))
     if problem.side:
-        close = problem.side_violations(best.information / best.s, above=_FIRST_CUTS)
-        state._add(_most_violated(close, state.keys, problem.experiment.size + _MORE_CUTS))
+        close = problem.violations(best.informations / best.s, above=_FIRST_CUTS, side=True)
+        state._add(_most_violated(problem, close, state.keys))
     if problem.densities:
         state.rows += first_density_rows(problem)
     return state
@@ -321,20 +330,29 @@ def _inner(problem: Problem, x: Array) -> Candidate:
     unit = candidate_at(problem, x, 1.0)
     if not problem.scaled:
         return unit
-    ratio = max((v.ratio for _, v in problem.violations(unit.information)), default=0.0)
+    ratio = max((v.ratio for _, v in problem.violations(unit.informations)), default=0.0)
     s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
     if problem.goal == "samples":
         s = 1.2 * scaled_up(problem, x, 1.0, []).s
     return candidate_at(problem, s * x, s)
 
 
-def _most_violated(found: list[tuple[int, Violation]], known: list[Place], most: int) -> list[Place]:
-    """Where to cut next: the worst places that have no cut yet (a flat ratio has hundreds of maxima)."""
-    ranked = sorted(found, key=lambda item: -item[1].ratio)
-    return [(i, v.frequency) for i, v in ranked if (i, v.frequency) not in known][:most]
+def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: list[Place]) -> list[Place]:
+    """Where to cut next: the worst places that have no cut yet (a flat ratio has hundreds of maxima).
+
+    Of many scenarios the worst few: what serves them serves most of the others.
+    """
+    most = 2 * problem.experiment.size + _MORE_CUTS
+    ranked = [
+        (i, v.frequency)
+        for i, v in sorted(found, key=lambda item: -item[1].ratio)
+        if (i, v.frequency) not in known
+    ]
+    worst = list(dict.fromkeys(problem.asked[i].scenario for i, _ in ranked))[:_FEW_SCENARIOS]
+    return [place for place in ranked if problem.asked[place[0]].scenario in worst][:most]
 
 
 def _active(keys: list[Place], proof: Proof) -> tuple[Place, ...]:
-    weights = np.array([np.trace(Y) for Y, _ in proof.cuts])
+    weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
     largest_first = np.argsort(-weights, kind="stable")
     return tuple(keys[i] for i in largest_first if weights[i] > 1e-4 * weights.sum())

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.candidate import least_scale, missing_floor, scaled_up
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Problem, Scenario
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
@@ -56,20 +57,22 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
         # Nothing caps the excitation: enough of it meets everything.
         strong = scaled_up(problem, start, 1.0, []).z
         return problem.basis, 1.2 * max(1.0, missing_floor(problem, strong)) * strong
-    asked = (*problem.requirements, *problem.side) if problem.goal == "cost" else problem.side
+
+    def asked(of: Scenario) -> tuple[Requirement, ...]:
+        return (*of.requirements, *of.side) if problem.goal == "cost" else of.side
+
     within = None
     if problem.has_floors:
-        limits_only = replace(
-            problem, goal="factor", requirements=(), side=(), floors_fixed=True, finer=problem
-        )
+        nothing = problem.with_requirements(lambda _: ())
+        limits_only = replace(nothing, goal="factor", floors_fixed=True, finer=problem)
         reached = exchange(limits_only, start, tolerance=_TOLERANCE, enough=_decided)
         if reached.objective >= 1.0:
             _check_proved(reached)
             raise UnreachableError(limits_only, reached, limits_alone=True)
         within = np.sqrt(reached.s) * reached.x
         problem, start = problem.on(reached.basis), np.pad(start, (0, within.size - start.size))
-    factor = replace(problem, goal="factor", requirements=asked, side=(), finer=problem)
-    if not asked:
+    factor = replace(problem.with_requirements(asked), goal="factor", finer=problem)
+    if not factor.asked:
         return problem.basis, within if within is not None else start * (0.5 / least_scale(factor, start))
     found = exchange(factor, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
     if found.objective >= 1.0 > found.certificate.bound and problem.goal == "cost":

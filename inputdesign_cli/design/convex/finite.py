@@ -18,7 +18,7 @@ from inputdesign_cli.design.conic import Block, solve_conic
 from inputdesign_cli.design.convex.cones import Atoms, Cone, Gram, Orthant
 from inputdesign_cli.design.convex.cut_cones import Concave, Inequalities
 from inputdesign_cli.design.convex.entries import Entries
-from inputdesign_cli.design.convex.interior import follow_path
+from inputdesign_cli.design.convex.interior import Seen, follow_path
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Face, svec, svec_length
 
@@ -30,39 +30,53 @@ _USEFUL = 1e-4  # a multiplier this near the optimum is worth another round
 
 
 @dataclass(frozen=True)
+class MatrixPart:
+    """One information matrix: svec(M) = `offset` + `gains` v, M in the `cuts`.
+
+    The constants of the cuts are multiplied by s, in natural units, for `sides`.
+    """
+
+    gains: Array
+    offset: Array
+    cuts: Sequence[Cut]
+    sides: Sequence[bool]
+
+
+@dataclass(frozen=True)
 class FiniteProgram:
     """minimise cost . v over v = (y on the face, multiples of kept spectra, s), (n,).
 
-    svec(M) = `offset` + `gains` v; `signs` v >= 0 for the kept spectra and s; `limit_offset` + `limits` v
-    >= 0; and M in the `cuts`, with constants times s in natural units (`unit` v[-1]) for `sides`.
-    Without s, `unit` is None. `size` is k.
+    `matrices` are the information matrices with their cuts, one a scenario; `signs` v >= 0 for the kept
+    spectra and s; `limit_offset` + `limits` v >= 0. s in natural units is `unit` v[-1]; without s, `unit` is
+    None. `size` is k.
     """
 
     cost: Array
     face: Face
-    gains: Array
-    offset: Array
+    matrices: Sequence[MatrixPart]
     signs: Array
     limits: Array
     limit_offset: Array
-    cuts: Sequence[Cut]
-    sides: Sequence[bool]
     unit: float | None
     size: int
 
     @property
     def work(self) -> int:
         """Entries of the matrix inequalities that cuts are made of."""
-        orders = [self.size if cut.concave is None else 2 * self.size for cut in self.cuts]
+        cuts = [cut for part in self.matrices for cut in part.cuts]
+        orders = [self.size if cut.concave is None else 2 * self.size for cut in cuts]
         return sum(svec_length(order) for order in orders)
 
 
 @dataclass(frozen=True)
 class FiniteSolution:
-    """v (n,), what the multiplier of each cut proves (see `Cut.proof`), and the weights of the limits."""
+    """v (n,), the weights of the limits, and for each matrix what the multipliers of its cuts prove.
+
+    See `Cut.proof`.
+    """
 
     v: Array
-    proofs: list[tuple[Array, float]]
+    proofs: list[list[tuple[Array, float]]]
     limit_weights: Array
     converged: bool
 
@@ -85,54 +99,52 @@ def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | No
     k, entries, n = program.size, svec_length(program.size), program.cost.size
     inside, scaled = program.face.columns.shape[1], int(program.unit is not None)
     number = n - scaled
-    parts = [cut.blocks(k) for cut in program.cuts]
-    widths = [blocks[0].auxiliary.shape[1] for blocks in parts]
-    starts = np.concatenate([[0], np.cumsum(widths)]).astype(int) + n + entries
-    total = n + entries + sum(widths)
+    # The unknowns: (y, kept), svec(M) of each matrix, s, auxiliary ones of the cuts.
+    s_at = number + entries * len(program.matrices)
+    parts = [[cut.blocks(k) for cut in matrix.cuts] for matrix in program.matrices]
+    total = s_at + scaled + sum(blocks[0].auxiliary.shape[1] for part in parts for blocks in part)
 
     def placed(matrix: Array) -> sp.csc_matrix:
-        """Columns of v among all unknowns: (y, kept), svec(M), s, auxiliary ones."""
+        """Columns of v among all unknowns."""
         wide = np.zeros((len(matrix), total))
         wide[:, :number] = matrix[:, :number]
-        wide[:, number + entries : n + entries] = matrix[:, number:]
+        wide[:, s_at : s_at + scaled] = matrix[:, number:]
         return sp.csc_matrix(wide)
 
-    link = placed(-program.gains) + _widened(sp.eye_array(entries, format="csc"), number, total)
-    blocks = [
-        Block("zero", sp.csc_matrix(link), -program.offset),
-        Block(
-            program.face.kind, sp.eye_array(inside, total, format="csc"), np.zeros(inside), program.face.order
-        ),
-    ]
+    blocks = []
+    for index, matrix in enumerate(program.matrices):
+        own = _widened(sp.eye_array(entries, format="csc"), number + index * entries, total)
+        blocks.append(Block("zero", sp.csc_matrix(placed(-matrix.gains) + own), -matrix.offset))
+    face = program.face
+    blocks.append(Block(face.kind, sp.eye_array(inside, total, format="csc"), np.zeros(inside), face.order))
     blocks += [Block("nonnegative", placed(row[None]), np.zeros(1)) for row in program.signs]
     if len(program.limits):
         blocks.append(Block("nonnegative", placed(program.limits), program.limit_offset))
-    first = len(blocks)
-    for side, conic, start in zip(program.sides, parts, starts, strict=False):
-        for block in conic:
-            pieces = [sp.csc_matrix((block.constant.size, number)), block.information]
-            if program.unit is not None:
-                column = (
-                    program.unit * block.constant[:, None] if side else np.zeros((block.constant.size, 1))
-                )
-                pieces.append(sp.csc_matrix(column))
-            head = sp.hstack(pieces, format="csc")
-            matrix = _widened(head, 0, total) + _widened(block.auxiliary, int(start), total)
-            offset = np.zeros(block.constant.size) if side else block.constant
-            blocks.append(Block(block.kind, sp.csc_matrix(matrix), offset, block.order))
+    first, start = len(blocks), s_at + scaled
+    for index, (matrix, part) in enumerate(zip(program.matrices, parts, strict=True)):
+        for side, conic in zip(matrix.sides, part, strict=True):
+            for block in conic:
+                pieces = _widened(block.information, number + index * entries, total)
+                pieces = pieces + _widened(block.auxiliary, start, total)
+                if program.unit is not None and side:
+                    column = sp.csc_matrix(program.unit * block.constant[:, None])
+                    pieces = pieces + _widened(column, s_at, total)
+                offset = np.zeros(block.constant.size) if side else block.constant
+                blocks.append(Block(block.kind, sp.csc_matrix(pieces), offset, block.order))
+            start += conic[0].auxiliary.shape[1]
     q = np.zeros(total)
     q[:number] = program.cost[:number]
-    q[number + entries : n + entries] = program.cost[number:]
+    q[s_at : s_at + scaled] = program.cost[number:]
     solution = solve_conic(q, blocks, tolerance=tolerance)
     if solution.status in ("infeasible", "unbounded") or not np.all(np.isfinite(solution.x)):
         return None
-    remaining = list(solution.multipliers[first:])
-    proofs = []
-    for cut, conic in zip(program.cuts, parts, strict=True):
-        mine, remaining = remaining[: len(conic)], remaining[len(conic) :]
-        proofs.append(cut.proof(mine))
+    remaining = iter(solution.multipliers[first:])
+    proofs = [
+        [cut.proof([next(remaining) for _ in conic]) for cut, conic in zip(matrix.cuts, part, strict=True)]
+        for matrix, part in zip(program.matrices, parts, strict=True)
+    ]
     return FiniteSolution(
-        v=np.concatenate([solution.x[:number], solution.x[number + entries : n + entries]]),
+        v=np.concatenate([solution.x[:number], solution.x[s_at : s_at + scaled]]),
         proofs=proofs,
         limit_weights=solution.multipliers[first - 1] if len(program.limits) else np.zeros(0),
         converged=solution.status != "failed",
@@ -142,13 +154,8 @@ def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | No
 def by_interior(program: FiniteProgram, *, tolerance: float) -> tuple[FiniteSolution | None, float]:
     """By the dense interior-point method: its best iterate, None where it had none, and the error of that."""
     n, inside = program.cost.size, program.face.columns.shape[1]
-    entries = _entries(program)
-    offset, gains = program.offset[entries.kept], program.gains[entries.kept]
-    if program.unit is not None:
-        offset = np.append(offset, 0.0)
-        gains = np.vstack([gains, program.unit * np.eye(n)[-1]])
-    through, order = _cut_cones(program, entries)
-    share = 1.0 / max(sum(cone.degree for cone in through), 1)
+    parts = [_seen(program, matrix) for matrix in program.matrices]
+    share = 1.0 / max(sum(cone.degree for seen, _ in parts for cone in seen.cones), 1)
     direct: list[Cone] = []
     start = np.zeros(n)
     if program.face.kind == "psd":
@@ -163,37 +170,48 @@ def by_interior(program: FiniteProgram, *, tolerance: float) -> tuple[FiniteSolu
         levels = np.concatenate([np.zeros(len(program.signs)), program.limit_offset])
         slack = np.maximum(levels + rows @ start, 1.0)
         direct.append(Orthant(rows, levels, slack, share * np.ones(len(rows))))
-    reached = follow_path(program.cost, start, direct, through, (offset, gains), tolerance=tolerance)
+    reached = follow_path(program.cost, start, direct, [seen for seen, _ in parts], tolerance=tolerance)
     if not np.isfinite(reached.error):
         return None, np.inf
-    cut_weights = [Z for block in reached.multipliers[len(direct) :] for Z in block]
-    proofs: list[tuple[Array, float] | None] = [None] * len(program.cuts)
-    for index, weight in zip(order, cut_weights, strict=True):
-        proofs[index] = program.cuts[index].implied(weight)
+    weights = iter(reached.multipliers[len(direct) :])
+    proofs = []
+    for matrix, (seen, order) in zip(program.matrices, parts, strict=True):
+        own = [Z for _ in seen.cones for Z in next(weights)]
+        by_cut = dict(zip(order, own, strict=True))
+        proofs.append([cut.implied(by_cut[i]) for i, cut in enumerate(matrix.cuts)])
     row_weights = reached.multipliers[1][0] if len(rows) else np.zeros(0)
     solution = FiniteSolution(
         v=reached.v,
-        proofs=[proof for proof in proofs if proof is not None],
+        proofs=proofs,
         limit_weights=row_weights[len(program.signs) :],
         converged=reached.error <= _USEFUL,
     )
     return solution, reached.error
 
 
-def _entries(program: FiniteProgram) -> Entries:
-    """Those of M that anything may change or ask for."""
-    seen = np.abs(program.gains).max(axis=1) + np.abs(program.offset)
+def _seen(program: FiniteProgram, matrix: MatrixPart) -> tuple[Seen, list[int]]:
+    """The cones of one matrix with what they see, and which cut each of their multipliers belongs to.
+
+    Seen are the entries of M that anything may change or ask for, and s.
+    """
+    seen = np.abs(matrix.gains).max(axis=1) + np.abs(matrix.offset)
     kept = np.flatnonzero(seen > 1e-14 * seen.max())
-    return Entries(program.size, kept, with_s=program.unit is not None)
+    entries = Entries(program.size, kept, with_s=program.unit is not None)
+    offset, gains = matrix.offset[kept], matrix.gains[kept]
+    if program.unit is not None:
+        offset = np.append(offset, 0.0)
+        gains = np.vstack([gains, program.unit * np.eye(program.cost.size)[-1]])
+    cones, order = _cut_cones(matrix, entries)
+    return Seen(cones, offset, gains), order
 
 
-def _cut_cones(program: FiniteProgram, entries: Entries) -> tuple[list[Cone], list[int]]:
+def _cut_cones(part: MatrixPart, entries: Entries) -> tuple[list[Cone], list[int]]:
     """The cuts gathered by their kind, and which cut each multiplier then belongs to."""
-    cuts = list(zip(range(len(program.cuts)), program.cuts, program.sides, strict=True))
+    cuts = list(zip(range(len(part.cuts)), part.cuts, part.sides, strict=True))
     found: list[Cone] = []
     order: list[int] = []
     matrix = [(i, cut.inequality, side) for i, cut, side in cuts if cut.inequality is not None]
-    keys = [(len(part.constant), part.scale, part.form is None) for _, part, _ in matrix]
+    keys = [(len(one.constant), one.scale, one.form is None) for _, one, _ in matrix]
     for key in dict.fromkeys(keys):
         mine = [item for item, own in zip(matrix, keys, strict=True) if own == key]
         share = 1.0 / (len(mine) * key[0])

@@ -1,9 +1,9 @@
 """A primal-dual interior-point method for the finite programs of the exchange, on dense blocks.
 
 minimise q^T v subject to S_b(v) in its cone for every block b, with a multiplier Z_b each. Directions are
-those of [helmberg-1996], with the corrector of [mehrotra-1992]. All matrix inequalities of a program hold
-the same M(v): their part of the linear system is summed over the inequalities, as a matrix of the entries of
-M, and only then taken to the unknowns, so that one inequality more costs next to nothing. A general
+those of [helmberg-1996], with the corrector of [mehrotra-1992]. Many matrix inequalities
+hold the same M(v): their part of the linear system is summed over them, as a matrix of the entries of M, and
+only then taken to the unknowns, so that one inequality more costs next to nothing. A general
 solver takes all unknowns through each of them. Smooth concave functions of M (determinant, inverse trace) are
 taken as they are, with their curvature, not by matrix inequalities of twice the order.
 
@@ -32,6 +32,15 @@ _ROUNDING = 1e-5  # errors below this are as likely rounding
 
 
 @dataclass(frozen=True)
+class Seen:
+    """Blocks of a = `offset` (e,) + `gains` (e, n) v: those of one information matrix."""
+
+    cones: Sequence[Cone]
+    offset: Array
+    gains: Array
+
+
+@dataclass(frozen=True)
 class Reached:
     """The best iterate: unknowns v (n,), multipliers of each block, its largest error; iterations taken."""
 
@@ -42,13 +51,7 @@ class Reached:
 
 
 def follow_path(
-    q: Array,
-    start: Array,
-    direct: Sequence[Cone],
-    through: Sequence[Cone],
-    seen: tuple[Array, Array],
-    *,
-    tolerance: float,
+    q: Array, start: Array, direct: Sequence[Cone], through: Sequence[Seen], *, tolerance: float
 ) -> Reached:
     """Solve to a tolerance on gap and residuals, relative to an objective of order one.
 
@@ -56,22 +59,21 @@ def follow_path(
         q: (n,) the cost.
         start: (n,) unknowns inside of their cones.
         direct: blocks of v.
-        through: blocks of a = offset + gains v.
-        seen: (offset (e,), gains (e, n)).
+        through: blocks of what is linear in v; their multipliers follow those of `direct`.
 
     Raises:
         InaccurateError: `out-of-time`.
     """
-    offset, gains = seen
-    cones = [*direct, *through]
+    cones = [*direct, *(cone for seen in through for cone in seen.cones)]
     degree, unit = sum(cone.degree for cone in cones), 1.0 + float(np.abs(q).max())
     v, best, kept = start, Reached(start, [], np.inf, 0), 0
     for iteration in range(_MOST_ITERATIONS):
         seconds_left()
         try:
-            missed = max(_look(direct, v), _look(through, offset + gains @ v))
+            missed = max([_look(direct, v), *(_look(s.cones, s.offset + s.gains @ v) for s in through)])
             weight = sum((c.pull() for c in direct), np.zeros(v.size))
-            weight = weight + gains.T @ sum((c.pull() for c in through), np.zeros(offset.size))
+            for seen in through:
+                weight = weight + seen.gains.T @ sum(c.pull() for c in seen.cones)
             gap = sum(cone.gap for cone in cones)
             error = max(gap / (1.0 + abs(float(q @ v))), missed, float(np.abs(q - weight).max()) / unit)
             if error < best.error:
@@ -80,7 +82,7 @@ def follow_path(
             patience = _PATIENCE if best.error > _ROUNDING else _PATIENCE_NEAR
             if error <= tolerance or iteration - kept > patience or not np.isfinite(error):
                 break
-            up, down = _step(q, v, direct, through, gains, gap, degree)
+            up, down = _step(q, v, direct, through, gap, degree)
         except (np.linalg.LinAlgError, FloatingPointError):  # beyond what double precision holds
             break
         v = v + up[0] * up[1]
@@ -94,26 +96,30 @@ def _look(cones: Sequence[Cone], at: Array) -> float:
 
 
 def _step(
-    q: Array, v: Array, direct: Sequence[Cone], through: Sequence[Cone], gains: Array, gap: float, degree: int
+    q: Array, v: Array, direct: Sequence[Cone], through: Sequence[Seen], gap: float, degree: int
 ) -> tuple[tuple[float, Array], float]:
     """Predictor and corrector: (length, direction) of the unknowns, and the length of the multipliers."""
-    cones = [*direct, *through]
-    entries = np.zeros((len(gains), len(gains)))
-    for cone in through:
-        cone.add_to(entries)
-    matrix = gains.T @ (entries @ gains)
+    cones = [*direct, *(cone for seen in through for cone in seen.cones)]
+    matrix = np.zeros((v.size, v.size))
+    for seen in through:
+        entries = np.zeros((seen.offset.size, seen.offset.size))
+        for cone in seen.cones:
+            cone.add_to(entries)
+        matrix += seen.gains.T @ (entries @ seen.gains)
     for cone in direct:
         cone.add_to(matrix)
     solve = _factored(matrix)
 
     def towards(target: float, *, corrected: bool) -> Array:
         pushed = sum((c.push(target, corrected=corrected) for c in direct), np.zeros(v.size))
-        seen = sum((c.push(target, corrected=corrected) for c in through), np.zeros(len(gains)))
-        step = solve(pushed + gains.T @ seen - q)
+        for seen in through:
+            pushed = pushed + seen.gains.T @ sum(c.push(target, corrected=corrected) for c in seen.cones)
+        step = solve(pushed - q)
         for cone in direct:
             cone.turn(step)
-        for cone in through:
-            cone.turn(gains @ step)
+        for seen in through:
+            for cone in seen.cones:
+                cone.turn(seen.gains @ step)
         return step
 
     towards(0.0, corrected=False)

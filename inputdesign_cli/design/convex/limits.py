@@ -16,7 +16,8 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 class PowerLimit:
     """A power of input, output or excitation is at most (`upper`) or at least `bound`.
 
-    `channel` counts from 0; None is the sum over the channels. `implied` says that a limit on single samples
+    `channel` counts from 0; None is the sum over the channels. `scenario` is the number of the plant at which
+    the power is taken. `implied` says that a limit on single samples
     stands behind it: |u| <= a leaves u no more power than a^2.
     """
 
@@ -25,6 +26,7 @@ class PowerLimit:
     upper: bool = True
     channel: int | None = None
     implied: bool = False
+    scenario: int = 0
 
     @property
     def key(self) -> str:

@@ -1,8 +1,8 @@
 """The finite program of one round: a face of the cone of spectra, finitely many cuts and rows.
 
-Unknowns: y (the spectrum on the face), svec(M'), s where the goal has one, and the auxiliary unknowns of
-the cuts. Everything is scaled by the best design so far: there M' is the identity and the objective is
-one, so that whatever is active has multipliers and slacks of order one.
+Unknowns: y (the spectrum on the face), svec(M') of the scenarios that have cuts, s where the goal has one,
+and the auxiliary unknowns of the cuts. Everything is scaled by the best design so far: there each M' is the
+identity and the objective is one, so that whatever is active has multipliers and slacks of order one.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Cut, positive_part
 from inputdesign_cli.design.convex.candidate import Candidate
-from inputdesign_cli.design.convex.finite import FiniteProgram, solve_program
+from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, solve_program
 from inputdesign_cli.design.convex.limits import DensityPlace
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
@@ -45,14 +46,33 @@ class Row:
 
 
 @dataclass(frozen=True)
+class PlacedCut:
+    """A cut with the scenario whose M' it is about; of a `side` requirement s multiplies its constants."""
+
+    cut: Cut
+    scenario: int = 0
+    side: bool = False
+
+
+@dataclass(frozen=True)
+class Implied:
+    """tr(Y M') >= level for the M' of a scenario, or level times s for `side` ones; Y = `weight` (k, k)."""
+
+    weight: Array
+    level: float
+    scenario: int = 0
+    side: bool = False
+
+
+@dataclass(frozen=True)
 class Proof:
     """What the multipliers of one round suggest, in the problem's own units.
 
-    `cuts` holds (Y, r) of each cut, tr(Y M') >= r (times s for cuts of side requirements), whatever the
-    solver did; `rows` (number of rows,) are nonnegative weights of the limits.
+    `cuts` holds what each cut implies, whatever the solver did; `rows` (number of rows,) are nonnegative
+    weights of the limits.
     """
 
-    cuts: tuple[tuple[Array, float], ...]
+    cuts: tuple[Implied, ...]
     rows: Array
 
 
@@ -74,7 +94,7 @@ class MasterSolution:
 def solve_master(
     problem: Problem,
     face: Face,
-    cuts: Sequence[tuple[Cut, bool]],
+    cuts: Sequence[PlacedCut],
     rows: Sequence[Row],
     best: Candidate,
     *,
@@ -84,7 +104,6 @@ def solve_master(
     """Solve one finite program; None when the solver has no point to show.
 
     Args:
-        cuts: each with whether it belongs to a side requirement, whose constants s multiplies.
         best: the best design so far, which sets the scales.
         keep: let any multiple of the best spectrum be added to the face, so that the program stays
             feasible where scaling up is no remedy.
@@ -92,33 +111,29 @@ def solve_master(
     ray = best.z[:, None] / problem.price.at(best.z) if keep else np.zeros((best.z.size, 0))
     columns = np.concatenate([face.columns, ray], axis=1)
     inside, number = face.columns.shape[1], columns.shape[1]
-    congruence = _congruence(best.information, definite=problem.needs_definite)
     objective, worth = best.objective, problem.price.at(best.z)
-
-    def turned(information: Array) -> Array:
-        return svec(congruence @ information @ congruence.T)
-
-    maps = problem.information_map
-    parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
-    gains = [worth * (np.concatenate(parts).T @ columns)]
+    definite = problem.needs_definite
+    involved = sorted({placed.scenario for placed in cuts})
+    turns = {plant: _congruence(best.informations[plant], definite=definite) for plant in involved}
+    matrices = []
+    for plant, turn in turns.items():
+        mine = [placed for placed in cuts if placed.scenario == plant]
+        gains, offset = _turned(problem, plant, turn, worth * columns, best.s)
+        transformed = [placed.cut.transformed(turn) for placed in mine]
+        matrices.append(MatrixPart(gains, offset, transformed, [placed.side for placed in mine]))
     signs = np.eye(number)[inside:]
     cost = problem.price.vector @ columns
     if problem.scaled:
-        gains.append(best.s * turned(problem.scaled_information)[:, None])
         signs = np.eye(number + 1)[inside:]
         cost = np.eye(number + 1)[number]
-    limits, offset = _limits(problem, columns, rows, best.s, worth)
-    transformed = [cut.transformed(congruence) for cut, _ in cuts]
+    limits, limit_offset = _limits(problem, columns, rows, best.s, worth)
     program = FiniteProgram(
         cost=cost,
         face=face,
-        gains=np.hstack(gains),
-        offset=turned(problem.fixed_information),
+        matrices=matrices,
         signs=signs,
         limits=limits,
-        limit_offset=offset,
-        cuts=transformed,
-        sides=[side for _, side in cuts],
+        limit_offset=limit_offset,
         unit=best.s if problem.scaled else None,
         size=problem.experiment.size,
     )
@@ -127,7 +142,11 @@ def solve_master(
         return None
     y = worth * _in_cone(face, solution.v[:inside])
     kept = worth * np.maximum(solution.v[inside:number], 0.0)
-    proofs = [(objective * congruence.T @ Y @ congruence, objective * r) for Y, r in solution.proofs]
+    told = {plant: iter(found) for plant, found in zip(involved, solution.proofs, strict=True)}
+    proofs = []
+    for placed in cuts:
+        turn, (Y, r) = turns[placed.scenario], next(told[placed.scenario])
+        proofs.append(Implied(objective * turn.T @ Y @ turn, objective * r, placed.scenario, placed.side))
     scales = np.array([_level(problem, row, best.s) for row in rows])
     weights = objective * np.maximum(solution.limit_weights, 0.0) / scales
     return MasterSolution(
@@ -137,6 +156,20 @@ def solve_master(
         proof=Proof(tuple(proofs), weights),
         converged=solution.converged,
     )
+
+
+def _turned(problem: Problem, scenario: int, turn: Array, columns: Array, s: float) -> tuple[Array, Array]:
+    """svec of K M' K^T as offset + gains (y, s), K = `turn`: gains (entries, unknowns), offset (entries,)."""
+
+    def turned(information: NDArray[np.float64]) -> NDArray[np.float64]:
+        return svec(turn @ information @ turn.T)
+
+    maps = problem.information_maps[:, scenario]
+    parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
+    gains = np.concatenate(parts).T @ columns
+    if problem.scaled:
+        gains = np.column_stack([gains, s * turned(problem.scaled_information[scenario])])
+    return gains, turned(problem.fixed_information[scenario])
 
 
 def _in_cone(face: Face, y: Array) -> Array:

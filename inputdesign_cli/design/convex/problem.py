@@ -1,7 +1,10 @@
 """The one sentence that every convex design here is an instance of.
 
-minimise an objective of the spectrum x, subject to x in the cone of spectra, M(x) = M0 + sum_i x_i M_i
-meeting every requirement, and the powers and the density of x within their limits.
+minimise an objective of the spectrum x, subject to x in the cone of spectra, M_s(x) = M0_s + sum_i x_i M_si
+meeting every requirement of every scenario s, and the powers and the density of x within their limits.
+
+A scenario is a plant that the true one might be. The nominal plant is the first, and most designs have no
+other; what is said of information below is then said of one matrix.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from inputdesign_cli.design.convex.limits import (
     breaches_at,
 )
 from inputdesign_cli.information import Experiment, PowerKind, WeightedProducts
-from inputdesign_cli.plant import graded_grid, local_maxima
+from inputdesign_cli.plant import common_grid, graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Functional
 
@@ -52,6 +55,29 @@ def weighted_sum(weights: Mapping[PowerKind, Weight], power: Mapping[PowerKind, 
     )
 
 
+def weighty_ones(weights: NDArray[np.float64]) -> list[int]:
+    """The scenarios whose weight Y_s of `weights` (S, k, k) is not zero."""
+    return np.flatnonzero(np.any(weights, axis=(1, 2))).tolist()
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A plant that the design must serve, in coordinates of its own, and what is required of it there."""
+
+    experiment: Experiment
+    requirements: tuple[Requirement, ...]
+    side: tuple[Requirement, ...] = ()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One requirement of all, of the scenario with this number; `side` as in `Problem`."""
+
+    scenario: int
+    requirement: Requirement
+    side: bool
+
+
 @dataclass(frozen=True)
 class Problem:
     """A design problem, for one of three goals.
@@ -66,11 +92,16 @@ class Problem:
     "samples": the least number of samples N within the limits; the experiment's own number must be
     one. In (N x, N) this is linear: M' = prior + N noise information + sum z_i M_i, limits times N.
 
-    `requirements` are made for the coordinates of `experiment`. `side` requirements (goal "factor")
-    must be met by M(x) itself. A density limit stands beside a limit on the power of the excitation
-    (`design.limits.implied_power`). With `floors_fixed` (goal "factor") lower limits do not scale: the
-    least multiple of the upper limits for which they can be met. `finer` is a problem of the same
-    experiment on the same or a larger basis, of whose integrals those of this basis are the head.
+    `requirements` are made for the coordinates of `experiment`, that of the nominal plant. `side`
+    requirements (goal "factor") must be met by M(x) itself. `others` are the scenarios besides, of the same
+    structure and length: each M_s meets the requirements of its own. A spectrum causes other powers at each
+    of them: limits name theirs, and the cost is that of the nominal plant, or with `mean_cost` the mean over
+    all.
+
+    A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
+    `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
+    they can be met. `finer` is a problem of the same experiment on the same or a larger basis, of whose
+    integrals those of this basis are the head.
     """
 
     experiment: Experiment
@@ -82,8 +113,30 @@ class Problem:
     goal: Goal = "cost"
     side: tuple[Requirement, ...] = ()
     floors_fixed: bool = False
+    others: tuple[Scenario, ...] = field(default=(), repr=False)
+    mean_cost: bool = False
     finer: Problem | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
+
+    @cached_property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """All S plants, the nominal one first."""
+        return (Scenario(self.experiment, self.requirements, self.side), *self.others)
+
+    @cached_property
+    def asked(self) -> tuple[Asked, ...]:
+        """All requirements, scenario by scenario, side ones after the others of theirs."""
+        return tuple(
+            Asked(number, requirement, side)
+            for number, scenario in enumerate(self.scenarios)
+            for side, listed in ((False, scenario.requirements), (True, scenario.side))
+            for requirement in listed
+        )
+
+    def with_requirements(self, of: Callable[[Scenario], tuple[Requirement, ...]]) -> Problem:
+        """The same problem with other requirements at every scenario, and no side ones."""
+        others = tuple(replace(one, requirements=of(one), side=()) for one in self.others)
+        return replace(self, requirements=of(self.scenarios[0]), side=(), others=others)
 
     @property
     def stated_criterion(self) -> Criterion | None:
@@ -98,8 +151,12 @@ class Problem:
         """The same problem on a basis that begins with this one; what is known of this one is kept."""
         grown = replace(self, basis=basis, finer=None)
         grown._before.append(self)
-        _ = grown.information_map, grown.grid, grown.grid_products
+        _ = grown.information_maps, grown.grid
+        for key in self._powers:
+            grown.power(*key)
         grown._before.clear()
+        grown._products.update(self._products)
+        grown._grids.update(self._grids)
         return grown
 
     @property
@@ -116,106 +173,169 @@ class Problem:
     @property
     def needs_definite(self) -> bool:
         """Whether a singular information matrix is out of the question."""
-        return any(requirement.definite for requirement in (*self.requirements, *self.side))
+        return any(asked.requirement.definite for asked in self.asked)
 
     @cached_property
-    def information_map(self) -> NDArray[np.float64]:
-        """(size, k, k): M_i, the information of each basis function."""
+    def information_maps(self) -> NDArray[np.float64]:
+        """(size, S, k, k): M_si, the information of each basis function at each scenario."""
         if self.finer is not None:
-            return self.finer.information_map[: self.basis.size]
-        experiment = self.experiment
+            return self.finer.information_maps[: self.basis.size]
         basis = self.basis.beyond(self._before[0].basis.size) if self._before else self.basis
-        found = basis.integrals(
-            experiment.information_density, experiment.singularities, experiment.information_factor
-        )
-        return np.concatenate([*(before.information_map for before in self._before), found])
+        found = np.empty((basis.size, len(self.scenarios), *2 * (self.experiment.size,)))
+        for number, scenario in enumerate(self.scenarios):
+            at = scenario.experiment
+            found[:, number] = basis.integrals(
+                at.information_density, at.singularities, at.information_factor
+            )
+        return np.concatenate([*(before.information_maps for before in self._before), found])
+
+    @property
+    def information_map(self) -> NDArray[np.float64]:
+        """(size, k, k): those of the nominal plant."""
+        return self.information_maps[:, 0]
+
+    @cached_property
+    def baselines(self) -> NDArray[np.float64]:
+        """(S, k, k): M0_s, what is known of each scenario without excitation."""
+        return np.array([scenario.experiment.baseline_information for scenario in self.scenarios])
 
     @property
     def baseline_information(self) -> Array:
-        """(k, k): M0, what is known without excitation."""
+        """(k, k): M0 of the nominal plant."""
         return self.experiment.baseline_information
 
+    def informations(self, x: Array) -> NDArray[np.float64]:
+        """(S, k, k): M_s(x)."""
+        return self.baselines + self.excited(x)
+
     def information(self, x: Array) -> Array:
-        """(k, k): M(x)."""
-        return self.baseline_information + self.excited_information(x)
+        """(k, k): M(x) of the nominal plant."""
+        return self.baseline_information + np.tensordot(x, self.information_map, axes=1)
 
-    def excited_information(self, x: Array) -> Array:
-        """(k, k): sum_i x_i M_i."""
-        return np.tensordot(x, self.information_map, axes=1)
+    def excited(self, x: Array) -> NDArray[np.float64]:
+        """(S, k, k): sum_i x_i M_si."""
+        return np.tensordot(x, self.information_maps, axes=1)
 
     @cached_property
-    def fixed_information(self) -> Array:
-        """(k, k): the part of M' that neither x nor s scales."""
+    def fixed_information(self) -> NDArray[np.float64]:
+        """(S, k, k): the part of M' that neither x nor s scales."""
         if self.goal == "cost":
-            return self.baseline_information
+            return self.baselines
         if self.goal == "samples":
-            return self.experiment.prior_information
-        return np.zeros_like(self.baseline_information)
+            return np.array([scenario.experiment.prior_information for scenario in self.scenarios])
+        return np.zeros_like(self.baselines)
 
     @cached_property
-    def scaled_information(self) -> Array:
-        """(k, k): the part of M' in proportion to s."""
+    def scaled_information(self) -> NDArray[np.float64]:
+        """(S, k, k): the part of M' in proportion to s."""
         if self.goal == "cost":
-            return np.zeros_like(self.baseline_information)
-        return self.experiment.noise_information if self.goal == "samples" else self.baseline_information
+            return np.zeros_like(self.baselines)
+        if self.goal == "samples":
+            return np.array([scenario.experiment.noise_information for scenario in self.scenarios])
+        return self.baselines
 
     @cached_property
     def price(self) -> Functional:
         """What x is measured by: the cost, or without one the sum of all powers over their upper limits."""
         if self.goal == "cost":
-            parts = [self.power(kind, channel) * weight for kind, channel, weight in weights_of(self.cost)]
+            parts = [self._paid(kind, channel) * weight for kind, channel, weight in weights_of(self.cost)]
         else:
             caps = [limit for limit in self.limits if limit.upper]
-            parts = [self.power(limit.kind, limit.channel) * (1.0 / limit.bound) for limit in caps]
+            parts = [self._limited(limit) * (1.0 / limit.bound) for limit in caps]
         total = parts[0]
         for part in parts[1:]:
             total = total + part
         return total
 
-    def power(self, kind: PowerKind, channel: int | None = None) -> Functional:
+    def _paid(self, kind: PowerKind, channel: int | None) -> Functional:
+        """The power that is paid for: that of the nominal plant, or the mean over all."""
+        nominal = self.power(kind, channel)
+        if not (self.mean_cost and self.others and self.experiment.depends_on_plant(kind)):
+            return nominal
+        each = [self.power(kind, channel, number) for number in range(len(self.scenarios))]
+        last: list[tuple[Array, NDArray]] = []
+
+        def density(w: Array) -> NDArray:
+            if not last or last[0][0] is not w:
+                last[:] = [(w, sum((one.density(w) for one in each), self._worthless(w)) / len(each))]
+            return last[0][1]
+
+        return Functional(np.mean([one.vector for one in each], axis=0), density)
+
+    def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
         """The power of input, output or excitation (of one channel) as a functional of the spectrum."""
-        known = self._powers.get((kind, channel))
+        known = self._powers.get((kind, channel, scenario))
         if known is not None:
             return known
+        experiment = self.scenarios[scenario].experiment
 
         def density(w: Array) -> Array:
-            return self.experiment.power_density(kind, w, channel)
+            return experiment.power_density(kind, w, channel)
 
         if self.finer is not None:
-            vector = self.finer.power(kind, channel).vector[: self.basis.size]
+            vector = self.finer.power(kind, channel, scenario).vector[: self.basis.size]
+        elif self._before:
+            vector = self._before[0].power(kind, channel, scenario).vector
+            more = self.basis.beyond(vector.size).integrals(density, experiment.singularities)
+            vector = np.concatenate([vector, more])
         else:
-            vector = self.basis.integrals(density, self.experiment.singularities)
-        self._powers[kind, channel] = Functional(vector, density)
-        return self._powers[kind, channel]
+            vector = self.basis.integrals(density, experiment.singularities)
+        self._powers[kind, channel, scenario] = Functional(vector, density)
+        return self._powers[kind, channel, scenario]
 
     @cached_property
-    def _powers(self) -> dict[tuple[PowerKind, int | None], Functional]:
+    def _powers(self) -> dict[tuple[PowerKind, int | None, int], Functional]:
         return {}
+
+    def _limited(self, limit: PowerLimit) -> Functional:
+        return self.power(limit.kind, limit.channel, limit.scenario)
 
     @cached_property
     def limit_functionals(self) -> tuple[Functional, ...]:
         """The limited powers, one a limit."""
-        return tuple(self.power(limit.kind, limit.channel) for limit in self.limits)
+        return tuple(self._limited(limit) for limit in self.limits)
 
-    def value(self, weight: Array) -> Functional:
-        """tr(Y (M(x) - M0)) for a fixed Y = `weight` (k, k) as a functional of the spectrum."""
-        known: dict[int, NDArray] = {}
+    def value(self, weights: NDArray[np.float64]) -> Functional:
+        """sum_s tr(Y_s (M_s(x) - M0_s)) for fixed Y = `weights` (S, k, k) as a functional of the spectrum."""
+        weighty = weighty_ones(weights)
+        grid = self.grid_of(weighty)
+        known: list[NDArray] = []
 
         def density(w: Array) -> NDArray:
-            if w is not self.grid:
-                return self.experiment.value_density(weight, w)
-            if not known:  # asked for again with every share that limits keep of a price
-                known[0] = self.experiment.valued(self.grid_products, weight)
-            return known[0]
+            if w is grid and known:  # asked for again with every share that limits keep of a price
+                return known[0]
+            parts = (self._worth(number, weights[number], w, on_grid=w is grid) for number in weighty)
+            total = sum(parts, self._worthless(w))
+            if w is grid:
+                known.append(total)
+            return total
 
-        return Functional(np.tensordot(self.information_map, weight, axes=2), density)
+        vector = np.tensordot(self.information_maps[:, weighty], weights[weighty], axes=3)
+        return Functional(vector, density)
+
+    def _worthless(self, w: Array) -> NDArray:
+        r = self.experiment.inputs
+        return np.zeros((np.size(w), *(() if r == 1 else (r, r))))
+
+    def _worth(self, scenario: int, weight: Array, w: Array, *, on_grid: bool) -> NDArray:
+        """The density of tr(Y M_s) at frequencies `w`; the gradients on a grid are kept."""
+        experiment = self.scenarios[scenario].experiment
+        if not on_grid:
+            return experiment.value_density(weight, w)
+        known = self._products.get(scenario)
+        if known is None or known[0] is not w:
+            known = self._products[scenario] = (w, experiment.products(w))
+        return experiment.valued(known[1], weight)
+
+    @cached_property
+    def _products(self) -> dict[int, tuple[Array, WeightedProducts]]:
+        """The gradients of scenarios on the grid that they were last asked for at."""
+        return {}
 
     def density_at(self, place: DensityPlace) -> Functional:
         """v^* Phi v at one frequency as a functional; it has no density over frequency."""
-        r = self.experiment.inputs
         vector = self.basis.directed(place.frequency, place.direction)
-        shape = () if r == 1 else (r, r)
-        return Functional(vector, lambda w: np.zeros((np.size(w), *shape)), concentrated=True)
+        return Functional(vector, self._worthless, concentrated=True)
 
     def density_breaches(self, x: Array, s: float, *, above: float) -> list[DensityBreach]:
         """Local maxima of Phi over its limits times s (or once, for fixed ones), if above `above`."""
@@ -244,43 +364,50 @@ class Problem:
 
     @cached_property
     def grid(self) -> Array:
-        """Frequencies that see every resonance of the excitation's densities, over its band."""
+        """Frequencies that see every resonance of the nominal plant's densities, over the band."""
         if self._before:
             return self._before[0].grid
         return graded_grid(self.experiment.singularities, *self.experiment.band)
 
-    @cached_property
-    def grid_products(self) -> WeightedProducts:
-        """The gradients at the frequencies of `grid`."""
-        return self._before[0].grid_products if self._before else self.experiment.products(self.grid)
+    def grid_of(self, scenarios: Sequence[int]) -> Array:
+        """The same for the densities of these scenarios together."""
+        others = frozenset(scenarios) - {0}
+        if not others:
+            return self.grid
+        if others not in self._grids:
+            plants = [self.scenarios[number].experiment.singularities for number in (0, *sorted(others))]
+            self._grids[others] = common_grid(plants, *self.experiment.band)
+        return self._grids[others]
 
-    def violations(self, information: Array, *, above: float = -np.inf) -> list[tuple[int, Violation]]:
-        """All local maxima of all requirements' ratios, each with the index of its requirement."""
+    @cached_property
+    def _grids(self) -> dict[frozenset[int], Array]:
+        return {}
+
+    def violations(
+        self, informations: NDArray[np.float64], *, above: float = -np.inf, side: bool = False
+    ) -> list[tuple[int, Violation]]:
+        """All local maxima of all requirements' ratios, each with the index of its requirement in `asked`.
+
+        Args:
+            side: look at the side requirements, not at the others.
+        """
         return [
             (index, violation)
-            for index, requirement in enumerate(self.requirements)
-            for violation in requirement.violations(information, above=above)
-        ]
-
-    def side_violations(self, information: Array, *, above: float = -np.inf) -> list[tuple[int, Violation]]:
-        """The same for the side requirements; their indices follow those of the requirements."""
-        first = len(self.requirements)
-        return [
-            (first + index, violation)
-            for index, requirement in enumerate(self.side)
-            for violation in requirement.violations(information, above=above)
+            for index, asked in enumerate(self.asked)
+            if asked.side == side
+            for violation in asked.requirement.violations(informations[asked.scenario], above=above)
         ]
 
     def requirement(self, index: int) -> Requirement:
-        """By the index that `violations` and `side_violations` give."""
-        return (*self.requirements, *self.side)[index]
+        """By the index that `violations` gives."""
+        return self.asked[index].requirement
 
-    def worst_ratio(self, information: Array) -> Violation:
+    def worst_ratio(self, informations: NDArray[np.float64]) -> Violation:
         """The worst violation of all requirements, criteria left out."""
         found = [
             violation
-            for requirement in (*self.requirements, *self.side)
-            if not isinstance(requirement, Criterion)
-            for violation in requirement.violations(information)
+            for asked in self.asked
+            if not isinstance(asked.requirement, Criterion)
+            for violation in asked.requirement.violations(informations[asked.scenario])
         ]
         return worst(found)

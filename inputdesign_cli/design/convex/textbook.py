@@ -18,7 +18,7 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.certificate import Certificate, certify
-from inputdesign_cli.design.convex.master import Proof
+from inputdesign_cli.design.convex.master import Implied, Proof
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
@@ -78,7 +78,7 @@ def solve_on_grid(
     proofs = []
     for cut, lmi in zip(cuts, lmis, strict=True):
         Y, r = cut.proof([svec(_symmetric(lmi.dual_value))])
-        proofs.append((unit_cost * inverse.T @ Y @ inverse, unit_cost * r))
+        proofs.append(Implied(unit_cost * inverse.T @ Y @ inverse, unit_cost * r))
     return GridResult(x, problem.price.at(x), certify(problem, Proof(tuple(proofs), np.zeros(0))))
 
 

@@ -35,11 +35,11 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         problem = Problem(coordinates, flat_basis(coordinates), {"excitation": 1.0}, requirements)
 
         def excess(log_power: float, problem: Problem = problem) -> float:
-            information = problem.information(np.array([np.exp(log_power)]))
-            return np.log(max(problem.worst_ratio(information).ratio, 1e-300))
+            informations = problem.informations(np.array([np.exp(log_power)]))
+            return np.log(max(problem.worst_ratio(informations).ratio, 1e-300))
 
         if np.linalg.matrix_rank(problem.baseline_information) == coordinates.size:
-            without = worst([v for _, v in problem.violations(problem.baseline_information)])
+            without = worst([v for _, v in problem.violations(problem.baselines)])
             if without.ratio <= 1.0:
                 return 0.0
         lo = hi = np.log(power)

@@ -59,7 +59,7 @@ class Designed:
         if self.design.problem.goal != "samples":
             return self.design.result.information
         samples = float(self.experiment.samples)
-        return candidate_at(self.problem, samples * self.design.result.x, samples).information
+        return candidate_at(self.problem, samples * self.design.result.x, samples).informations[0]
 
 
 def design_result(done: Designed, how: dict[str, Json], tolerance: float) -> dict[str, Json]:

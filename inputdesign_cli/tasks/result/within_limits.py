@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.exchange import ExchangeResult
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import Asked, Problem
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 
@@ -102,7 +101,7 @@ class Bought:
                 {"key": bound.key, "asked": bound.value, "bought": bound.loosened(self.factor)}
                 for bound in self.stated
             ],
-            "worst": [self._listed(requirement, w) for requirement, w in self._binding],
+            "worst": [self._listed(asked, w) for asked, w in self._binding],
             "limits": [_entry(limit, share) for limit, share in self._shares],
         }
 
@@ -115,12 +114,12 @@ class Bought:
         return [(limit, share) for limit, share in known if share > least]
 
     @property
-    def _binding(self) -> list[tuple[Requirement, float | None]]:
+    def _binding(self) -> list[tuple[Asked, float | None]]:
         """Where the requirements bind, the place of the largest multiplier first."""
-        return [(self.problem.requirement(index), w) for index, w in self.nearest.active]
+        return [(self.problem.asked[index], w) for index, w in self.nearest.active]
 
-    def _place(self, place: tuple[Requirement, float | None]) -> str:
-        requirement, w = place
+    def _place(self, place: tuple[Asked, float | None]) -> str:
+        requirement, w = place[0].requirement, place[1]
         parts = []
         if requirement.entry is not None and not self.units.single:
             parts.append(f"in entry {self.units.entry(*requirement.entry)}")
@@ -128,14 +127,15 @@ class Bought:
             parts.append(f"at {self.units.named(w)}")
         return " ".join(parts)
 
-    def _listed(self, requirement: Requirement, w: float | None) -> dict[str, Json]:
+    def _listed(self, asked: Asked, w: float | None) -> dict[str, Json]:
+        requirement = asked.requirement
         item: dict[str, Json] = {"name": requirement.name}
         if requirement.entry is not None and not self.units.single:
             item["entry"] = self.units.entry(*requirement.entry)
         if w is not None:
             item["frequency"] = w / self.units.frequency
         at = np.array([0.0 if w is None else w])
-        item["worst_ratio"] = float(requirement.ratios(self.nearest.information, at)[0])
+        item["worst_ratio"] = float(requirement.ratios(self.nearest.informations[asked.scenario], at)[0])
         return item
 
 

@@ -47,7 +47,7 @@ def check(case, solution):
     """Everything that a design promises, recomputed on dense grids."""
     result, problem = solution.result, solution.problem
     if solution.white_power == 0.0:
-        assert problem.worst_ratio(problem.baseline_information).ratio <= 1.0
+        assert problem.worst_ratio(problem.baselines).ratio <= 1.0
         return
     assert result.gap <= 1e-5, case.name
     assert result.certificate.bound <= result.objective * (1 + 1e-9)
@@ -119,7 +119,7 @@ def test_a_plain_grid_understates_the_cost_of_a_resonant_plant(flexible):
 def test_certificate_holds_for_random_spectra(first_order):
     """price(x) >= tr(Y M(x)) for every nonnegative x, so the bound is one for every admissible x."""
     solution = design(first_order, 8)
-    problem, Y = solution.problem, solution.result.certificate.weight
+    problem, Y = solution.problem, solution.result.certificate.weights[0]
     assert np.linalg.eigvalsh(Y)[0] >= -1e-12 * np.trace(Y)
     rng = np.random.default_rng(3)
     for _ in range(200):
@@ -128,7 +128,7 @@ def test_certificate_holds_for_random_spectra(first_order):
         excited = problem.information(x) - problem.baseline_information
         assert problem.price.at(x) >= np.sum(Y * excited) * (1 - 1e-9)
         # scaled until it is admissible, it costs no less than the bound
-        if problem.worst_ratio(problem.information(1e6 * x)).ratio <= 1:
+        if problem.worst_ratio(problem.informations(1e6 * x)).ratio <= 1:
             assert problem.price.at(1e6 * x) >= solution.result.certificate.bound
 
 
@@ -136,7 +136,7 @@ def test_equivalence_theorem(first_order):
     """Over every spectrum: the ratio is at most one everywhere, one at the sinusoid of the design."""
     solution = design(first_order, 2)
     anything = solution.any_spectrum
-    value = solution.problem.value(anything.certificate.weight)
+    value = solution.problem.value(anything.certificate.weights)
     ratio = value.density(DENSE) / solution.problem.price.density(DENSE)
     assert ratio.max() == pytest.approx(1.0, abs=1e-6)
     assert DENSE[ratio.argmax()] == pytest.approx(0.1553, abs=2e-4)

@@ -1,10 +1,12 @@
 """The dense interior-point method against Clarabel on random finite programs of every kind."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from inputdesign_cli.accuracy.cuts import DeterminantCut, EllipsoidCut, MatrixCut, TraceCut, VarianceCut
-from inputdesign_cli.design.convex.finite import FiniteProgram, by_cones, by_interior
+from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, by_cones, by_interior
 from inputdesign_cli.spectrum import Face, svec, svec_length
 
 K = 5
@@ -60,24 +62,32 @@ def random_program(rng, kind, cuts, goal):
             unit[:] = matrix_of(vector, face.order)
         gains = np.array([svec(sum(B @ unit @ B.T for B in maps)) for unit in units]).T
     offset = svec(0.01 * np.eye(K))
-    common = {"face": face, "size": K, "cuts": cuts}
     if goal == "cost":
         caps = -np.eye(n)[:1]
         return FiniteProgram(
-            cost=price, gains=gains, offset=offset, signs=np.zeros((0, n)), limits=caps,
-            limit_offset=np.array([1.0]), sides=[False] * len(cuts), unit=None, **common,
-        )  # fmt: skip
+            cost=price,
+            face=face,
+            matrices=[MatrixPart(gains, offset, cuts, [False] * len(cuts))],
+            signs=np.zeros((0, n)),
+            limits=caps,
+            limit_offset=np.array([1.0]),
+            unit=None,
+            size=K,
+        )
     side = [MatrixCut(0.02 * psd(rng)), VarianceCut(0.1 * rng.normal(size=(K, 2)))]
-    return FiniteProgram(
-        cost=np.eye(n + 1)[-1],
+    part = MatrixPart(
         gains=np.hstack([gains, 0.02 * svec(np.eye(K))[:, None]]),
         offset=np.zeros_like(offset),
+        cuts=[*cuts, *side],
+        sides=[False] * len(cuts) + [True] * 2,
+    )
+    return FiniteProgram(
+        cost=np.eye(n + 1)[-1],
+        matrices=[part],
         signs=np.eye(n + 1)[-1:],
         limits=np.append(-price, 1.5)[None],
         limit_offset=np.zeros(1),
         face=face,
-        cuts=[*cuts, *side],
-        sides=[False] * len(cuts) + [True] * 2,
         unit=1.3,
         size=K,
     )
@@ -102,8 +112,8 @@ def test_both_methods_agree(name, kind, goal):
     assert error <= 1e-6
     optimum = program.cost @ reference.v
     assert program.cost @ found.v == pytest.approx(optimum, rel=1e-6, abs=1e-7)
-    weight, required = (sum(part) for part in zip(*found.proofs, strict=True))
-    other, also = (sum(part) for part in zip(*reference.proofs, strict=True))
+    weight, required = (sum(part) for part in zip(*found.proofs[0], strict=True))
+    other, also = (sum(part) for part in zip(*reference.proofs[0], strict=True))
     assert required == pytest.approx(also, rel=1e-3, abs=1e-5)
     np.testing.assert_allclose(weight, other, atol=2e-3 * np.abs(other).max() + 1e-5)
     np.testing.assert_allclose(found.limit_weights, reference.limit_weights, atol=1e-4)
@@ -115,10 +125,11 @@ def test_multipliers_prove_the_optimum(name):
     rng = np.random.default_rng(4)
     program = random_program(rng, "nonnegative", CUTS[name](rng), "cost")
     found, _ = by_interior(program, tolerance=1e-9)
-    weight, required = (sum(part) for part in zip(*found.proofs, strict=True))
-    reduced = program.cost - program.gains.T @ svec(weight) - program.limits.T @ found.limit_weights
+    weight, required = (sum(part) for part in zip(*found.proofs[0], strict=True))
+    part = program.matrices[0]
+    reduced = program.cost - part.gains.T @ svec(weight) - program.limits.T @ found.limit_weights
     assert reduced.min() >= -1e-6
-    proved = required - svec(weight) @ program.offset - found.limit_weights @ program.limit_offset
+    proved = required - svec(weight) @ part.offset - found.limit_weights @ program.limit_offset
     assert proved == pytest.approx(program.cost @ found.v, rel=1e-6)
 
 
@@ -129,7 +140,9 @@ def test_information_in_blocks_is_the_same_program():
     apart = np.ones((K, K))
     apart[:2, 2:] = apart[2:, :2] = 0.0
     kept = svec(apart) != 0
-    split = FiniteProgram(**{**vars(program), "gains": program.gains * kept[:, None]})
+    whole = program.matrices[0]
+    apart = dataclasses.replace(whole, gains=whole.gains * kept[:, None])
+    split = dataclasses.replace(program, matrices=[apart])
     found, error = by_interior(split, tolerance=1e-9)
     assert error <= 1e-6
     reference = by_cones(split, tolerance=1e-9)

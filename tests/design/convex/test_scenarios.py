@@ -1,0 +1,151 @@
+"""Designs that serve several plants: copies change nothing, more cost no less, the certificate is a proof."""
+
+import dataclasses
+
+import cvxpy as cp
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.accuracy import Criterion
+from inputdesign_cli.design.convex.designs import Alternative, Question, solve_design
+from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.spectrum import FirBasis, LinesBasis
+from inputdesign_cli.tasks.build.system import build_model
+from tests.support.scenarios import alternatives, around, relative_of
+
+DENSE = np.linspace(0.0, np.pi, 4001)
+
+
+def question(experiment, others=(), *, order=8, fraction=0.1, **kwargs):
+    return Question(
+        experiment,
+        FirBasis(order),
+        kwargs.pop("goal", "cost"),
+        relative_of(experiment, fraction),
+        cost=kwargs.pop("cost", {"input": 1.0}),
+        others=others,
+        **kwargs,
+    )
+
+
+@pytest.mark.parametrize("mean_cost", [False, True])
+@pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.parametrize("goal", ["cost", "factor", "samples"])
+def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, limited, mean_cost):
+    """Paid for by the power of the output too, which is that of each plant."""
+    experiment = dataclasses.replace(first_order, samples=1) if goal == "samples" else first_order
+    limits = [PowerLimit("output", 1.0)] if limited or goal != "cost" else []
+    asked = question(experiment, cost={"input": 1.0, "output": 1.0}, goal=goal, limits=limits)
+    once = solve_design(asked, tolerance=1e-8)
+    same = Alternative(asked.experiment, asked.requirements)
+    again = solve_design(dataclasses.replace(asked, others=[same] * 2, mean_cost=mean_cost), tolerance=1e-8)
+    assert again.result.objective == pytest.approx(once.result.objective, rel=1e-6)
+    assert again.any_spectrum.objective == pytest.approx(once.any_spectrum.objective, rel=1e-5)
+    assert again.white_power == pytest.approx(once.white_power, rel=1e-9)
+
+
+def test_more_scenarios_never_cost_less(first_order):
+    others = alternatives(first_order, around(first_order, 8, 0.03), 0.1)
+    costs = []
+    for number in (0, 1, 2, 4, 8):
+        design = solve_design(question(first_order, others[:number]), tolerance=1e-7)
+        costs.append(design.result.objective)
+        assert design.result.gap <= 1e-6
+        for scenario, told in zip(design.problem.scenarios, design.result.informations, strict=True):
+            assert scenario.requirements[0].ratios(told, DENSE).max() <= 1 + 1e-6
+    assert all(later >= earlier * (1 - 1e-6) for earlier, later in zip(costs, costs[1:], strict=False))
+    assert costs[-1] > 1.05 * costs[0]
+
+
+def test_the_design_agrees_with_a_plain_program(first_order):
+    """One matrix inequality for each plant and frequency, a Gram matrix for positivity, the mean cost."""
+    order, others = 6, alternatives(first_order, around(first_order, 3, 0.03, seed=2), 0.1)
+    asked = question(first_order, others, order=order, cost={"input": 1.0, "output": 1.0}, mean_cost=True)
+    design = solve_design(asked, tolerance=1e-8)
+    unit, problem = design.result.objective, design.problem
+    c = cp.Variable(order + 1)
+    gram = cp.Variable((order + 1, order + 1), PSD=True)
+    constraints = [cp.sum(cp.diag(gram, lag)) == c[lag] for lag in range(order + 1)]
+    price = np.mean(
+        [
+            sum(problem.power(kind, None, s).vector for kind in ("input", "output"))
+            for s in range(len(problem.scenarios))
+        ],
+        axis=0,
+    )
+    grid = np.union1d(np.geomspace(0.01, np.pi, 20), design.result.active_frequencies)
+    for s, (scenario, told) in enumerate(zip(problem.scenarios, design.result.informations, strict=True)):
+        assert scenario.requirements[0].ratios(told, DENSE).max() <= 1 + 1e-6
+        K = np.linalg.inv(np.linalg.cholesky(told))
+        maps = K @ problem.information_maps[:, s] @ K.T
+        M = K @ problem.baselines[s] @ K.T + sum(unit * c[i] * maps[i] for i in range(order + 1))
+        for w in grid:
+            slack = M - K @ scenario.requirements[0].cut(float(w)).matrix @ K.T
+            constraints.append(0.5 * (slack + slack.T) >> 0)
+    plain = cp.Problem(cp.Minimize(price @ c), constraints).solve(solver=cp.CLARABEL)
+    assert plain == pytest.approx(1.0, rel=1e-5)
+
+
+def test_the_certificate_holds_for_random_spectra(first_order):
+    """price >= sum_s tr(Y_s (M_s - M0_s)) on the cone, with weight on several plants."""
+    others = alternatives(first_order, around(first_order, 12, 0.05, seed=1), 0.1)
+    design = solve_design(question(first_order, others), tolerance=1e-7)
+    problem, weights = design.problem, design.result.certificate.weights
+    assert np.sum(np.any(weights, axis=(1, 2))) >= 2
+    assert np.linalg.eigvalsh(weights).min() >= -1e-12 * np.abs(weights).max()
+    anywhere = design.any_spectrum.certificate
+    ratio = anywhere.value.density(DENSE) / anywhere.price.density(DENSE)
+    assert ratio.max() <= 1 + 1e-9
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        taps = rng.normal(size=9)
+        x = np.correlate(taps, taps, mode="full")[8:]
+        excited = problem.informations(x) - problem.baselines
+        assert problem.price.at(x) >= np.sum(weights * excited) * (1 - 1e-9)
+
+
+LAG = """
+plant: {parameters: {theta: 1}, continuous: {numerator: [theta], denominator: [1, theta]}}
+noise: {variance: 1}
+accuracy: {criterion: A}
+limits: {input_power: 1, band: [0.001, 100]}
+"""
+
+
+def test_one_constant_between_a_tenth_and_ten():
+    """Four lines for the worst relative variance 1 / (theta^2 M) of unit power; by hand 12.69."""
+
+    model = build_model(parse_spec(LAG))
+
+    def asked(theta):
+        experiment = Experiment(model.at([theta]), 1, (1e-3, 100.0))
+        return Alternative(experiment, [lambda at: Criterion("A", at.model.theta[:, None] * factor(at))])
+
+    def factor(at):
+        return np.eye(1) if at.factor is None else at.factor
+
+    nominal = asked(1.0)
+    design = solve_design(
+        Question(
+            nominal.experiment,
+            LinesBasis.anywhere(1e-3, 100.0, 1),
+            "factor",
+            nominal.requirements,
+            limits=[PowerLimit("input", 1.0)],
+            others=[asked(theta) for theta in np.geomspace(0.1, 10.0, 61)],
+        ),
+        tolerance=1e-6,
+    )
+    assert design.result.objective == pytest.approx(12.69, abs=0.05)
+    assert design.result.certificate.bound == pytest.approx(design.result.objective, rel=1e-5)
+    w, power = design.result.basis.lines(design.result.x)
+    power = power[:, 0, 0].real
+    places = [0.130, 0.558, 1.79, 7.70]
+    near = np.argmin(np.abs(np.log(w[:, None] / places)), axis=1)
+    for number, place in enumerate(places):
+        mine = near == number
+        assert np.exp(np.average(np.log(w[mine]), weights=power[mine])) == pytest.approx(place, rel=0.02)
+    # One sinusoid: 1 / (theta^2 M) = (w^2 + theta^2)^2 / (theta w)^2, worst at both ends when it is best.
+    assert max((1.0 + theta**2) ** 2 / theta**2 for theta in (0.1, 10.0)) == pytest.approx(102.0, abs=0.05)
