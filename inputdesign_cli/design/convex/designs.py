@@ -322,7 +322,9 @@ def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeRes
 
 def _white(question: Question, flat: Problem, power: float) -> Candidate:
     if question.goal == "cost":
-        return scaled_up(flat, np.array([power]), 1.0, [])
+        # Enough for the nominal plant; the others may take more.
+        at = np.array([power])
+        return scaled_up(flat, at, 1.0, []) if power > 0.0 and flat.others else candidate_at(flat, at, 1.0)
     # From far below, since what meets the requirements with room to spare is not scaled down.
     return scaled_up(replace(flat, floors_fixed=False), np.array([_FAR_BELOW * power]), 0.0, [])
 

@@ -113,12 +113,13 @@ def solve_master(
     inside, number = face.columns.shape[1], columns.shape[1]
     objective, worth = best.objective, problem.price.at(best.z)
     definite = problem.needs_definite
-    involved = sorted({placed.scenario for placed in cuts})
+    # The nominal plant where there are no cuts: a program without M is solved by no spectrum at all.
+    involved = sorted({placed.scenario for placed in cuts}) or [0]
     turns = {plant: _congruence(best.informations[plant], definite=definite) for plant in involved}
     matrices = []
     for plant, turn in turns.items():
         mine = [placed for placed in cuts if placed.scenario == plant]
-        gains, offset = _turned(problem, plant, turn, worth * columns, best.s)
+        gains, offset = _turned(problem, plant, turn, columns, worth, best.s)
         transformed = [placed.cut.transformed(turn) for placed in mine]
         matrices.append(MatrixPart(gains, offset, transformed, [placed.side for placed in mine]))
     signs = np.eye(number)[inside:]
@@ -158,15 +159,17 @@ def solve_master(
     )
 
 
-def _turned(problem: Problem, scenario: int, turn: Array, columns: Array, s: float) -> tuple[Array, Array]:
-    """svec of K M' K^T as offset + gains (y, s), K = `turn`: gains (entries, unknowns), offset (entries,)."""
+def _turned(
+    problem: Problem, scenario: int, turn: Array, columns: Array, worth: float, s: float
+) -> tuple[Array, Array]:
+    """svec of K M' K^T, K = `turn`, as gains (entries, unknowns) and offset (entries,) of (y / worth, s)."""
 
     def turned(information: NDArray[np.float64]) -> NDArray[np.float64]:
         return svec(turn @ information @ turn.T)
 
     maps = problem.information_maps[:, scenario]
     parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
-    gains = np.concatenate(parts).T @ columns
+    gains = worth * (np.concatenate(parts).T @ columns)
     if problem.scaled:
         gains = np.column_stack([gains, s * turned(problem.scaled_information[scenario])])
     return gains, turned(problem.fixed_information[scenario])
