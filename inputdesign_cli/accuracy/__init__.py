@@ -3,6 +3,7 @@
 from inputdesign_cli.accuracy.admissible import (
     Absolute as Absolute,
     AdmissibleError as AdmissibleError,
+    Floored as Floored,
     Relative as Relative,
     Sensitivity as Sensitivity,
     Table as Table,

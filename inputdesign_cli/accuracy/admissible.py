@@ -144,6 +144,32 @@ class Weighted:
         return self.inner.at(w) / np.maximum(np.abs(self.weight.at(w)), _NO_WEIGHT)
 
 
+@dataclass(frozen=True)
+class Floored:
+    """r_adm of a scenario, and no less than a `share` of what is admitted at the nominal plant.
+
+    Where a scenario's own r_adm vanishes no experiment would be long enough.
+    """
+
+    own: AdmissibleError
+    nominal: AdmissibleError
+    share: float
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        """Poles and zeros near which r_adm varies fast, as points of the frequency plane."""
+        return np.concatenate([self.own.singularities, self.nominal.singularities])
+
+    @property
+    def knots(self) -> Array:
+        """Frequencies at which r_adm may have a kink."""
+        return np.union1d(self.own.knots, self.nominal.knots)
+
+    def at(self, w: ArrayLike) -> Array:
+        """r_adm (n,) at frequencies `w` (n,)."""
+        return np.maximum(self.own.at(w), self.share * self.nominal.at(w))
+
+
 def largest_gain(G: ComplexArray) -> Array:
     """Largest singular values (n,) of (n, p, r)."""
     if G.shape[1:] == (1, 1):

@@ -162,6 +162,11 @@ class ContinuousModel(Parametrised, WhiteNoise):
         """Poles of G and of all gradients, as points of the frequency plane."""
         return _frequency_plane(self.poles)
 
+    @property
+    def radius(self) -> float:
+        """See `Model`."""
+        return float(np.exp(np.max(self.poles.real, initial=-np.inf)))
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Poles and zeros of one entry of G, as points of the frequency plane."""
         return _frequency_plane(

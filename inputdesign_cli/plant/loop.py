@@ -90,6 +90,11 @@ class Loop(ABC):
         return logarithmic_distance(np.concatenate([self.closed_poles, self.predictor_poles]))
 
     @property
+    def radius(self) -> float:
+        """Of the farthest pole in z of all that the excitation and the noise cause."""
+        return float(np.abs(np.concatenate([self.closed_poles, self.predictor_poles])).max(initial=0.0))
+
+    @property
     def memory(self) -> float:
         """How long, in samples, signals matter beyond what the poles remember."""
         return self.model.memory + self.controller.memory

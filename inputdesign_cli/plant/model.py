@@ -65,6 +65,13 @@ class Model(Protocol):
         """Poles and zeros of one entry of G, as points of the frequency plane."""
 
     @property
+    def radius(self) -> float:
+        """Of the farthest pole of G, H and the predictor in z, below one when all are stable.
+
+        In continuous time exp of the largest real part in s.
+        """
+
+    @property
     def memory(self) -> float:
         """How long, in samples or in time units, signals matter beyond what the poles remember."""
 

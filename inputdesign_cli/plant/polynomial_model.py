@@ -143,6 +143,12 @@ class PolynomialModel(Parametrised):
         polynomials = [*self.A, *self.C, *self.D, *(p for row in self.F for p in row)]
         return logarithmic_distance(join_roots(roots_in_z(p) for p in polynomials))
 
+    @property
+    def radius(self) -> float:
+        """See `Model`."""
+        polynomials = [*self.A, *self.C, *self.D, *(p for row in self.F for p in row)]
+        return float(np.abs(join_roots(roots_in_z(p) for p in polynomials)).max(initial=0.0))
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Poles and zeros of one entry of G, as points of the frequency plane."""
         polynomials = (self._row(self.A, output), self.F[output][input], self.B[output][input])

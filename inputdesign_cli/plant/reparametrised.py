@@ -91,6 +91,11 @@ class Reparametrised:
         """Poles of G and of all gradients, as points of the frequency plane."""
         return self.coefficients.singularities
 
+    @property
+    def radius(self) -> float:
+        """See `Model`."""
+        return self.coefficients.radius
+
     def entry_singularities(self, output: int, input: int) -> ComplexArray:
         """Poles and zeros of one entry of G, as points of the frequency plane."""
         return self.coefficients.entry_singularities(output, input)

@@ -78,6 +78,11 @@ class SampledModel(WhiteNoise):
         """Poles in z of all entries."""
         return np.exp(self.continuous_plant.poles * self.sample_time)
 
+    @property
+    def radius(self) -> float:
+        """See `Model`."""
+        return float(np.abs(self.poles).max(initial=0.0))
+
     @cached_property
     def realisation(self) -> StateSpace:
         """From inputs to outputs: the past of each input, then the states of entry after entry."""

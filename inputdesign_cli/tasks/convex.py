@@ -48,9 +48,11 @@ from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
+from inputdesign_cli.tasks.result.robust import robust_entry
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
+from inputdesign_cli.tasks.robust import Plants, without_dearest
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A record that needs a larger alpha is made anew, this often at the most.
@@ -86,6 +88,7 @@ class ConvexTask:
     tolerance: float
     any_spectrum_tolerance: float
     most_samples: int | None
+    plants: Plants | None
     ellipses: Pairs | None
     grid: GridMethod | None
     columns: FewColumns | None
@@ -129,6 +132,9 @@ class ConvexTask:
             raise out_of_time(f"the design is proved (value {value:.6g}), but not yet its record") from None
         record = made.record
         tables, curves = self._illustrations(done, record)
+        if self.plants is not None:
+            result["robust"], told = robust_entry(done, self.plants, done.kept)
+            tables |= told
         files: dict[str, bytes] = {}
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record)
@@ -224,22 +230,27 @@ class ConvexTask:
         return calibration.alpha(errors, problem.information(np.array([power])))
 
     def _designed(self, confidence: Confidence) -> tuple[Designed, dict[str, Json]]:
-        design, how = self._by_exchange() if self.grid is None else self._by_grid(self.grid)
+        question, kept = self.question, list(range(len(self.question.others)))
+        design, how = self._by_exchange(question) if self.grid is None else self._by_grid(self.grid)
+        if self.plants is not None and self.plants.discard:
+            kept = without_dearest(question, design, self.plants.discard)
+            question = replace(question, others=[question.others[number] for number in kept])
+            design, how = self._by_exchange(question)
         if self.columns is not None:
             design, climbed = restrict_columns(self.columns, design)
             how |= climbed
         experiment = design.problem.experiment
         if design.problem.goal == "samples":
             experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
-        return Designed(self.header, self.question, design, experiment, self.cost, confidence), how
+        return Designed(self.header, question, design, experiment, self.cost, confidence, kept), how
 
-    def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
+    def _by_exchange(self, question: Question) -> tuple[Design, dict[str, Json]]:
         try:
             design = solve_design(
-                self.question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+                question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
             )
         except UnreachableError as unreachable:
-            raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
+            raise explain(self.header.units, question, unreachable, self.stated) from unreachable
         found = design.result
         if found.gap > _ALMOST * self.tolerance:
             raise InaccurateError.because(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import FEW, Problem
 from inputdesign_cli.plant.polynomial import Array
 
 Place = tuple[int, float | None]
@@ -71,10 +71,11 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
         factor = max((v.ratio for _, v in problem.violations(informations)), default=1.0) ** 2
         return candidate_at(problem, factor * z, factor * s)
     factor, at = 1.0, set(places)
-    for _ in range(12):
+    for _ in range(12 + len(problem.others)):
         factor = _smallest_factor(problem, z, s, at, factor)
         informations = candidate_at(problem, factor * z, factor * s).informations
-        missed = [(i, v) for i, v in problem.violations(informations, above=1.0) if v.ratio > 1.0 + _MEETS]
+        found = problem.violations(informations, above=1.0, few=FEW)
+        missed = [(i, v) for i, v in found if v.ratio > 1.0 + _MEETS]
         if not missed:
             break
         at |= {(i, v.frequency) for i, v in missed}

@@ -137,14 +137,17 @@ def solve_design(
     start = question.basis.spread(powers)
     whitened = whitened_problem(question, powers)
     problem = _suited(whitened, question, start)
-    flat = problem.on(flat_basis(problem.experiment))
+    flat = replace(problem.on(flat_basis(problem.experiment)), mean_cost=False)
     white = _white(question, flat, power)
     white_level = float(white.z[0] / white.s)
     anywhere = _anywhere(question, whitened, powers)
     if power == 0.0 and not problem.has_floors:
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
-    within = excess(flat, white) <= _KEEPS
+    limited = problem.limits or problem.densities or problem.side
+    within = not limited or excess(flat, white) <= _KEEPS
     _check_excites(problem, start)
+    if problem.others and problem.goal == "cost":
+        start, powers = (white_level / power) * start, (white_level / power) * powers
     result = _without_faint_lines(problem, _solve(problem, start, tolerance))
     if question.basis.free:
         return Design(problem, white, white_level, within, result, result)
@@ -182,7 +185,7 @@ def balanced_powers(question: Question, power: float) -> Array:
     if r == 1:
         return even
     lines = LinesBasis.anywhere(*question.experiment.band, r)
-    price = _stated(replace(question, basis=lines), question.experiment).price
+    price = _stated(replace(question, basis=lines, others=()), question.experiment).price
     prices = np.array([price.at(lines.spread(channel)) for channel in np.eye(r)])
     if np.ptp(prices) <= _KEEPS * prices.max():
         return even
@@ -239,13 +242,20 @@ def _suited_to(problem: Problem, experiment: Experiment, information: Array, sta
 def _stated(question: Question, experiment: Experiment) -> Problem:
     """The problem but for what it requires."""
     densities = tuple(question.densities)
+    # A limit holds at every plant; of the powers that are the same at all it stands there once.
+    everywhere = [
+        replace(limit, scenario=number)
+        for limit in question.limits
+        if experiment.depends_on_plant(limit.kind)
+        for number in range(1, len(question.plants))
+    ]
     implied = [implied_power(d, experiment.inputs) for d in densities if d.upper]
     return Problem(
         experiment=experiment,
         basis=question.basis,
         cost=question.cost,
         requirements=(),
-        limits=(*question.limits, *implied),
+        limits=(*question.limits, *implied, *everywhere),
         densities=densities,
         goal=question.goal,
         mean_cost=question.mean_cost,

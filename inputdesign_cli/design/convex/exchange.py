@@ -30,7 +30,7 @@ from inputdesign_cli.design.convex.candidate import (
 from inputdesign_cli.design.convex.certificate import Certificate, certify
 from inputdesign_cli.design.convex.limits import DensityBreach
 from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
-from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.problem import FEW, Problem
 from inputdesign_cli.design.convex.rows import alike, density_row, first_density_rows, on_basis, power_rows
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Face
@@ -40,7 +40,6 @@ MAX_ROUNDS = 60
 _WORTH_REPAIRING = 1.5
 _FIRST_CUTS = 0.3
 _MORE_CUTS = 6
-_FEW_SCENARIOS = 4
 _HALVINGS = 6
 _BINDS = 1e-5
 _PROGRESS = 1e-5
@@ -348,7 +347,7 @@ def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: 
         for i, v in sorted(found, key=lambda item: -item[1].ratio)
         if (i, v.frequency) not in known
     ]
-    worst = list(dict.fromkeys(problem.asked[i].scenario for i, _ in ranked))[:_FEW_SCENARIOS]
+    worst = list(dict.fromkeys(problem.asked[i].scenario for i, _ in ranked))[:FEW]
     return [place for place in ranked if problem.asked[place[0]].scenario in worst][:most]
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,10 @@ class PowerLimit:
     channel: int | None = None
     implied: bool = False
     scenario: int = 0
+
+    def everywhere(self, limits: Sequence[PowerLimit]) -> list[int]:
+        """The numbers of those of the limits that are the same at one plant or another."""
+        return [index for index, other in enumerate(limits) if replace(other, scenario=self.scenario) == self]
 
     @property
     def key(self) -> str:

@@ -9,7 +9,7 @@ other; what is said of information below is then said of one matrix.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -34,6 +34,10 @@ from inputdesign_cli.spectrum import Basis, Functional
 RequirementFactory = Callable[[Experiment], Requirement]
 Goal = Literal["cost", "factor", "samples"]
 Weight = float | tuple[float, ...]
+# Ratios are looked at down to this share of what is asked for, so that more is known of them later.
+_NEARLY = 0.6
+# So many scenarios are enough for a next step: what serves the worst few serves most of the others.
+FEW = 4
 
 
 def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | None, float]]:
@@ -67,6 +71,43 @@ class Scenario:
     experiment: Experiment
     requirements: tuple[Requirement, ...]
     side: tuple[Requirement, ...] = ()
+
+
+@dataclass
+class Seen:
+    """The ratios (S,) that scenarios had at most, and K (S, k, k) with K M K^T = I there.
+
+    Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
+    what it was. Most of many scenarios need not be looked at again.
+    """
+
+    ratios: Array
+    roots: NDArray[np.float64] | None = None
+
+    @classmethod
+    def none(cls, number: int) -> Seen:
+        """Nothing is known yet."""
+        return cls(np.full(number, np.inf))
+
+    def most(self, informations: NDArray[np.float64]) -> Array:
+        """(S,): the largest ratios that are possible with these M_s (S, k, k)."""
+        if self.roots is None:
+            return self.ratios.copy()
+        share = np.linalg.eigvalsh(self.roots @ informations @ self.roots.swapaxes(1, 2))[:, 0]
+        with np.errstate(divide="ignore"):
+            return np.where(share > 0.0, self.ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
+
+    def note(self, number: int, information: Array, ratio: float) -> None:
+        """What a scenario was found to have, at most."""
+        if self.roots is None:
+            self.roots = np.broadcast_to(
+                np.eye(len(information)), (self.ratios.size, *information.shape)
+            ).copy()
+        try:
+            self.roots[number] = np.linalg.inv(np.linalg.cholesky(information))
+            self.ratios[number] = ratio
+        except np.linalg.LinAlgError:
+            self.ratios[number] = np.inf
 
 
 @dataclass(frozen=True)
@@ -157,6 +198,8 @@ class Problem:
         grown._before.clear()
         grown._products.update(self._products)
         grown._grids.update(self._grids)
+        if self.others:
+            vars(grown)["_seen"] = self._seen
         return grown
 
     @property
@@ -384,18 +427,55 @@ class Problem:
         return {}
 
     def violations(
-        self, informations: NDArray[np.float64], *, above: float = -np.inf, side: bool = False
+        self,
+        informations: NDArray[np.float64],
+        *,
+        above: float = -np.inf,
+        side: bool = False,
+        few: int | None = None,
     ) -> list[tuple[int, Violation]]:
         """All local maxima of all requirements' ratios, each with the index of its requirement in `asked`.
 
         Args:
             side: look at the side requirements, not at the others.
+            few: so many scenarios with violations are enough; those that were worst before are first.
         """
+        if not self.others:
+            return list(self._violated(0, informations[0], above, side))
+        seen = self._seen[int(side)]
+        most, found, bad = seen.most(informations), list[tuple[int, Violation]](), 0
+        for number in np.argsort(-most, kind="stable").tolist():
+            if most[number] <= above:
+                break
+            own = list(self._violated(number, informations[number], _NEARLY * above, side))
+            worst_here = max((violation.ratio for _, violation in own), default=max(_NEARLY * above, 0.0))
+            seen.note(number, informations[number], worst_here)
+            found += [(index, violation) for index, violation in own if violation.ratio > above]
+            bad += worst_here > above
+            if few is not None and bad >= few:
+                break
+        return found
+
+    def _violated(
+        self, number: int, information: Array, above: float, side: bool
+    ) -> Iterator[tuple[int, Violation]]:
+        """Those of one scenario."""
+        for index in self._asked_of[number]:
+            if self.asked[index].side == side:
+                for violation in self.asked[index].requirement.violations(information, above=above):
+                    yield index, violation
+
+    @cached_property
+    def _seen(self) -> tuple[Seen, Seen]:
+        """What is known of the ratios of requirements, and of side ones."""
+        return Seen.none(len(self.scenarios)), Seen.none(len(self.scenarios))
+
+    @cached_property
+    def _asked_of(self) -> list[list[int]]:
+        """The numbers of its requirements for each scenario."""
         return [
-            (index, violation)
-            for index, asked in enumerate(self.asked)
-            if asked.side == side
-            for violation in asked.requirement.violations(informations[asked.scenario], above=above)
+            [index for index, asked in enumerate(self.asked) if asked.scenario == number]
+            for number in range(len(self.scenarios))
         ]
 
     def requirement(self, index: int) -> Requirement:

@@ -19,6 +19,7 @@ from inputdesign_cli.specification.models.realisation import Report, Signal, Sim
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
+from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.specification.yaml.places import Source, parse_key
 from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
 
@@ -64,6 +65,9 @@ class Spec(Section):
     limits: Limits = Field(default=Limits(), description="What the experiment may not exceed.")
     spectrum: Spectrum | None = Field(
         default=None, description="Family of the input spectrum, or a given excitation."
+    )
+    uncertainty: Uncertainty | None = Field(
+        default=None, description="How well the plant is known: the design is then made for all such plants."
     )
     signal: Signal = Field(default=Signal(), description="The time series that realises the spectrum.")
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")

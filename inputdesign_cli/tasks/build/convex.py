@@ -8,6 +8,7 @@ from dataclasses import replace
 from inputdesign_cli.design.convex.designs import Question
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
 from inputdesign_cli.tasks.build.demand import check_design
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
@@ -15,12 +16,13 @@ from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.parameters import check_known
-from inputdesign_cli.tasks.build.requirements import build_criterion, build_requirements, stated_bounds
+from inputdesign_cli.tasks.build.requirements import build_asked, stated_bounds
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
 from inputdesign_cli.tasks.build.system import build_cost, build_experiment
+from inputdesign_cli.tasks.build.uncertainty import build_plants
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
 from inputdesign_cli.tasks.factor_columns import FewColumns
 
@@ -35,8 +37,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     """
     check_supported(spec)
     experiment = build_experiment(spec)
-    requirements = build_requirements(spec, experiment)
-    criterion = build_criterion(spec, experiment)
+    requirements, side = build_asked(spec, experiment)
     goal, cost = _GOALS[spec.goal], build_cost(spec)
     experiment.whitened(1.0)  # says which parameters cannot be told apart
     check_pairs(spec, experiment.model.names)
@@ -44,15 +45,19 @@ def build_convex(spec: Spec) -> ConvexTask:
     basis = build_basis(spec, experiment.inputs, experiment.band)
     grid = _grid_method(spec)
     check_design(spec, experiment, basis)
+    counted = replace(experiment, samples=1) if goal == "samples" else experiment
+    plants = build_plants(spec, counted, basis)
     question = Question(
-        experiment=replace(experiment, samples=1) if goal == "samples" else experiment,
+        experiment=counted,
         basis=basis,
         goal=goal,
-        requirements=requirements if criterion is None else [criterion],
-        side=[] if criterion is None else requirements,
+        requirements=requirements,
+        side=side,
         cost=cost if goal == "cost" else {},
         limits=[*build_power_limits(spec), *([] if grid else implied_limits(spec))],
         densities=build_density_limits(spec, experiment),
+        others=[] if plants is None else plants.batch.plants,
+        mean_cost=plants is not None and plants.mean_cost,
     )
     check_every_direction_counts(spec, question)
     return ConvexTask(
@@ -65,6 +70,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         tolerance=spec.solver.tolerance,
         any_spectrum_tolerance=spec.solver.any_spectrum_tolerance,
         most_samples=spec.limits.samples,
+        plants=plants,
         ellipses=spec.report.ellipses,
         grid=grid,
         columns=_few_columns(spec, basis),
@@ -101,6 +107,23 @@ def check_supported(spec: Spec) -> None:
         raise refuse("signal.order", "fit rational filters here", "remove it: noise comes from a long filter")
     if not spec.plant.sampled:
         _check_interpolated(spec)
+    if spec.uncertainty is not None:
+        _check_robust(spec, spec.uncertainty)
+
+
+def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
+    """What is not designed for several plants at once."""
+    spectrum, error = spec.spectrum, spec.accuracy.model_error
+    columns = spectrum is not None and spectrum.type == "polynomial" and spectrum.factor_columns is not None
+    if columns:
+        what, hint = "hold a robust design to few factor columns", "remove spectrum.factor_columns"
+    elif spec.solver.method == "lmi":
+        what, hint = "write a robust design as the papers' program", "use method: exchange"
+    elif error is not None and error.region == "ellipsoid" and uncertainty.r_adm == "fixed":
+        what, hint = "take a fixed r_adm over the whole ellipsoid", "use r_adm: own, or region: first_order"
+    else:
+        return
+    raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key="uncertainty")
 
 
 def check_pairs(spec: Spec, known: Sequence[str]) -> None:

@@ -10,6 +10,7 @@ from inputdesign_cli.accuracy import (
     AdmissibleError,
     EllipsoidError,
     Entry,
+    Floored,
     ModelError,
     Relative,
     Sensitivity,
@@ -66,10 +67,16 @@ def required_band(
     return lo * spec.sample_time, min(hi * spec.sample_time, float(np.pi))
 
 
-def build_model_errors(spec: Spec, experiment: Experiment) -> list[OnModelError]:
+def build_model_errors(
+    spec: Spec, experiment: Experiment, nominal: Model | None = None
+) -> list[OnModelError]:
     """`accuracy.model_error` in raw coordinates: one an entry of G that is not zero, or one of the norm.
 
     Empty when it is not asked for.
+
+    Args:
+        nominal: where the experiment is on a scenario, the plant of the spec: r_adm may be that of the one or
+            of the other.
 
     Raises:
         SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
@@ -83,7 +90,7 @@ def build_model_errors(spec: Spec, experiment: Experiment) -> list[OnModelError]
         places: list[Entry | None] = [(0, 0) if build_units(spec).single else None]
     else:
         places = list(active_entries(experiment.model, band[1]))
-    return [_on_entry(spec, error, experiment, band, entry) for entry in places]
+    return [_on_entry(spec, error, experiment, band, entry, nominal) for entry in places]
 
 
 def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
@@ -96,9 +103,14 @@ def unstated_errors(spec: Spec, experiment: Experiment) -> list[ModelError]:
 
 
 def _on_entry(
-    spec: Spec, error: StatedError, experiment: Experiment, band: tuple[float, float], entry: Entry | None
+    spec: Spec,
+    error: StatedError,
+    experiment: Experiment,
+    band: tuple[float, float],
+    entry: Entry | None,
+    nominal: Model | None,
 ) -> OnModelError:
-    admissible = _admissible(spec, error, experiment.model, band, entry)
+    admissible = _admissible_of(spec, error, experiment.model, band, entry, nominal)
     if error.weight is not None:
         admissible = Weighted(admissible, build_weight(spec, error.weight, f"{_KEY}.weight"))
     alpha = model_error_alpha(spec, experiment.model)
@@ -115,10 +127,18 @@ def _on_entry(
             alpha=alpha,
             against="absolute" if error.relative is None else "relative",
         )
-    check_bounded(spec, made, _KEY)
-    units = build_units(spec)
-    check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
+    if nominal is None:
+        check_bounded(spec, made, _KEY)
+    if nominal is None or not _has_floor(spec):
+        units = build_units(spec)
+        check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
     return made
+
+
+def _has_floor(spec: Spec) -> bool:
+    """Whether r_adm of scenarios is positive since that of the nominal plant is."""
+    stated = spec.uncertainty
+    return stated is not None and (stated.r_adm == "fixed" or stated.floor > 0.0)
 
 
 def check_bounded(spec: Spec, requirement: OverFrequency, key: str) -> None:
@@ -172,6 +192,29 @@ def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:
             hint="use region: first_order for this structure",
             key=f"{_KEY}.region",
         )
+
+
+def _admissible_of(
+    spec: Spec,
+    error: StatedError,
+    model: Model,
+    band: tuple[float, float],
+    entry: Entry | None,
+    nominal: Model | None,
+) -> AdmissibleError:
+    """r_adm of a model; of a scenario as `uncertainty` says, its own down to a floor or the nominal one.
+
+    Raises:
+        SpecError: see `build_model_errors`.
+    """
+    stated = spec.uncertainty
+    if nominal is None or stated is None:
+        return _admissible(spec, error, model, band, entry)
+    known = _admissible(spec, error, nominal, band, entry)
+    if stated.r_adm == "fixed":
+        return known
+    own = _admissible(spec, error, model, band, entry)
+    return Floored(own, known, stated.floor) if stated.floor > 0.0 else own
 
 
 def _admissible(

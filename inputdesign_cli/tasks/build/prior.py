@@ -48,7 +48,7 @@ def stated_prior(spec: Spec) -> StatedPrior | None:
         return None
     found = load_estimate(spec, prior.information, PRIOR)
     covariance = np.array(found.covariance, dtype=float)
-    return StatedPrior(_inverse(covariance), tuple(found.parameters), found.parameters)
+    return StatedPrior(inverse(covariance), tuple(found.parameters), found.parameters)
 
 
 def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
@@ -64,8 +64,14 @@ def build_earlier(spec: Spec, nominal: Model) -> Earlier | None:
     return Earlier(np.array(theta, dtype=float), stated.over(spec, nominal.names))
 
 
-def _inverse(covariance: Array) -> Array:
-    """The information (k, k), by way of correlations."""
+def inverse(covariance: Array) -> Array:
+    """Of a covariance or an information matrix (k, k), by way of correlations.
+
+    Raises:
+        LinAlgError: it is singular.
+    """
     scale = np.sqrt(np.diag(covariance))
+    if not np.all(scale > 0.0):
+        raise np.linalg.LinAlgError
     half = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale))) / scale
     return np.asarray(half.T @ half)

@@ -12,6 +12,7 @@ from inputdesign_cli.accuracy import Criterion, InformationTarget, WeightedVaria
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.design.convex.problem import RequirementFactory
 from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import (
@@ -27,17 +28,28 @@ from inputdesign_cli.tasks.result.within_limits import StatedBound
 _RELATIVE_ZERO = 1e-9
 
 
-def build_requirements(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
+def build_requirements(
+    spec: Spec, experiment: Experiment, nominal: Model | None = None
+) -> list[RequirementFactory]:
     """One maker for each requirement that `accuracy` states, in the order of the contract.
 
     Requirements over frequency are made entry by entry of G.
+
+    Args:
+        nominal: the plant of the spec, where the experiment is on a scenario.
 
     Raises:
         SpecError: a name that the model does not have, a matrix of the wrong size, a requirement that
             cannot be met or is not supported.
         DataError: a table cannot be used.
     """
-    return [make for key in spec.accuracy.requirements for make in BUILDERS[key](spec, experiment)]
+
+    def made(key: str) -> list[RequirementFactory]:
+        if key == "model_error" and nominal is not None:
+            return [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
+        return BUILDERS[key](spec, experiment)
+
+    return [make for key in spec.accuracy.requirements for make in made(key)]
 
 
 def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | None:
@@ -66,6 +78,19 @@ def build_criterion(spec: Spec, experiment: Experiment) -> RequirementFactory | 
         return Criterion(letter, scale[:, None] * factor)
 
     return make
+
+
+def build_asked(
+    spec: Spec, experiment: Experiment, nominal: Model | None = None
+) -> tuple[list[RequirementFactory], list[RequirementFactory]]:
+    """What the goal of a design is about, and what must hold besides: requirements beside a criterion.
+
+    Raises:
+        SpecError, DataError: see `build_requirements` and `build_criterion`.
+    """
+    requirements = build_requirements(spec, experiment, nominal)
+    criterion = build_criterion(spec, experiment)
+    return (requirements, []) if criterion is None else ([criterion], requirements)
 
 
 def stated_bounds(spec: Spec) -> list[StatedBound]:

@@ -31,12 +31,29 @@ class Task(Protocol):
         """
 
 
+def _check_uncertainty(spec: Spec) -> None:
+    """Raise `SpecError` (`not-supported`) where no convex design is asked that could be made robust."""
+    closed_loop_error = spec.accuracy.closed_loop_error is not None
+    if spec.uncertainty is None or not (
+        closed_loop_error or not spec.designs or spec.plant.kind == "regression"
+    ):
+        return
+    what = "a given excitation" if not spec.designs else "this kind of design"
+    raise spec.complain(
+        "not-supported",
+        f"{what} is not looked at for several plants at once",
+        hint="remove uncertainty, or ask for a design with model_error, information or a criterion",
+        key="uncertainty",
+    )
+
+
 def build_task(spec: Spec) -> Task:
     """The task of a spec; everything that can be wrong with the spec comes to light here.
 
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
+    _check_uncertainty(spec)
     if not spec.designs:
         return build_given(spec)
     if spec.plant.kind == "regression":

@@ -34,7 +34,10 @@ _KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "acc
 
 @dataclass(frozen=True)
 class Designed:
-    """A design with what it answers and the experiment of the delivered length."""
+    """A design with what it answers and the experiment of the delivered length.
+
+    `kept` are the numbers of the drawn plants that the design is for, without those that it leaves out.
+    """
 
     header: Header
     question: Question
@@ -42,6 +45,7 @@ class Designed:
     experiment: Experiment
     cost: dict[PowerKind, Weight]
     confidence: Confidence
+    kept: Sequence[int] = ()
 
     @property
     def units(self) -> Units:
@@ -147,16 +151,23 @@ def requirement_entry(units: Units, requirement: Requirement, information: Array
     return item
 
 
-def powers(problem: Problem, basis: Basis, x: Array) -> dict[PowerKind, list[float]]:
-    """The powers of input, output and excitation, one entry a channel."""
+def powers(problem: Problem, basis: Basis, x: Array, scenario: int = 0) -> dict[PowerKind, list[float]]:
+    """The powers of input, output and excitation at a plant, one entry a channel."""
     at, model = problem.on(basis), problem.experiment.model
     channels = {"input": model.inputs, "output": model.outputs, "excitation": model.inputs}
     # A channel without power may come out below zero by rounding.
-    return {kind: [max(at.power(kind, c).at(x), 0.0) for c in range(channels[kind])] for kind in POWER_KINDS}
+    return {
+        kind: [max(at.power(kind, c, scenario).at(x), 0.0) for c in range(channels[kind])]
+        for kind in POWER_KINDS
+    }
 
 
 def _cost(done: Designed, basis: Basis, x: Array) -> float:
-    return weighted_sum(done.cost, powers(done.design.problem, basis, x))
+    """At the nominal plant, or the mean over all plants where that is what is paid."""
+    problem = done.design.problem
+    paid = range(len(problem.scenarios)) if problem.mean_cost else (0,)
+    costs = [weighted_sum(done.cost, powers(problem, basis, x, scenario)) for scenario in paid]
+    return sum(costs) / len(costs)
 
 
 def _objective(design: Design) -> dict[str, Json]:
@@ -211,7 +222,10 @@ def _limits(done: Designed) -> list[dict[str, Json]]:
     x, at = done.design.result.x, done.problem
     entries: list[dict[str, Json]] = []
     for limit in done.question.limits:
-        value = at.power(limit.kind, limit.channel).at(x)
+        # Where the plant takes part in the power, the one of all scenarios that comes nearest to the limit.
+        alike = [at.limits[index].scenario for index in limit.everywhere(at.limits)]
+        values = [at.power(limit.kind, limit.channel, scenario).at(x) for scenario in alike]
+        value = max(values) if limit.upper else min(values)
         slack = (limit.bound - value) if limit.upper else (value - limit.bound)
         entry: dict[str, Json] = {"name": limit.key.removeprefix("limits.")}
         if limit.channel is not None:

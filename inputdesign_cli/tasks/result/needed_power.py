@@ -24,10 +24,10 @@ def needed_power(unreachable: UnreachableError, limit: PowerLimit) -> float | No
     The multiplier of a limit tells how fast the square of the best ratio falls as the limit rises: Newton's
     method, in logarithms, between values that are proved too small and values that are known to do.
     """
-    found, index = unreachable.nearest, unreachable.problem.limits.index(limit)
+    found, places = unreachable.nearest, limit.everywhere(unreachable.problem.limits)
     low, high, at = limit.bound, np.inf, limit.bound
     for _ in range(_STEPS):
-        share = float(found.certificate.limits[index]) * at
+        share = float(found.certificate.limits[places].sum()) * at
         if found.certificate.bound > 1.0 + _TOLERANCE:
             low = at
             if share < _NO_SHARE or low > _MOST * limit.bound:
@@ -42,7 +42,7 @@ def needed_power(unreachable: UnreachableError, limit: PowerLimit) -> float | No
             return low
         if at >= high:
             at = float(np.sqrt(low * high))
-        problem = _raised(unreachable.problem.on(found.basis), index, at)
+        problem = _raised(unreachable.problem.on(found.basis), places, at)
         found = exchange(
             problem,
             found.x,
@@ -53,9 +53,10 @@ def needed_power(unreachable: UnreachableError, limit: PowerLimit) -> float | No
     return low if np.isfinite(high) else None
 
 
-def _raised(problem: Problem, index: int, bound: float) -> Problem:
+def _raised(problem: Problem, places: list[int], bound: float) -> Problem:
     limits = list(problem.limits)
-    limits[index] = replace(limits[index], bound=bound)
+    for index in places:
+        limits[index] = replace(limits[index], bound=bound)
     return replace(problem, limits=tuple(limits), finer=None)
 
 

@@ -108,9 +108,11 @@ class Bought:
     @property
     def _shares(self) -> list[tuple[PowerLimit, float]]:
         """Each limit of the spec with its share of the weight of the proof."""
-        weights = self.nearest.certificate.limits * np.array([limit.bound for limit in self.problem.limits])
+        listed = self.problem.limits
+        weights = self.nearest.certificate.limits * np.array([limit.bound for limit in listed])
         least = _TAKES_PART * max(weights.max(initial=0.0), 1e-300)
-        known = zip(self.problem.limits[: len(self.limits)], weights.tolist(), strict=False)
+        stated = listed[: len(self.limits)]
+        known = [(limit, float(weights[limit.everywhere(listed)].sum())) for limit in stated]
         return [(limit, share) for limit, share in known if share > least]
 
     @property

@@ -1,0 +1,130 @@
+"""`uncertainty:`, how well the plant of the spec is known: it makes the design robust."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Discriminator, Field
+
+from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.experiment import InformationSource, Values, check_names
+from inputdesign_cli.specification.models.fields import (
+    Count,
+    CovarianceMatrix,
+    FileName,
+    Fraction,
+    Index,
+    Names,
+    NonNegative,
+    Number,
+    Several,
+)
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
+from inputdesign_cli.specification.models.section import TAG, Section, tag
+from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.wording import show
+
+CovarianceSource = Annotated[
+    Annotated[FileName, tag("file")] | Annotated[CovarianceMatrix, tag("matrix")],
+    Discriminator(lambda value: TAG + ("file" if isinstance(value, str) else "matrix")),
+]
+SOURCES = ("covariance", "information", "intervals")
+_OF_DRAWS = ("risk", "discard", "seed", "stable_within")
+
+
+def _rising(ends: tuple[float, float]) -> tuple[float, float]:
+    if ends[0] > ends[1]:
+        message = f"{{key}} falls from {show(ends[0])} to {show(ends[1])}"
+        raise fail("bad-interval", message, "write [least, largest]")
+    return ends
+
+
+Intervals = Annotated[
+    Mapping[str, Annotated[tuple[Number, Number], AfterValidator(_rising), Wording("two numbers")]],
+    Field(min_length=1),
+    Wording("a mapping", "write parameter names and intervals: {K: [1.5, 2.7]}"),
+]
+Scenarios = Annotated[
+    Annotated[Count, SIZES["uncertainty.scenarios"], tag("number")]
+    | Annotated[Several[Values], SIZES["uncertainty.scenarios"], tag("list")],
+    Discriminator(lambda value: TAG + ("list" if isinstance(value, list | tuple) else "number")),
+]
+
+
+class Uncertainty(Section):
+    """How well the plant is known, and what the design does about it."""
+
+    covariance: CovarianceSource | None = Field(
+        default=None,
+        description="Covariance of the parameters around those of the plant: a matrix, or a model that "
+        "identify wrote (.yaml).",
+    )
+    information: InformationSource | None = Field(
+        default=None,
+        description="Its inverse: an information matrix, or the name of a file: data (.csv) of the "
+        "excitation of an earlier experiment, or a model (.yaml).",
+    )
+    intervals: Intervals | None = Field(
+        default=None, description="Parameters drawn evenly from intervals: {K: [1.5, 2.7]}; others are known."
+    )
+    parameters: Names | None = Field(
+        default=None, description="Names that order the rows of the matrix (default: the order of the model)."
+    )
+    scenarios: Scenarios | None = Field(
+        default=None,
+        description="How many plants are drawn (default: 100, or what risk needs), or the plants one by one: "
+        "[{b1: 3.2}, {b1: 4.0, f1: -0.6}]; parameters left out are those of the plant.",
+    )
+    risk: Fraction | None = Field(
+        default=None,
+        description="Share of plants that may be left out, with confidence 0.999: as many are drawn as it "
+        "takes.",
+    )
+    discard: Annotated[NonNegative, Field(lt=0.5)] = Field(
+        default=0.0, description="Share of the drawn plants that the design may leave out, the dearest."
+    )
+    seed: Index = Field(default=1, description="Seed of the draws.")
+    stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = Field(
+        default=None,
+        description="Plants with poles (in closed loop: of the loop) beyond this radius are not drawn "
+        "(default: 0.998, or halfway from the radius of the nominal poles to one).",
+    )
+    r_adm: Literal["own", "fixed"] = Field(
+        default="own",
+        description="The admissible error of every plant: its own, or that of the nominal plant.",
+    )
+    floor: Annotated[NonNegative, Field(lt=1)] = Field(
+        default=0.1, description="Least admissible error of a plant, as a share of that of the nominal plant."
+    )
+    cost: Literal["nominal", "mean"] | None = Field(
+        default=None,
+        description="The powers that are paid for: of the nominal plant, or their mean over all (default in "
+        "closed loop).",
+    )
+    fresh: Annotated[Index, SIZES["uncertainty.fresh"]] = Field(
+        default=1000, description="Plants drawn afresh that the finished design is tried on."
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """The prior is stated once, with rows that have names."""
+        listed = isinstance(self.scenarios, tuple)
+        if listed:
+            for extra in self.stated(*SOURCES):
+                message = "{key} stands beside a list of scenarios, which says all"
+                hint = "write scenarios: 200 for plants that are drawn, or remove the one"
+                yield PathDiagnostic("conflicting-keys", message, hint, (extra,), at_key=True)
+            for extra in (key for key in _OF_DRAWS if key in self.model_fields_set):
+                message = "{key} is for plants that are drawn, and these are listed one by one"
+                yield PathDiagnostic("conflicting-keys", message, f"remove {extra}", (extra,), at_key=True)
+        elif not self.stated(*SOURCES):
+            hint = "add one of them, or list the plants: scenarios: [{b1: 3.2}, {b1: 4.0}]"
+            keys = (*SOURCES, "scenarios")
+            yield PathDiagnostic("missing-key", "{key} does not say how the plant may vary", hint, keys=keys)
+        yield from self.at_most_one(*SOURCES)
+        if not listed:
+            yield from self.at_most_one("scenarios", "risk")
+        for key in ("covariance", "information"):
+            matrix = self.covariance if key == "covariance" else self.information
+            if isinstance(matrix, tuple):
+                yield from check_names(self.parameters, len(matrix), key)

@@ -1,0 +1,115 @@
+"""`robust` of the result: what the design keeps at the plants that were drawn, and at others like them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
+from inputdesign_cli.monte_carlo.statistics import binomial_limits
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json, Table
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.result.design import Designed
+from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, kept_by, tried_on
+
+# A plant binds when it keeps all but this share of what is admitted.
+_BINDS = 1e-5
+_LISTED = 12
+
+
+def robust_entry(
+    done: Designed, plants: Plants, kept: Sequence[int]
+) -> tuple[dict[str, Json], dict[str, Table]]:
+    """What the result says, and a table of all plants.
+
+    Args:
+        plants: as they were drawn; `kept` are the numbers of those that the design is for.
+    """
+    units, batch = done.units, plants.batch
+    at_each = kept_by(done.problem, done.design, done.experiment.samples)
+    shares = np.array([one.share for one in at_each])
+    worst = int(np.argmax(shares))
+    numbers = [0, *(number + 1 for number in kept)]  # of the plants, the nominal one being 0
+    binding = _binding(done, shares)
+    support = [place for place in binding if place > 0]
+    entry: dict[str, Json] = {
+        "source": plants.source,
+        "scenarios": len(batch.plants),
+        "rejected": batch.rejected,
+        "discarded": len(batch.plants) - len(kept),
+        "r_adm": plants.r_adm,
+        "cost": "mean" if plants.mean_cost else "nominal",
+        "worst_share": float(shares[worst]),
+        "worst_scenario": numbers[worst],
+        "active": [_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]],
+        "support": len(support),
+    }
+    if plants.afresh is not None:
+        entry |= _risk(plants, len(support), len(kept))
+    if plants.afresh is not None and done.design.result.x.any():
+        entry["fresh"] = _fresh(done, plants)
+    return entry, {"scenarios": _table(units, plants, numbers, at_each)}
+
+
+def _binding(done: Designed, shares: Array) -> list[int]:
+    """The plants that bind, those of the largest multipliers first."""
+    weight = np.trace(done.design.result.certificate.weights, axis1=1, axis2=2)
+    order = np.lexsort((-shares, -weight))
+    taking_part = (weight > _BINDS * weight.sum()) | (shares >= 1.0 - _BINDS)
+    return [place for place in order.tolist() if taking_part[place]]
+
+
+def _active(units: Units, plants: Plants, number: int, kept: Kept) -> dict[str, Json]:
+    item: dict[str, Json] = {"scenario": number, "share": kept.share}
+    if kept.frequency is not None:
+        item["frequency"] = kept.frequency / units.frequency
+    if number > 0:
+        item["parameters"] = dict(zip(plants.names, plants.batch.thetas[number - 1].tolist(), strict=True))
+    return item
+
+
+def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
+    """Shares of plants that may be missed; after discarding the theory is silent, and fresh draws count."""
+    drawn = len(plants.batch.plants)
+    if kept < drawn:
+        return {}
+    beta = 1.0 - CONFIDENCE
+    risk: dict[str, Json] = {"confidence": CONFIDENCE, "after": risk_after(drawn, beta, support)}
+    if plants.unknowns is not None:
+        risk["before"] = risk_before(drawn, beta, plants.unknowns)
+    return {"risk": risk}
+
+
+def _fresh(done: Designed, plants: Plants) -> dict[str, Json]:
+    """How many of other plants from the same distribution the design misses."""
+    assert plants.afresh is not None
+    batch = plants.afresh()
+    shares = np.array([one.share for one in tried_on(done.design, done.experiment.samples, batch)])
+    missed = int(np.sum(shares > MET))
+    finite = shares[np.isfinite(shares)]
+    return {
+        "draws": len(batch.plants),
+        "rejected": batch.rejected,
+        "missed": missed,
+        "share": missed / len(batch.plants),
+        "limits": list(binomial_limits(missed, len(batch.plants))),
+        "largest": float(finite.max(initial=0.0)),
+    }
+
+
+def _table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
+    """scenarios.csv: the plants that the design is for, with their parameters."""
+    thetas = plants.batch.thetas
+    where = [np.nan if one.frequency is None else one.frequency / units.frequency for one in at_each]
+    listed = [place for place, number in enumerate(numbers) if number > 0]
+    columns: dict[str, Array] = {
+        "scenario": np.array([numbers[place] for place in listed], dtype=float),
+        "share": np.array([at_each[place].share for place in listed]),
+    }
+    if not np.any(np.isnan([where[place] for place in listed])):
+        columns[units.frequency_header] = np.array([where[place] for place in listed])
+    chosen = thetas[[numbers[place] - 1 for place in listed]]
+    columns |= dict(zip(plants.names, chosen.T, strict=True))
+    return Table(columns)

@@ -1,0 +1,158 @@
+"""Designs for every plant that the true one might be: what was drawn, what the design keeps there.
+
+All that is said of plants that were not drawn is said under the distribution of the draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.design.convex.designs import Alternative, Design, Question, solve_design
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.spectrum import Basis
+
+CONFIDENCE = 0.999
+"""Of the statements on plants that were not drawn."""
+MET = 1.0 + 1e-6
+# While the dearest plants are sought a rough optimum will do.
+_ROUGH = 1e-4
+_TAKES_PART = 1e-6
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Plants with parameters `thetas` (S, k), and how many were drawn until so many were stable."""
+
+    thetas: Array
+    plants: tuple[Alternative, ...]
+    drawn: int
+
+    @property
+    def rejected(self) -> int:
+        """How many were unstable."""
+        return self.drawn - len(self.plants)
+
+    def only(self, kept: Sequence[int]) -> Batch:
+        """The plants with these numbers."""
+        return replace(self, thetas=self.thetas[list(kept)], plants=tuple(self.plants[i] for i in kept))
+
+
+@dataclass(frozen=True)
+class Plants:
+    """The scenarios of a design.
+
+    Args:
+        batch: the plants beside the nominal one.
+        source: the key of the spec that they come from.
+        names: of the k parameters.
+        r_adm, mean_cost: as the spec has them.
+        discard: how many of the plants the design may leave out.
+        afresh: draws others from the same distribution; None where the plants were listed one by one.
+        unknowns: of the program, None where they have no number.
+    """
+
+    batch: Batch
+    source: str
+    names: tuple[str, ...]
+    r_adm: str
+    mean_cost: bool
+    discard: int = 0
+    afresh: Callable[[], Batch] | None = None
+    unknowns: int | None = None
+
+
+@dataclass(frozen=True)
+class Kept:
+    """How near a plant comes to missing what is asked: ratio over what is admitted, and where."""
+
+    share: float
+    frequency: float | None = None
+
+
+def without_dearest(question: Question, design: Design, discard: int) -> list[int]:
+    """The numbers of the `others` that stay when those that raise the optimum most are left out, one by one.
+
+    Of the plants that bind those of the largest multipliers go first, and others take their place.
+    """
+    kept = list(range(len(question.others)))
+    while discard > 0:
+        weight = np.trace(design.result.certificate.weights, axis1=1, axis2=2)[1:]
+        dear = [
+            n for n in np.argsort(-weight, kind="stable").tolist() if weight[n] > _TAKES_PART * weight.sum()
+        ]
+        # Half of those that bind at a time: a plant that goes frees others.
+        gone = set(dear[: min(discard, max(len(dear) // 2, 1))])
+        if not gone:
+            break
+        kept = [number for place, number in enumerate(kept) if place not in gone]
+        discard -= len(gone)
+        if discard > 0:
+            fewer = replace(question, others=[question.others[number] for number in kept])
+            design = solve_design(fewer, tolerance=_ROUGH, any_spectrum_tolerance=1.0)
+    return kept
+
+
+def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
+    """How near each scenario of the problem comes to missing what the design promises; the nominal one first.
+
+    Args:
+        problem: of the design, on the basis of its answer.
+        samples: of the delivered experiment.
+    """
+    informations = design.result.informations
+    if problem.goal == "samples":
+        informations = problem.fixed_information + samples * (
+            problem.scaled_information + problem.excited(design.result.x)
+        )
+    worst = [Kept(0.0)] * len(problem.scenarios)
+    for side in (False, True):
+        admitted = _admitted(problem, design, side=side)
+        for index, violation in problem.violations(informations, side=side):
+            number, share = problem.asked[index].scenario, violation.ratio / admitted
+            if share > worst[number].share:
+                worst[number] = Kept(share, violation.frequency)
+    return worst
+
+
+def _admitted(problem: Problem, design: Design, *, side: bool) -> float:
+    """The ratio that a requirement may have: where the best accuracy is sought the one that is reached."""
+    return float(np.sqrt(design.result.objective)) if problem.goal == "factor" and not side else 1.0
+
+
+def tried_on(design: Design, samples: int, batch: Batch) -> list[Kept]:
+    """The same for plants that the design was not made for."""
+    at = design.problem.on(design.result.basis)
+    power = max(at.power("excitation").at(design.result.x), np.finfo(float).tiny)
+    return [_tried(design, at.basis, power, samples, plant) for plant in batch.plants]
+
+
+def _tried(design: Design, basis: Basis, power: float, samples: int, plant: Alternative) -> Kept:
+    seconds_left()
+    try:
+        of_length = replace(plant.experiment, samples=samples)
+        own = replace(plant, experiment=of_length).at(of_length.whitened(power))
+        alone = replace(
+            design.problem,
+            experiment=own.experiment,
+            requirements=own.requirements,
+            side=own.side,
+            others=(),
+            basis=basis,
+            finer=None,
+        )
+        informations = alone.informations(design.result.x)
+        worst = Kept(0.0)
+        for side in (False, True):
+            admitted = _admitted(design.problem, design, side=side)
+            for _, violation in alone.violations(informations, side=side):
+                if violation.ratio / admitted > worst.share:
+                    worst = Kept(violation.ratio / admitted, violation.frequency)
+        return worst
+    except (np.linalg.LinAlgError, IdesignError):  # a plant of which the experiment does not tell everything
+        return Kept(np.inf)
