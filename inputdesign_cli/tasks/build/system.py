@@ -34,6 +34,7 @@ from inputdesign_cli.specification.models.transfer import DiscreteMatrix, Discre
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.demand import check_model
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.tables import read_columns
@@ -104,8 +105,8 @@ def build_experiment(spec: Spec) -> Experiment:
     """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
     Raises:
-        SpecError: `needs-band`; `too-large`; an unstable or algebraic loop; a prior that does
-            not fit the parameters.
+        SpecError: `needs-band`; `too-large`; `infinite-information`; an unstable or algebraic
+            loop; a prior that does not fit the parameters.
         DataError: the record of a prior cannot be used.
     """
     model, controller = build_model(spec), spec.experiment.controller
@@ -114,6 +115,7 @@ def build_experiment(spec: Spec) -> Experiment:
     if loop is not None:
         loop.check_delay()
     experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+    experiment = on_finite_information(spec, experiment)
     return replace(experiment, prior=_prior(spec, experiment))
 
 
