@@ -58,17 +58,21 @@ def best_record(
     bounds, settings = bounds or Bounds(), generator.settings
     limiter = limiter_of(plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
-    streams = np.random.SeedSequence(settings.seed).spawn(max(settings.candidates, settings.most_candidates))
-    best = candidates.record(np.random.default_rng(streams[0]))
-    for number, stream in enumerate(streams[1:], start=1):
+    best = candidates.record(_stream(settings.seed, 0))
+    for number in range(1, max(settings.candidates, settings.most_candidates)):
         if number >= settings.candidates and candidates.suffices(best):
             break
         try:
-            other = candidates.record(np.random.default_rng(stream))
+            other = candidates.record(_stream(settings.seed, number))
         except OutOfTimeError:
             break
         best = min((best, other), key=candidates.rank)
     return best
+
+
+def _stream(seed: int, number: int) -> np.random.Generator:
+    """Of the candidate of this number: the child that `SeedSequence.spawn` would make."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
 
 
 @dataclass(frozen=True)
