@@ -223,21 +223,22 @@ class PolynomialModel(Parametrised):
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)
         C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
-        noise = {
-            (letter, i): (factor[:, None] * source[:, i])
-            for i in range(self.outputs)
-            for letter, factor, source in (
-                ("a", -D[i] / C[i], y),
-                ("c", 1.0 / C[i], e),
-                ("d", -1.0 / D[i], e),
-            )
-        }
+        letters = {parameter.letter for parameter in self.parameters}
+        noise: dict[tuple[str, int], ComplexArray] = {}
+        for i in range(self.outputs):
+            if "a" in letters:
+                noise["a", i] = (-D[i] / C[i])[:, None] * y[:, i]
+            if "c" in letters:
+                noise["c", i] = e[:, i] / C[i][:, None]
+            if "d" in letters:
+                noise["d", i] = -e[:, i] / D[i][:, None]
         plant: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:
             F = evaluate(self.F[i][j], q)
             filtered = D[i] / (C[i] * F)
             plant["b", i, j] = filtered[:, None] * u[:, j]
-            plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
+            if "f" in letters:
+                plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
         for index, parameter in enumerate(self.parameters):
             shift = (q**parameter.power)[:, None]
             if parameter.letter in "bf":
