@@ -40,12 +40,15 @@ def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagn
     has = f"but the plant has {count(outputs, 'output')}"
     white = "the noise of a regression is white" if spec.plant.kind == "regression" else ""
     kind = white or ("" if spec.plant.sampled else "the plant is not sampled")
-    for key, value in (("C", noise.C), ("D", noise.D)):
+    for key, value in (("C", noise.C), ("D", noise.D), ("drift", ())):
         if kind and key in noise.model_fields_set:
-            message = f"{{key}} is a polynomial in q^-1, but {kind}"
+            message = f"{{key}} is {'a polynomial' if value else 'a root'} in q^-1, but {kind}"
             yield PathDiagnostic("unsuitable-key", message, f"remove {key}", (*path, key))
-        else:
+        elif value:
             yield from check_per_output(value, outputs, *path, key)
+    if len(noise.drifts) not in (1, outputs):
+        message = f"{{key}} is a list of {len(noise.drifts)}, {has}"
+        yield PathDiagnostic("wrong-shape", message, "write true, or one for each output", (*path, "drift"))
     variance = noise.variance
     if isinstance(variance, tuple) and len(variance) != outputs:
         message = f"{{key}} is {len(variance)} x {len(variance)}, {has}"

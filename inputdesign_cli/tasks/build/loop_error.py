@@ -86,6 +86,13 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
+    if any(noise.drifts):
+        raise bad_spec(
+            "not-supported",
+            "this version designs for the closed-loop error with noise that does not drift",
+            hint="write a root of D inside the unit circle in place of drift",
+            key="noise.drift",
+        )
     if plant.kind != "parameters" and plant.kind != "regression":
         for part, listed in (("noise", noise.known), (key, plant.known or plant.named_parameters)):
             if listed:
