@@ -2,6 +2,7 @@
 
 from inputdesign_cli.plant.coloured import Coloured as Coloured
 from inputdesign_cli.plant.continuous_model import ContinuousModel as ContinuousModel
+from inputdesign_cli.plant.discretised import delayed as delayed, discretised as discretised, pid as pid
 from inputdesign_cli.plant.frequencies import (
     graded_grid as graded_grid,
     local_maxima as local_maxima,

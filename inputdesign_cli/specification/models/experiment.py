@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Discriminator, Field
 
 from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
     CovarianceMatrix,
@@ -29,7 +30,6 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.specification.models.section import TAG, Section, tag
 from inputdesign_cli.specification.models.shapes import with_paths
-from inputdesign_cli.specification.models.transfer import Controller
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import count
 
@@ -170,8 +170,8 @@ class Experiment(Section):
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
     controller: Controller | None = Field(
         default=None,
-        description="C of the loop u = r - C y, in q^-1; present: the experiment is in closed loop. With "
-        "several channels numerator and denominator are rows (inputs) of columns (outputs).",
+        description="C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
+        "closed loop. With several channels: loops, or numerator and denominator as rows (inputs) of columns.",
     )
     prior: Prior | None = Field(default=None, description="Information already at hand.")
 

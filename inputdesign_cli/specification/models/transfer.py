@@ -241,16 +241,6 @@ Transfer = Annotated[
 ]
 """A filter or weight, in q^-1 or in s."""
 
-Controller = Annotated[
-    DiscreteTransfer | DiscreteMatrix,
-    pick(lambda v: (DiscreteMatrix if depth(v.get("numerator")) > 1 else DiscreteTransfer).phrase),
-    Wording(
-        "a mapping of keys",
-        "write {numerator: [..], denominator: [..]} in q^-1; with several channels rows of columns of them",
-    ),
-]
-"""C of a loop u = r - C y: one transfer function, or rows (inputs) of columns (outputs) of them."""
-
 Target = Annotated[
     DiscreteTransfer | ContinuousTransfer | DiscreteMatrix | ContinuousMatrixTransfer,
     pick(_target_kind),

@@ -55,7 +55,7 @@ def _true_system(spec: Spec) -> TrueSystem | None:
     model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
     controller = spec.experiment.controller
     try:
-        loop = None if controller is None else build_loop(model, controller)
+        loop = None if controller is None else build_loop(spec, model, controller)
     except SpecError as error:
         found = error.diagnostics[0]
         raise bad_spec(

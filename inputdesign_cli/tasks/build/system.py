@@ -17,12 +17,12 @@ from inputdesign_cli.plant import (
     Model,
     PolynomialModel,
     SampledModel,
-    TransferMatrix,
     close_loop,
     hold_entries,
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
 from inputdesign_cli.specification.models.spectrum import (
@@ -32,15 +32,14 @@ from inputdesign_cli.specification.models.spectrum import (
     MultisineSpectrum,
     PolynomialSpectrum,
 )
-from inputdesign_cli.specification.models.transfer import DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.demand import check_model
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.tables import read_columns
-from inputdesign_cli.tasks.build.weights import rational
 
 
 def build_model(spec: Spec) -> Model:
@@ -122,7 +121,7 @@ def build_experiment(spec: Spec) -> Experiment:
     """
     model, controller = build_model(spec), spec.experiment.controller
     check_model(spec, model)
-    loop = None if controller is None else build_loop(model, controller)
+    loop = None if controller is None else build_loop(spec, model, controller)
     if loop is not None:
         loop.check_delay()
     experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
@@ -130,17 +129,13 @@ def build_experiment(spec: Spec) -> Experiment:
     return replace(experiment, prior=_prior(spec, experiment))
 
 
-def build_loop(model: Model, controller: DiscreteTransfer | DiscreteMatrix) -> Loop:
-    """The loop of a model that is sampled; a single transfer function is a controller of one entry.
+def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
+    """The loop of a model that is sampled.
 
     Raises:
         SpecError: the loop is unstable or algebraic.
     """
-    match controller:
-        case DiscreteMatrix():
-            C = TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
-        case _:
-            C = TransferMatrix.diagonal(rational(controller), 1)
+    C = controller_matrix(controller, spec.sample_time, (model.inputs, model.outputs))
     loop = close_loop(model, C)
     loop.check_stability()
     return loop
