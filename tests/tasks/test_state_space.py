@@ -22,8 +22,9 @@ WORDS = [
     f'{{{PARAMETERS}, state_space: {{A: [["-1/T"]], B: [["K/T"]], C: [[1]], delay: L}}, sample: zoh}}',
     f"{{{PARAMETERS}, continuous: {{numerator: [K], denominator: [T, 1], delay: L}}, sample: zoh}}",
     # behind the hold, by hand: a lag of one sample and 0.185, and E = exp(-h/T)
-    f'{{{PARAMETERS}, state_space: {{time: discrete, A: [["exp(-0.5/T)", "K*(exp(-(1 - L)/T) - exp(-0.5/T))", '
-    '"K*(1 - exp(-(1 - L)/T))"], [0, 0, 1], [0, 0, 0]], B: [[0], [0], [1]], C: [[1, 0, 0]]}}',
+    f"{{{PARAMETERS}, state_space: {{time: discrete, B: [[0], [0], [1]], C: [[1, 0, 0]], "
+    'A: [["exp(-0.5/T)", "K*(exp(-(1 - L)/T) - exp(-0.5/T))", "K*(1 - exp(-(1 - L)/T))"], '
+    "[0, 0, 1], [0, 0, 0]]}}",
 ]
 
 
@@ -83,7 +84,8 @@ def test_a_study():
 
 
 def test_an_unstable_plant_under_a_controller():
-    plant = "{parameters: {a: 1.1, b: 0.5}, state_space: {time: discrete, A: [[a]], B: [[b]], C: [[1]], K: [[0.9]]}}"
+    states = "{time: discrete, A: [[a]], B: [[b]], C: [[1]], K: [[0.9]]}"
+    plant = f"{{parameters: {{a: 1.1, b: 0.5}}, state_space: {states}}}"
     rest = REST.replace("{samples: 300}", "{samples: 300, controller: {numerator: [0.8]}}")
     assert solve(spec_of(plant, rest)).result["status"] == "optimal"
 
@@ -94,9 +96,9 @@ STATES = "A: [[a]], B: [[1]], C: [[1]]"
 @pytest.mark.parametrize(
     ("plant", "code", "key"),
     [
-        (f"{{state_space: {{{STATES}}}}}", "bad-expression", "plant.state_space.A[0][0]"),
-        ("{state_space: {A: [[-1]], B: [[1]], C: [[1]]}, sample: zoh}", "missing-key", "plant.parameters"),
-        (f"{{parameters: {{a: -1}}, state_space: {{{STATES}}}}}", "missing-key", "plant.sample"),
+        (f"{{state_space: {{{STATES}}}}}", "not-a-number", "plant.state_space.A[0][0]"),
+        ("{state_space: {A: [[-1]], B: [[1]], C: [[1]]}, sample: zoh}", "missing-key", "plant"),
+        (f"{{parameters: {{a: -1}}, state_space: {{{STATES}}}}}", "missing-key", "plant"),
         (
             f"{{parameters: {{a: 0.5}}, state_space: {{{STATES}, time: discrete}}, sample: zoh}}",
             "unsuitable-key",
