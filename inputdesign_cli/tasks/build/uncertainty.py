@@ -140,7 +140,7 @@ class _Scenarios:
         model, controller, loop = self._nominal.at(theta), self.spec.experiment.controller, None
         if controller is not None:
             try:
-                loop = build_loop(model, controller)
+                loop = build_loop(self.spec, model, controller)
             except SpecError:
                 return None
         if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
