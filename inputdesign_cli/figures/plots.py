@@ -11,6 +11,7 @@ from inputdesign_cli.figures.bound import draw_bound
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
 from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.exploration import draw_orders
+from inputdesign_cli.figures.fan import draw_fan
 from inputdesign_cli.figures.moments import draw_error, draw_moments
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
@@ -28,6 +29,7 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.EllipseCurves: draw_ellipses,
     of.ErrorBandCurves: draw_error_bands,
     of.ErrorCurves: draw_error,
+    of.FanCurves: draw_fan,
     of.FitCurves: draw_fit,
     of.LossCurves: draw_loss,
     of.MomentsCurves: draw_moments,

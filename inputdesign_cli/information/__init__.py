@@ -6,7 +6,10 @@ from inputdesign_cli.information.experiment import (
     Experiment as Experiment,
     PowerKind as PowerKind,
 )
-from inputdesign_cli.information.finite_record import FiniteRecord as FiniteRecord
+from inputdesign_cli.information.finite_record import (
+    FiniteRecord as FiniteRecord,
+    FiniteRecords as FiniteRecords,
+)
 from inputdesign_cli.information.products import WeightedProducts as WeightedProducts
 from inputdesign_cli.information.quadrature import (
     Quadrature as Quadrature,

@@ -81,3 +81,27 @@ class FiniteRecord:
     def _answers(self) -> _Answers:
         filters = RecordFilters.of(self.experiment)
         return filters or RecordTransforms(self.experiment, self.samples, self.step)
+
+
+@dataclass(frozen=True)
+class FiniteRecords(FiniteRecord):
+    """The same for several plants at once: what is known and what a record tells are stacks of matrices.
+
+    Powers are those at the first plant, that of `experiment`; the `others` follow it.
+    """
+
+    others: tuple[Experiment, ...] = ()
+
+    def information(self, record: Array) -> NDArray[np.float64]:
+        """(1 + others, k, k): each as in `FiniteRecord`."""
+        return np.array([plant.information(record) for plant in self._each])
+
+    @cached_property
+    def known(self) -> NDArray[np.float64]:
+        """(1 + others, k, k): each as in `FiniteRecord`."""
+        return np.array([plant.known for plant in self._each])
+
+    @cached_property
+    def _each(self) -> list[FiniteRecord]:
+        plants = (self.experiment, *self.others)
+        return [FiniteRecord(plant, self.samples, self.step) for plant in plants]

@@ -30,6 +30,9 @@ Drawn = tuple[Curves, str, str]
 
 _CAPTIONS = {
     "bound": "The error that the model may have (r_u) against the error that is admitted (r_adm).",
+    "fan": "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at "
+    "each, those that bind in colour. The plants are those that the uncertainty of the spec describes; "
+    "nothing is said of the true plant.",
     "spectrum": "Where in frequency the excitation has its power, and white excitation for comparison.",
     "optimality": "The certificate of the bound over every spectrum: what a unit of cost buys at each "
     "frequency, relative to the best. It is nowhere above one, and one where power pays.",

@@ -44,6 +44,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
             f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
             f"not {error['alpha']:.4g}",
         )
+    if "robust" in result:
+        yield from _robust(result["robust"])
     if "mean_squared_error" in result:
         error = result["mean_squared_error"]
         parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"
@@ -56,6 +58,35 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "improvement" in result.get("simulation", {}):
         measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
+    """What holds at the plants that the true one might be, and at others drawn in the same way."""
+    kept = found["scenarios"] - found["discarded"]
+    bound = [_bound_by(item) for item in found["active"][:3]]
+    more = ", .." if len(found["active"]) > len(bound) else ""
+    left = f"; {found['discarded']} are left out" if found["discarded"] else ""
+    drawn = "listed" if found["source"] == "scenarios" else "drawn"
+    again = f"{found['rejected']} unstable ones were drawn again" if found["rejected"] else ""
+    yield "plants", f"what is asked holds at the plant of the spec and {kept} {drawn}{left}", again
+    if bound:
+        yield "binding", ", ".join(bound) + more, ""
+    if "fresh" in found:
+        told = found["fresh"]
+        low, high = (f"{100 * share:.2g}" for share in told["limits"])
+        yield (
+            "fresh plants",
+            f"{told['missed']} of {told['draws']} drawn afresh are missed: {100 * told['share']:.2g} % "
+            f"({low} to {high})",
+            "said of plants drawn as the spec says, not of the true plant",
+        )
+
+
+def _bound_by(item: Mapping[str, Json]) -> str:
+    if not item["scenario"]:
+        return "the plant of the spec"
+    values = ", ".join(f"{name} {value:.4g}" for name, value in item["parameters"].items())
+    return f"plant {item['scenario']} ({values})"
 
 
 def white(result: Result) -> str:

@@ -9,6 +9,7 @@ from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.specification import PolynomialPlant, Spec, parse_spec
 from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.specification.models.spectrum import FirSpectrum, GivenSpectrum, PolynomialSpectrum
+from inputdesign_cli.specification.models.uncertainty import SOURCES
 
 _SPECTRA = {
     "white": "white excitation",
@@ -49,7 +50,14 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
     """
     spec = parse_spec(text, file, design=verb != "identify")
     error = spec.accuracy.model_error
-    sentences = [_system(spec), _experiment(spec), *_accuracy(spec), *_limits(spec), _goal(spec, verb)]
+    sentences = [
+        _system(spec),
+        _experiment(spec),
+        *_uncertain(spec),
+        *_accuracy(spec),
+        *_limits(spec),
+        _goal(spec, verb),
+    ]
     return Question(
         title=spec.title or "",
         sentences=tuple(sentences),
@@ -105,6 +113,21 @@ def _experiment(spec: Spec) -> str:
     if spec.designs and spec.goal == "shortest_experiment":
         return f"The length of the experiment is sought; it runs {loop}."
     return f"The experiment has {length}, {loop}."
+
+
+def _uncertain(spec: Spec) -> list[str]:
+    """For which plants the design is."""
+    stated = spec.uncertainty
+    if stated is None:
+        return []
+    if isinstance(stated.scenarios, tuple):
+        return [f"What is asked must hold for this plant and {len(stated.scenarios)} others that are listed."]
+    number = f"{stated.scenarios} plants" if stated.scenarios else "plants"
+    if stated.risk is not None:
+        number = f"as many plants as a risk of {stated.risk:g} takes,"
+    source = {"covariance": "its covariance", "information": "what is known of it", "intervals": "intervals"}
+    drawn = source[stated.stated(*SOURCES)[0]]
+    return [f"What is asked must hold for this plant and {number} drawn from {drawn}."]
 
 
 def _accuracy(spec: Spec) -> list[str]:

@@ -27,7 +27,7 @@ from inputdesign_cli.runs.run_directory import read_run
 
 # Headings and the charts that belong under them; those of data and of simulated runs have their own.
 _SECTIONS = (
-    ("Accuracy", ("bound",)),
+    ("Accuracy", ("bound", "fan")),
     ("Spectrum", ("spectrum",)),
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),
@@ -54,6 +54,7 @@ _FIELDS = {
             "identification",
             "assessment",
             "simulation",
+            "robust",
             "moments",
             "mean_squared_error",
         ),

@@ -25,6 +25,12 @@ _EQUIVALENCE = (
     "J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canadian Journal of Mathematics "
     "12 (1960) 363-366: the idea behind the bound over every spectrum."
 )
+_SCENARIOS = (
+    "M. C. Campi and S. Garatti, The exact feasibility of randomized solutions of uncertain convex programs, "
+    "SIAM Journal on Optimization 19 (2008) 1211-1230.",
+    "M. C. Campi and S. Garatti, Wait-and-judge scenario optimization, Mathematical Programming 167 (2018) "
+    "155-189.",
+)
 _PREDICTION_ERROR = (
     "L. Ljung, System Identification: Theory for the User, second edition, Prentice Hall, 1999: prediction "
     "errors and their asymptotic covariance."
@@ -38,6 +44,12 @@ def assumptions(question: Question, result: Result) -> list[str]:
         from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."
         chosen = "Orders and delays were chosen by what the model simulates of data that it has not seen."
         said = [chosen if "exploration" in result else from_spec]
+    elif "robust" in result:
+        said = [
+            f"The plant is as the uncertainty of the spec describes it. {rests} for the plants that were "
+            "drawn from it or listed; shares of other plants are those of plants drawn in the same way. If "
+            "the description is wrong nothing is said: none of this is a statement about the true plant."
+        ]
     else:
         said = [
             f"The plant and the noise are as the spec has them. {rests} for this nominal system; the "
@@ -82,6 +94,8 @@ def citations(question: Question, result: Result) -> list[str]:
         cited.append(_MEAN_SQUARED)
     if question.family == "polynomial":
         cited.append(_SPECTRAL)
+    if "risk" in result.get("robust", {}):
+        cited += _SCENARIOS
     if "any_spectrum_bound" in result.get("objective", {}):
         cited.append(_EQUIVALENCE)
     if not question.regression:

@@ -114,6 +114,16 @@ class OptimalityCurves(Curves):
 
 
 @dataclass(frozen=True)
+class FanCurves(Curves):
+    """r_u / r_adm over frequency at many plants; of several entries of G the largest."""
+
+    frequency: Array  # (n,)
+    ratios: Array  # (plants, n)
+    nominal: Array  # (n,)
+    active: Mapping[str, Array]  # the plants that bind, by name -> (n,)
+
+
+@dataclass(frozen=True)
 class Ellipse:
     """The predicted confidence region of a pair of parameters: their values and (2, 2) covariances."""
 

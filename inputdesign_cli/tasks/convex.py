@@ -49,7 +49,7 @@ from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
-from inputdesign_cli.tasks.result.robust import robust_entry
+from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.tasks.result.status import proof_status
@@ -137,8 +137,9 @@ class ConvexTask:
         record = made.record
         tables, curves = self._illustrations(done, record)
         if self.plants is not None:
-            result["robust"], told = robust_entry(done, self.plants, done.kept)
-            tables |= told
+            robust = robust_result(done, self.plants)
+            result["robust"] = robust.entry
+            tables, curves = tables | robust.tables, curves | robust.curves
         files: dict[str, bytes] = {}
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record)

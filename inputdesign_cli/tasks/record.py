@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.design.convex.problem import Weight, weights_of
-from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
+from inputdesign_cli.design.convex.problem import FEW, Weight, weights_of
+from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal import (
     Bounds,
@@ -23,12 +24,14 @@ from inputdesign_cli.signal import (
     best_record,
     limited_responses,
 )
+from inputdesign_cli.signal.evaluation import MET
 from inputdesign_cli.tasks.shortest_record import shortest_record
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
 _FALLS_SHORT = 5e-3
+_TAKES_PART = 1e-6
 _NO_RECORD = (
     "there is no record: it would have {} samples, and at most {} are computed for this model; "
     "signal.samples sets a shorter one"
@@ -105,7 +108,8 @@ def make_record(
 ) -> Record | None:
     """The best of several records of the designed spectrum.
 
-    Best is the least power that meets the requirements by the record itself, or the best criterion. None when
+    Best is the least power that meets the requirements of every scenario by the record itself, or the best
+    criterion of the plant where it is worst. None when
     no excitation is needed, or when the record would be too short (criteria per sample without
     `signal.samples`) or longer than any that is computed.
 
@@ -120,14 +124,23 @@ def make_record(
     feasible = request.feasible(experiment.samples, least_period(experiment.inputs))
     if not design.result.x.any() or not feasible:
         return None
-    upper = tuple((limit.kind, limit.channel, limit.bound) for limit in problem.limits if limit.upper)
-    bounds = replace(request.bounds, powers=upper)
-    target = Target(
-        _score(problem.requirements),
-        meets=problem.goal != "factor" and request.meets,
-        cost=request.cost,
-        designed=design_cost(design, request.cost),
+    upper = tuple(
+        (limit.kind, limit.channel, limit.bound)
+        for limit in problem.limits
+        if limit.upper and limit.scenario == 0
     )
+    bounds = replace(request.bounds, powers=upper)
+    meets = problem.goal != "factor" and request.meets
+    cost = design_cost(design, request.cost)
+    plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
+    scores = [_score(scenario.requirements) for scenario in problem.scenarios]
+
+    def target_at(numbers: Sequence[int]) -> Target:
+        def worst(informations: NDArray[np.float64]) -> float:
+            return max(scores[n](M) for n, M in zip(numbers, informations, strict=True))
+
+        return Target(worst, meets=meets, cost=request.cost, designed=cost)
+
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
     def made(samples: int, candidates: int | None = None) -> Record:
@@ -136,13 +149,44 @@ def make_record(
             tried = replace(settings, candidates=candidates, most_candidates=candidates)
         limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
         generator = SignalGenerator(spectrum, tried, samples, request.band, limited)
-        return best_record(generator, FiniteRecord(experiment, samples, request.step), target, bounds)
+        numbers = _binding(design)
+        while True:
+            at = FiniteRecords(
+                experiment, samples, request.step, others=tuple(plants[n] for n in numbers if n)
+            )
+            record = best_record(generator, at, target_at(numbers), bounds)
+            least = max(record.worst_ratio, MET) if meets else record.worst_ratio
+            missed = {
+                n: ratio
+                for n in range(len(plants))
+                if n not in numbers
+                and (ratio := _ratio_at(FiniteRecord(plants[n], samples, request.step), scores[n], record))
+                > least
+            }
+            if not missed:
+                return record
+            # What serves the worst few serves most of the others.
+            numbers += sorted(missed, key=lambda n: -missed[n])[:FEW]
 
     record = made(samples)
     if record.met or not (request.searched and longer):
         return record
     allowed = request.most_samples if problem.goal == "samples" and request.samples is None else 0
     return shortest_record(record, settings.block, made, allowed, request.longest, request.limit_keys)
+
+
+def _binding(design: Design) -> list[int]:
+    """The nominal plant, and the scenarios that bind the design."""
+    weight = np.trace(design.result.certificate.weights, axis1=1, axis2=2)
+    return [n for n, share in enumerate(weight) if n == 0 or share > _TAKES_PART * weight.sum()]
+
+
+def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Record) -> float:
+    """The worst ratio of a record at one plant."""
+    try:
+        return score(plant.information(record.samples))
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGenerator:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.designs import Alternative, Design, Question, solve_design
@@ -105,11 +106,7 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
         problem: of the design, on the basis of its answer.
         samples: of the delivered experiment.
     """
-    informations = design.result.informations
-    if problem.goal == "samples":
-        informations = problem.fixed_information + samples * (
-            problem.scaled_information + problem.excited(design.result.x)
-        )
+    informations = delivered(problem, design, samples)
     worst = [Kept(0.0)] * len(problem.scenarios)
     for side in (False, True):
         admitted = _admitted(problem, design, side=side)
@@ -118,6 +115,15 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
             if share > worst[number].share:
                 worst[number] = Kept(share, violation.frequency)
     return worst
+
+
+def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.float64]:
+    """(S, k, k): what the spectrum tells of each scenario over so many samples."""
+    if problem.goal != "samples":
+        return design.result.informations
+    return problem.fixed_information + samples * (
+        problem.scaled_information + problem.excited(design.result.x)
+    )
 
 
 def _admitted(problem: Problem, design: Design, *, side: bool) -> float:

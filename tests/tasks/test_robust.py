@@ -8,6 +8,11 @@ import pytest
 from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.design.convex.designs import Alternative, solve_design
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.information import FiniteRecord
+from inputdesign_cli.report.facts import facts
+from inputdesign_cli.report.question import read_question
+from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.task import build_task
 from inputdesign_cli.tasks.robust import Batch, tried_on
@@ -278,3 +283,46 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     assert by_own.share == pytest.approx(1.02, abs=0.02)
     assert by_estimate.share == pytest.approx(1.86, abs=0.02)
     assert by_estimate.frequency == pytest.approx(0.390, abs=2e-3)
+
+
+@pytest.mark.parametrize("asked", [(), ("limits={input_power: 1}", "objective=best_accuracy")])
+def test_the_record_serves_every_plant_by_its_own_samples(asked):
+    prior = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 30, fresh: 5}}"
+    spec = parse_spec(FIRST, overrides=[prior, *asked])
+    found = solve(spec)
+    samples = found.tables["signal"].columns["u1"][:, None]
+    ratios = []
+    for plant in build_convex(spec).question.plants:
+        scenario = plant.at(plant.experiment.whitened(1.0))
+        told = FiniteRecord(scenario.experiment, len(samples)).information(samples)
+        ratios.append(scenario.requirements[0].worst(told).ratio)
+    assert max(ratios) == pytest.approx(found.result["signal"]["worst_ratio"], rel=1e-9)
+    assert max(ratios) > ratios[0]
+    if not asked:
+        assert max(ratios) <= 1.0 + 1e-9
+
+
+def test_the_fan_shows_every_plant_and_names_those_that_bind():
+    found = solve(
+        parse_spec(TWO, overrides=["uncertainty={scenarios: [{'b1[1,1]': 0.8}, {'b1[1,1]': 1.1}]}"])
+    )
+    curves, columns = found.curves["fan"], found.tables["fan"].columns
+    assert curves.ratios.shape == (2, curves.frequency.size)
+    np.testing.assert_allclose(columns["largest"], np.maximum(curves.ratios.max(axis=0), curves.nominal))
+    assert columns["largest"].max() == pytest.approx(1.0, abs=1e-3)
+    names = {f"plant {item['scenario']}" for item in found.result["robust"]["active"] if item["scenario"]}
+    assert set(curves.active) == names
+    assert draw_all(found)["fan.png"].startswith(b"\x89PNG")
+
+
+def test_what_is_said_is_said_under_the_prior():
+    found = solve(
+        parse_spec(FIRST, overrides=[f"uncertainty={{covariance: {COVARIANCE}, fresh: 20, scenarios: 9}}"])
+    )
+    lines = {name: (text, note) for name, text, note in facts(found.result, "s")}
+    assert lines["plants"][0] == "what is asked holds at the plant of the spec and 9 drawn"
+    assert "not of the true plant" in lines["fresh plants"][1]
+    question = read_question(found.resolved_spec)
+    assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
+    assert "true plant" in assumptions(question, found.result)[0]
+    assert sum("Campi" in source for source in citations(question, found.result)) == 2

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Json, Table
+from inputdesign_cli.runs.results import Curves, Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed
+from inputdesign_cli.tasks.result.fan import fan_curves
 from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, kept_by, tried_on
 
 # A plant binds when it keeps all but this share of what is admitted.
@@ -19,14 +21,18 @@ _BINDS = 1e-5
 _LISTED = 12
 
 
-def robust_entry(
-    done: Designed, plants: Plants, kept: Sequence[int]
-) -> tuple[dict[str, Json], dict[str, Table]]:
-    """What the result says, and a table of all plants.
+@dataclass(frozen=True)
+class RobustResult:
+    """`robust` of the result, with its tables and curves by the names of their files."""
 
-    Args:
-        plants: as they were drawn; `kept` are the numbers of those that the design is for.
-    """
+    entry: dict[str, Json]
+    tables: dict[str, Table]
+    curves: dict[str, Curves]
+
+
+def robust_result(done: Designed, plants: Plants) -> RobustResult:
+    """What the result says of the plants that were drawn, as far as the design is for them."""
+    kept = done.kept
     units, batch = done.units, plants.batch
     at_each = kept_by(done.problem, done.design, done.experiment.samples)
     shares = np.array([one.share for one in at_each])
@@ -50,7 +56,11 @@ def robust_entry(
         entry |= _risk(plants, len(support), len(kept))
     if plants.afresh is not None and done.design.result.x.any():
         entry["fresh"] = _fresh(done, plants)
-    return entry, {"scenarios": _table(units, plants, numbers, at_each)}
+    tables, curves = {"scenarios": _table(units, plants, numbers, at_each)}, dict[str, Curves]()
+    fan = fan_curves(done, numbers, binding)
+    if fan is not None and done.design.result.x.any():
+        tables["fan"], curves["fan"] = fan
+    return RobustResult(entry, tables, curves)
 
 
 def _binding(done: Designed, shares: Array) -> list[int]:

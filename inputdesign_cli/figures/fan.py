@@ -1,0 +1,48 @@
+"""fan.png: how near every plant that the true one might be comes to missing what is asked."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from inputdesign_cli.figures.style import (
+    BLACK,
+    DASHED,
+    GREY,
+    ORANGE,
+    PALETTE,
+    frequency_axis,
+    legend_above,
+    log_axes,
+)
+from inputdesign_cli.runs.results import FanCurves
+
+# More lines than these are one grey area.
+_MOST_LINES = 200
+_MOST_NAMED = 5
+_LEAST = 1e-3
+
+
+def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
+    """A line for every plant, those that bind in colour; none may exceed one."""
+    axes = page.add_subplot()
+    log_axes(axes, "y")
+    w = curves.frequency
+    rows = curves.ratios[:_MOST_LINES]
+    width = 0.5 if len(rows) > 20 else 0.8
+    lines = axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
+    handles = []
+    for line in lines[:1]:
+        line.set_label(f"{len(curves.ratios)} plants")
+        handles.append(line)
+    handles += axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
+    named = list(curves.active.items())[:_MOST_NAMED]
+    for (name, ratio), color in zip(named, PALETTE, strict=False):
+        handles += axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
+    handles.append(axes.axhline(1.0, color=ORANGE, linestyle=DASHED, linewidth=1.0, label="admitted"))
+    shown = curves.nominal if not len(rows) else rows
+    axes.set_ylim(
+        max(float(shown.min()) * 0.8, _LEAST * float(shown.max())), 1.3 * max(float(shown.max()), 1.0)
+    )
+    frequency_axis(axes, w, time_unit)
+    axes.set_ylabel("r_u / r_adm")
+    legend_above(axes, handles)
