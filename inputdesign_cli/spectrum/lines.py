@@ -24,7 +24,8 @@ from inputdesign_cli.spectrum.directions import (
 )
 
 _FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
-_MOST_NEW = 16  # for each input
+# New atoms a round: for each input, and in all. The best few get company (see `_around`).
+_NEW_EACH, _MOST_NEW, _MOST_ACCOMPANIED = 16, 64, 16
 # From so many atoms on, so many of the most power stay.
 _MOST_ATOMS, _KEPT_ATOMS = 320, 200
 _ATOMS_AT_ONCE = 256
@@ -157,7 +158,7 @@ class LinesBasis:
         """
         scale, where = directed_scale(price, value, grid) if self.free else (None, self.allowed)
         ratios, directions = every_direction(price.density(where), value.density(where))
-        best = np.argsort(-ratios, axis=None, kind="stable")[: _MOST_NEW * self.inputs]
+        best = np.argsort(-ratios, axis=None, kind="stable")[: min(_NEW_EACH * self.inputs, _MOST_NEW)]
         number, which = np.unravel_index(best, ratios.shape)
         atoms = np.column_stack([where[number], directions[number, which]])
         return Pricing(inverse_of(ratios) if scale is None else scale, atoms)
@@ -170,7 +171,7 @@ class LinesBasis:
         number = face.generators
         power = np.zeros(self.size)
         power[number[: y.size]] = y
-        rows = [*directions, *self._around(power, directions)]
+        rows = [*directions, *self._around(power, directions[:_MOST_ACCOMPANIED])]
         known = [self._known(float(row[0].real), row[1:]) for row in rows]
         fresh = [row for row, at in zip(rows, known, strict=True) if at is None]
         back = np.setdiff1d([at for at in known if at is not None], number).astype(np.intp)
