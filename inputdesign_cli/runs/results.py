@@ -172,6 +172,7 @@ class FitPanel:
     simulated: Array | None = None
     fit: float | None = None  # per cent
     output: int = 0  # from zero
+    label: str = ""  # its name and unit, where there are any
 
 
 @dataclass(frozen=True)
@@ -214,6 +215,7 @@ class SignalCurves(Curves):
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
+    labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
 
 
 @dataclass(frozen=True)

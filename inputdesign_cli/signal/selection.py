@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.bounds import Bounds, limiter_of
@@ -51,6 +51,9 @@ def best_record(
 
     Args:
         plant: for records of the length of the generator's.
+
+    Raises:
+        OutOfTimeError: the time limit passed before the first was made.
     """
     bounds, settings = bounds or Bounds(), generator.settings
     limiter = limiter_of(plant, settings, bounds)
@@ -59,7 +62,11 @@ def best_record(
     for number in range(1, max(settings.candidates, settings.most_candidates)):
         if number >= settings.candidates and candidates.suffices(best):
             break
-        best = min((best, candidates.record(_stream(settings.seed, number))), key=candidates.rank)
+        try:
+            other = candidates.record(_stream(settings.seed, number))
+        except OutOfTimeError:
+            break
+        best = min((best, other), key=candidates.rank)
     return best
 
 

@@ -54,6 +54,17 @@ def channels(spec: Spec) -> Iterator[PathDiagnostic]:
         yield _wrong_size("spectrum.given.amplitudes", spec.given.rows, "input", spec.plant.inputs)
 
 
+def named_channels(spec: Spec) -> Iterator[PathDiagnostic]:
+    """Names and units are those of channels that the plant has."""
+    sizes = ("u", spec.plant.inputs), ("y", spec.plant.outputs)
+    there = [f"{letter}{i + 1}" for letter, count in sizes for i in range(count)]
+    for name in spec.channels or ():
+        if name not in there:
+            message = f"the plant has no channel {name}"
+            hint = f"it has {', '.join(there)}"
+            yield PathDiagnostic("unknown-name", message, hint, ("channels", name), at_key=True)
+
+
 def _wrong_size(key: str, value: tuple, noun: str, size: int) -> PathDiagnostic:
     return PathDiagnostic(
         "wrong-shape",
@@ -67,10 +78,14 @@ def _wrong_size(key: str, value: tuple, noun: str, size: int) -> PathDiagnostic:
 def delays(spec: Spec) -> Iterator[PathDiagnostic]:
     """Dead times end within the record, and are not too many samples."""
     plant = spec.plant
-    if plant.kind != "continuous":
+    path: Path
+    if plant.kind == "state_space":
+        longest, path = plant.state_space.delay, ("plant", "state_space", "delay")
+    elif plant.kind == "continuous":
+        longest = max(max(row) for row in plant.continuous.delays)
+        path = ("plant", "continuous", "dead_time" if plant.continuous.kind == "process" else "delay")
+    else:
         return
-    longest = max(max(row) for row in plant.continuous.delays)
-    path = ("plant", "continuous", "dead_time" if plant.continuous.kind == "process" else "delay")
     whole = spec.experiment.samples * spec.sample_time
     if "samples" in spec.experiment.model_fields_set and longest >= whole:
         message = f"{{key}} is {show(longest)} {spec.time_unit}, and the experiment lasts {show(whole)}"

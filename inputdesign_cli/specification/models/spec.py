@@ -11,6 +11,7 @@ from pydantic import Field, PrivateAttr
 
 from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.accuracy import Accuracy
+from inputdesign_cli.specification.models.channels import Channels
 from inputdesign_cli.specification.models.experiment import Cost, Estimated, Experiment, Noise
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
@@ -45,6 +46,12 @@ class Spec(Section):
     )
     noise: Noise = Field(
         description="Noise on the output: variance, and polynomials C and D.", examples=[{"variance": 1.0}]
+    )
+    channels: Channels | None = Field(
+        default=None,
+        min_length=1,
+        description="What inputs u1, u2, .. and outputs y1, y2, .. are called, and their units.",
+        examples=[{"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "temperature", "unit": "degC"}}],
     )
     experiment: Experiment = Field(
         default=Experiment(), description="Samples, controller, prior information."
