@@ -20,7 +20,7 @@ from inputdesign_cli.design.convex.finite import FiniteProgram, MatrixPart, solv
 from inputdesign_cli.design.convex.limits import DensityPlace
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Face, Functional, smat, svec
+from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
 
 # The conic program is solved this much tighter than the gap that is asked for.
 _SOLVER_MARGIN = 1e-2
@@ -168,8 +168,12 @@ def _turned(
         return svec(turn @ information @ turn.T)
 
     maps = problem.information_maps[:, scenario]
-    parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
-    gains = worth * (np.concatenate(parts).T @ columns)
+    # Of a basis that grows, most functions have left the face.
+    used = np.flatnonzero(columns.any(axis=1))
+    gains = np.zeros((svec_length(len(turn)), columns.shape[1]))
+    for start in range(0, used.size, _AT_ONCE):
+        part = used[start : start + _AT_ONCE]
+        gains += worth * (turned(maps[part]).T @ columns[part])
     if problem.scaled:
         gains = np.column_stack([gains, s * turned(problem.scaled_information[scenario])])
     return gains, turned(problem.fixed_information[scenario])

@@ -310,6 +310,7 @@ class Problem:
         known = self._powers.get((kind, channel, scenario))
         if known is not None:
             return known
+        # Without this problem inside, which would keep the arrays of each that has grown beyond it.
         experiment = self.scenarios[scenario].experiment
 
         def density(w: Array) -> Array:
