@@ -13,6 +13,7 @@ from inputdesign_cli.accuracy.requirement import Entry, Requirement, Violation, 
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, graded_grid, local_maxima
+from inputdesign_cli.plant.frequencies import SLACK
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # The search comes this near to frequency zero, in shares of the band, where a flat maximum at zero is meant.
@@ -126,6 +127,12 @@ class OverFrequency(Requirement):
             lambda w: self.measure(self.rows(w) @ turn, w), self.grid, on_grid, above=above
         )
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
+
+    def most(self, information: Array) -> float:
+        """From the points of the grid: a peak between them stands no higher than `local_maxima` admits."""
+        on_grid = self.measure(self._grid_rows @ inverse_factor(information).T, self.grid)
+        top = float(on_grid.max())
+        return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
 
     def worst(self, information: Array) -> Violation:
         """The largest of the violations; one beside frequency zero is told to be there."""

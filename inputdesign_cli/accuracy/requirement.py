@@ -61,6 +61,10 @@ class Requirement(ABC):
     def cut(self, frequency: float | None) -> Cut:
         """The cone that enforces the requirement at this frequency."""
 
+    def most(self, information: Array) -> float:
+        """What the ratio does not exceed; where the search for its maximum is long, without that search."""
+        return worst(self.violations(information)).ratio
+
     def worst(self, information: Array) -> Violation:
         """The largest of the violations, for reports."""
         return worst(self.violations(information))

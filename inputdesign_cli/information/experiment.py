@@ -8,6 +8,7 @@ Criteria do not depend on the measure, as long as powers and information share i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -134,6 +135,19 @@ class Experiment(Coordinates):
             return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
         return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
+
+    def cost_density(self, weights: Sequence[tuple[PowerKind, int | None, float]], w: ArrayLike) -> NDArray:
+        """(n,) or (n, r, r): that of a weighted sum of powers, each of a kind and of a channel or all."""
+        t = None if self.loop is None else self.loop.responses(w)
+        total: NDArray | float = 0.0
+        for kind, channel, weight in weights:
+            if t is None or not self.depends_on_plant(kind):
+                total = total + weight * self.power_density(kind, w, channel)
+                continue
+            G = t.y_x if kind == "output" else t.u_x
+            rows = G if channel is None else G[:, channel : channel + 1]
+            total = total + weight * self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
+        return np.asarray(total)
 
     def depends_on_plant(self, kind: PowerKind) -> bool:
         """Whether a power is that of a signal that the plant takes part in, not of x itself."""

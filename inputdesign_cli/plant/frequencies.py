@@ -12,8 +12,8 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 _REFINEMENT = 6
 _ZOOM_POINTS = 8
 _ZOOM_STEPS = 6
-# A peak between two grid points may stand this much higher than both.
-_SLACK = 0.05
+SLACK = 0.05
+"""A peak between two grid points may stand this much higher than both, as a share of itself."""
 # Values that differ by less are those of a function that is flat there.
 _FLAT = 1e-12
 
@@ -89,7 +89,7 @@ def local_maxima(
     Returns:
         Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
     """
-    index = _peaks(values, above - _SLACK * abs(above) if np.isfinite(above) else above)
+    index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
     if index.size == 0:
         return np.zeros(0), np.zeros(0)
     around = np.unique(np.clip(index[:, None] + np.arange(-2, 2), 0, grid.size - 2))
@@ -97,7 +97,7 @@ def local_maxima(
     finer = np.concatenate([grid, inside])
     order = np.argsort(finer, kind="stable")
     finer, values = finer[order], np.concatenate([values, function(inside)])[order]
-    index = _peaks(values, above - _SLACK * abs(above) if np.isfinite(above) else above)
+    index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
     steps, rows = _fractions(_ZOOM_POINTS), np.arange(index.size)

@@ -68,7 +68,7 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
     if problem.goal == "factor":
         # All of M' scales, so that one look at the ratios gives the factor, above or below one.
         informations = candidate_at(problem, z, s).informations
-        factor = max((v.ratio for _, v in problem.violations(informations)), default=1.0) ** 2
+        factor = problem.largest(informations, default=1.0) ** 2
         return candidate_at(problem, factor * z, factor * s)
     factor, at = 1.0, set(places)
     for _ in range(12 + len(problem.others)):

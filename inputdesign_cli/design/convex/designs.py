@@ -153,6 +153,8 @@ def solve_design(
     whitened = whitened_problem(question, powers)
     problem = _suited(whitened, question, start)
     flat = replace(problem.on(flat_basis(problem.experiment)), mean_cost=False)
+    if question.others and _begins_flat(question.basis):
+        flat = replace(flat, finer=problem)
     white = _white(question, flat, power)
     white_level = float(white.z[0] / white.s)
     anywhere = _anywhere(question, whitened, powers)
@@ -181,6 +183,11 @@ def solve_design(
         found = replace(design, result=result, any_spectrum=proved)
         raise UnfinishedDesignError.of(found) from None
     return replace(design, result=result, any_spectrum=anything)
+
+
+def _begins_flat(basis: Basis) -> bool:
+    """Whether its first function is the flat spectrum of power one, so that its integrals are known."""
+    return basis.has_density and basis.even[0] == 1.0 and not np.any(basis.even[1:])
 
 
 def white_power(question: Question) -> float:

@@ -296,7 +296,7 @@ class _State:
         """The same, its best design with just the s that it needs: an interior one has room to spare."""
         if self.problem.goal != "factor":
             return self
-        worst = max((v.ratio for _, v in self.problem.violations(self.best.informations)), default=1.0)
+        worst = self.problem.largest(self.best.informations, default=1.0)
         best = candidate_at(self.problem, worst**2 * self.best.z, worst**2 * self.best.s)
         return replace(self, best=best)
 
@@ -346,7 +346,7 @@ def _first_state(problem: Problem, start: Array, interior: Array | None, known: 
         ),
     )
     state._add(list(known))
-    nearly = problem.violations(best.informations, above=_FIRST_CUTS)
+    nearly = problem.violations(best.informations, above=_FIRST_CUTS, few=FEW)
     state._add(_most_violated(problem, nearly, state.keys))
     if problem.side:
         close = problem.violations(best.informations / best.s, above=_FIRST_CUTS, side=True)
@@ -361,7 +361,7 @@ def _inner(problem: Problem, x: Array) -> Candidate:
     unit = candidate_at(problem, x, 1.0)
     if not problem.scaled:
         return unit
-    ratio = max((v.ratio for _, v in problem.violations(unit.informations)), default=0.0)
+    ratio = problem.largest(unit.informations, default=0.0)
     s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
     if problem.goal == "samples":
         s = 1.2 * scaled_up(problem, x, 1.0, []).s

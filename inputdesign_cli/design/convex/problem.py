@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -34,8 +34,6 @@ from inputdesign_cli.spectrum import Basis, Functional
 RequirementFactory = Callable[[Experiment], Requirement]
 Goal = Literal["cost", "factor", "samples"]
 Weight = float | tuple[float, ...]
-# Ratios are looked at down to this share of what is asked for, so that more is known of them later.
-_NEARLY = 0.6
 # So many scenarios are enough for a next step: what serves the worst few serves most of the others.
 FEW = 4
 
@@ -195,6 +193,8 @@ class Problem:
         _ = grown.information_maps, grown.grid
         for key in self._powers:
             grown.power(*key)
+        if self.mean_cost and self.others:
+            _ = grown._mean_price
         grown._before.clear()
         grown._products.update(self._products)
         grown._grids.update(self._grids)
@@ -281,7 +281,9 @@ class Problem:
     def price(self) -> Functional:
         """What x is measured by: the cost, or without one the sum of all powers over their upper limits."""
         if self.goal == "cost":
-            parts = [self._paid(kind, channel) * weight for kind, channel, weight in weights_of(self.cost)]
+            if self.mean_cost and self.others:
+                return self._mean_price
+            parts = [self.power(kind, channel) * weight for kind, channel, weight in weights_of(self.cost)]
         else:
             caps = [limit for limit in self.limits if limit.upper]
             parts = [self._limited(limit) * (1.0 / limit.bound) for limit in caps]
@@ -290,20 +292,30 @@ class Problem:
             total = total + part
         return total
 
-    def _paid(self, kind: PowerKind, channel: int | None) -> Functional:
-        """The power that is paid for: that of the nominal plant, or the mean over all."""
-        nominal = self.power(kind, channel)
-        if not (self.mean_cost and self.others and self.experiment.depends_on_plant(kind)):
-            return nominal
-        each = [self.power(kind, channel, number) for number in range(len(self.scenarios))]
+    @cached_property
+    def _mean_price(self) -> Functional:
+        """The mean of the cost over all plants."""
+        weights, plants = weights_of(self.cost), [scenario.experiment for scenario in self.scenarios]
         last: list[tuple[Array, NDArray]] = []
 
         def density(w: Array) -> NDArray:
             if not last or last[0][0] is not w:
-                last[:] = [(w, sum((one.density(w) for one in each), self._worthless(w)) / len(each))]
+                total = sum(plant.cost_density(weights, w) for plant in plants)
+                last[:] = [(w, np.asarray(total / len(plants)))]
             return last[0][1]
 
-        return Functional(np.mean([one.vector for one in each], axis=0), density)
+        def vector(basis: Basis) -> Array:
+            each = (
+                basis.integrals(partial(plant.cost_density, weights), plant.singularities) for plant in plants
+            )
+            return np.asarray(sum(each) / len(plants))
+
+        if self.finer is not None:
+            return Functional(self.finer._mean_price.vector[: self.basis.size], density)
+        if self._before:
+            known = self._before[0]._mean_price.vector
+            return Functional(np.concatenate([known, vector(self.basis.beyond(known.size))]), density)
+        return Functional(vector(self.basis), density)
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
         """The power of input, output or excitation (of one channel) as a functional of the spectrum."""
@@ -443,19 +455,33 @@ class Problem:
         """
         if not self.others:
             return list(self._violated(0, informations[0], above, side))
-        seen = self._seen[int(side)]
-        most, found, bad = seen.most(informations), list[tuple[int, Violation]](), 0
-        for number in np.argsort(-most, kind="stable").tolist():
-            if most[number] <= above:
-                break
-            own = list(self._violated(number, informations[number], _NEARLY * above, side))
-            worst_here = max((violation.ratio for _, violation in own), default=max(_NEARLY * above, 0.0))
-            seen.note(number, informations[number], worst_here)
-            found += [(index, violation) for index, violation in own if violation.ratio > above]
-            bad += worst_here > above
+        found, bad = list[tuple[int, Violation]](), 0
+        for number in self._by_most(informations, above, side):
+            own = list(self._violated(number, informations[number], above, side))
+            found += own
+            bad += bool(own)
             if few is not None and bad >= few:
                 break
         return found
+
+    def largest(self, informations: NDArray[np.float64], *, default: float) -> float:
+        """The largest ratio of the requirements, side ones left out; the default without any."""
+        found: list[float] = []
+        for number in self._by_most(informations, -np.inf, False) if self.others else [0]:
+            if found and self._seen[0].ratios[number] <= max(found):
+                break  # the next ones are no larger
+            found += [v.ratio for _, v in self._violated(number, informations[number], -np.inf, False)]
+        return max(found, default=default)
+
+    def _by_most(self, informations: NDArray[np.float64], above: float, side: bool) -> list[int]:
+        """The scenarios whose ratios may exceed `above`, those that may have the largest first."""
+        seen = self._seen[int(side)]
+        for number in np.flatnonzero(seen.most(informations) > above).tolist():
+            asked = [self.asked[index] for index in self._asked_of[number]]
+            most = [a.requirement.most(informations[number]) for a in asked if a.side == side]
+            seen.note(number, informations[number], max(most, default=0.0))
+        now = seen.most(informations)
+        return [n for n in np.argsort(-now, kind="stable").tolist() if now[n] > above]
 
     def _violated(
         self, number: int, information: Array, above: float, side: bool
