@@ -16,6 +16,7 @@ import scipy.optimize
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.identification.estimate import BatchEstimate
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts, fit_records
 from inputdesign_cli.identification.record_problem import Point, evaluate
 from inputdesign_cli.identification.records import Record, Records
@@ -188,6 +189,12 @@ class ReparametrisedKind:
     def holding(self, known: NDArray[np.bool_]) -> ReparametrisedKind:
         """The same."""
         return self
+
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """Those of the coefficients."""
+        coefficients = self.model.parametrisation.at(theta).coefficients
+        found = self.coefficients.extensions(coefficients, feedback=feedback)
+        return tuple(replace(extension, nested=False) for extension in found)
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
