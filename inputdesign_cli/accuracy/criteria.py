@@ -45,17 +45,23 @@ class Criterion(OneCondition):
     def _inverse(self) -> Array:
         return np.asarray(np.linalg.inv(self.scaling), dtype=float)
 
+    @cached_property
+    def _gain(self) -> float:
+        """(det G)^{2/k}."""
+        return float(np.exp(2.0 * np.linalg.slogdet(self.scaling)[1] / len(self.scaling)))
+
     def level(self, information: Array) -> float:
         """The quantity that must reach one; 0 where M is singular, except for T."""
         if self.letter == "T":
             return float(np.sum(self.scaling * (self.scaling @ information)))
         try:
-            half = scipy.linalg.solve_triangular(np.linalg.cholesky(information), self._inverse, lower=True)
+            factor = np.linalg.cholesky(information)
         except np.linalg.LinAlgError:
             return 0.0
-        singular = np.linalg.svd(half, compute_uv=False)
         if self.letter == "D":
-            return float(np.exp(-2.0 * np.log(singular).mean()))
+            return self._gain * float(np.exp(2.0 * np.log(np.diag(factor)).mean()))
+        half = scipy.linalg.solve_triangular(factor, self._inverse, lower=True)
+        singular = np.linalg.svd(half, compute_uv=False)
         return float(1.0 / np.sum(singular**2) if self.letter == "A" else 1.0 / singular[0] ** 2)
 
     def value(self, level: float) -> float:
@@ -72,9 +78,7 @@ class Criterion(OneCondition):
     def cut(self, frequency: float | None) -> Cut:
         """The criterion itself, as a cone."""
         if self.letter == "D":
-            return DeterminantCut(
-                float(np.exp(-2.0 * np.linalg.slogdet(self.scaling)[1] / len(self.scaling)))
-            )
+            return DeterminantCut(1.0 / self._gain)
         if self.letter == "A":
             return VarianceCut(self._inverse)
         if self.letter == "E":

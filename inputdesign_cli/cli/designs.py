@@ -6,10 +6,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import typer
+
 from inputdesign_cli.cli.options import (
     Confine,
     Figures,
     Json,
+    KeepPartial,
     NoOutput,
     Output,
     Overrides,
@@ -19,8 +22,10 @@ from inputdesign_cli.cli.options import (
 )
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.streams import ending_early
 from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
+from inputdesign_cli.compute.time_limit import stoppable
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -38,6 +43,7 @@ def solve(
     output: Output = None,
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
+    keep_partial: KeepPartial = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -47,9 +53,16 @@ def solve(
     Writes a run directory with the spectrum, the signal to apply, the model error that it buys, and the
     proof of optimality; prints a summary.
     """
-    results = _results("solve", spec, overrides, confine, quiet)
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    if not keep_partial:
+        results = _results("solve", spec, overrides, confine, quiet)
+        keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+        return
+    with stoppable() as stop, ending_early(stop) as came:
+        results = _results("solve", spec, overrides, confine, quiet)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    if came:
+        raise typer.Exit(128 + came[0])
 
 
 def analyse(

@@ -145,6 +145,14 @@ Json = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+KeepPartial = Annotated[
+    bool,
+    typer.Option(
+        "--keep-partial",
+        help="After Ctrl-C or SIGTERM write the best design so far, as after solver.time_limit; a second one "
+        "ends at once.",
+    ),
+]
 Figures = Annotated[
     bool, typer.Option("--figures/--no-figures", help="Draw the figures of the run, or leave them out.")
 ]

@@ -7,6 +7,8 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import BinaryIO, NoReturn
 
@@ -77,6 +79,33 @@ def prepare_signals() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _terminate)
+
+
+@contextmanager
+def ending_early(stop: Callable[[], None]) -> Iterator[list[int]]:
+    """The first Ctrl-C or SIGTERM asks for the end by `stop`, the next one ends the program as usual.
+
+    The list has the number of the signal that came.
+    """
+    came: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    def first(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+        restore()
+        stop()
+        sys.stderr.write("ending with what is known so far; once more ends at once\n")
+
+    for number in before:
+        signal.signal(number, first)
+    try:
+        yield came
+    finally:
+        restore()
 
 
 def _terminate(number: int, _frame: FrameType | None) -> NoReturn:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from math import inf
+from threading import Event
 
 from inputdesign_cli.errors import InaccurateError
 
 
 class OutOfTimeError(InaccurateError):
-    """The time limit has passed; `reached` is what a design underway had attained, and its proved bound."""
-
-    reached: tuple[float, float] | None = None
+    """The time limit has passed, or somebody asked for the end."""
 
 
 _end: ContextVar[float] = ContextVar("end", default=inf)
+_stopped: ContextVar[Event | None] = ContextVar("stopped", default=None)
 
 
 @contextmanager
@@ -30,6 +30,28 @@ def time_limit(seconds: float) -> Iterator[None]:
         _end.reset(token)
 
 
+@contextmanager
+def finishing() -> Iterator[None]:
+    """What is computed inside has the time that it takes: a few last steps of what ran out of it."""
+    tokens = _end.set(inf), _stopped.set(None)
+    try:
+        yield
+    finally:
+        _end.reset(tokens[0])
+        _stopped.reset(tokens[1])
+
+
+@contextmanager
+def stoppable() -> Iterator[Callable[[], None]]:
+    """What is computed inside ends as if its time were over, once the function given to it is called."""
+    stopped = Event()
+    token = _stopped.set(stopped)
+    try:
+        yield stopped.set
+    finally:
+        _stopped.reset(token)
+
+
 def seconds_left() -> float:
     """What is left of the time limit; infinite where there is none.
 
@@ -37,14 +59,31 @@ def seconds_left() -> float:
         OutOfTimeError: `out-of-time` when nothing is left.
     """
     left = _end.get() - time.monotonic()
-    if left <= 0.0:
+    if left <= 0.0 or was_stopped():
         raise out_of_time("")
     return left
 
 
+def time_is_over() -> bool:
+    """Whether nothing is left of the time limit, or somebody asked for the end."""
+    return _end.get() <= time.monotonic() or was_stopped()
+
+
+def was_stopped() -> bool:
+    """Whether somebody asked for the end of what is being computed."""
+    stopped = _stopped.get()
+    return stopped is not None and stopped.is_set()
+
+
+def what_ended() -> str:
+    """What ends a computation that ran out of time, as the subject of a sentence."""
+    return "the interrupt" if was_stopped() else "solver.time_limit"
+
+
 def out_of_time(reached: str) -> OutOfTimeError:
     """The error, with a sentence on what was reached."""
-    told = "the answer was not found within solver.time_limit"
+    when = "before the interrupt" if was_stopped() else "within solver.time_limit"
+    told = f"the answer was not found {when}"
     return OutOfTimeError.because(
         "out-of-time",
         f"{told}: {reached}" if reached else told,

@@ -12,6 +12,7 @@ from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
+from inputdesign_cli.plant.model import Listed
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 
@@ -31,7 +32,7 @@ class Extension:
         nested: whether that structure has no further freedom than the one parameter.
     """
 
-    model: Model
+    model: Listed
     name: str
     what: str
     record: Callable[[Array, Array], Record]

@@ -39,7 +39,9 @@ class WeightedProducts:
 
 
 def _by_output(F: ComplexArray) -> list[tuple[NDArray[np.intp], ComplexArray]]:
-    found = []
+    found: list[tuple[NDArray[np.intp], ComplexArray]] = []
+    if F.shape[2] == 1:  # all parameters matter to the only output
+        return [(np.arange(F.shape[1]), np.ascontiguousarray(F[:, :, 0].swapaxes(1, 2)))]
     for output in range(F.shape[2]):
         rows = F[:, :, output]
         size = np.abs(rows).max(axis=(0, 2), initial=0.0)
@@ -52,7 +54,7 @@ def _summed(outputs: list[tuple[NDArray[np.intp], ComplexArray]], weight: Array)
     n, r, _ = outputs[0][1].shape
     total = np.zeros((n, r, r), dtype=complex)
     for used, rows in outputs:
-        turned = rows @ weight[np.ix_(used, used)]
+        turned = rows @ (weight if used.size == len(weight) else weight[np.ix_(used, used)])
         if r == 1:
             total[:, 0, 0] += np.einsum("nk,nk->n", rows[:, 0].conj(), turned[:, 0])
         else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -42,7 +42,7 @@ def _edges(
     panels = np.union1d(panels, knots[(knots > lo) & (knots < hi)])
     left, right = panels[:-1], panels[1:]
     done: list[Array] = []
-    near = np.asarray(singularities, dtype=complex)
+    near = singularities
     while left.size and near.size:
         nearest = np.clip(near.real[None, :], left[:, None], right[:, None])
         distance = np.hypot(nearest - near.real, np.maximum(near.imag, 1e-12)).min(axis=1)
@@ -76,12 +76,27 @@ def graded_quadrature(
         refine: how often every panel is halved, for the check by doubling.
         knots: frequencies at which the integrand has a kink; panels end there.
     """
+    near = np.asarray(singularities, dtype=complex)
+    return _panels(
+        near.tobytes(), np.asarray(knots, dtype=float).tobytes(), float(lo), float(hi), highest_lag, refine
+    )
+
+
+# The integrals of one design ask for the same few rules again and again.
+@lru_cache(maxsize=32)
+def _panels(
+    singularities: bytes, knots: bytes, lo: float, hi: float, highest_lag: int, refine: int
+) -> Quadrature:
+    near, ends = np.frombuffer(singularities, dtype=complex), np.frombuffer(knots)
     longest = min(0.5, _PHASE_PER_PANEL / max(highest_lag, 1)) / 2**refine
-    edges = _edges(lo, hi, singularities, longest, 1.0 / 2**refine, knots)
+    edges = _edges(lo, hi, near, longest, 1.0 / 2**refine, ends)
     x, weight = _rule()
     half = 0.5 * np.diff(edges)[:, None]
     middle = 0.5 * (edges[:-1] + edges[1:])[:, None]
-    return Quadrature((middle + half * x).ravel(), (half * weight / np.pi).ravel())
+    rule = Quadrature((middle + half * x).ravel(), (half * weight / np.pi).ravel())
+    for shared in (rule.nodes, rule.weights):
+        shared.setflags(write=False)
+    return rule
 
 
 def integrate(

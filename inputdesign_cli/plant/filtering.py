@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
+import scipy.linalg.blas
 from numpy.typing import ArrayLike, NDArray
 
 # Samples times coefficients beyond which it pays to load scipy.signal: that takes a third of the start.
@@ -25,14 +25,19 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis
         import scipy.signal
 
         return np.asarray(scipy.signal.lfilter(b, a, values, axis=axis))
-    columns = np.moveaxis(values, axis, -1).reshape(-1, values.shape[axis])
-    driven = columns * b[0]
-    for lag in range(1, min(b.size, columns.shape[1])):
-        driven[:, lag:] += b[lag] * columns[:, :-lag]
-    if a.size > 1:
-        driven = _recursion(a, driven)
-    shape = np.moveaxis(values, axis, -1).shape
-    return np.moveaxis(driven.reshape(shape), -1, axis)
+    if values.ndim == 1:
+        return _of_rows(b, a, values[None])[0]
+    turned = np.moveaxis(values, axis, -1)
+    rows = _of_rows(b, a, turned.reshape(-1, values.shape[axis]))
+    return np.moveaxis(rows.reshape(turned.shape), -1, axis)
+
+
+def _of_rows(b: NDArray, a: NDArray, rows: NDArray) -> NDArray:
+    """The same of rows (m, n), a[0] being one."""
+    driven = rows * b[0]
+    for lag in range(1, min(b.size, rows.shape[1])):
+        driven[:, lag:] += b[lag] * rows[:, :-lag]
+    return _recursion(a, driven) if a.size > 1 else driven
 
 
 def _recursion(a: NDArray, driven: NDArray) -> NDArray:
@@ -40,5 +45,5 @@ def _recursion(a: NDArray, driven: NDArray) -> NDArray:
     samples = driven.shape[1]
     order = min(a.size, samples) - 1
     diagonals = np.repeat(a[: order + 1, None].astype(driven.dtype), samples, axis=1)
-    solve = scipy.linalg.get_blas_funcs("tbsv", (driven,))
+    solve = scipy.linalg.blas.ztbsv if np.iscomplexobj(driven) else scipy.linalg.blas.dtbsv
     return np.array([solve(order, diagonals, row, lower=1, diag=1) for row in driven])

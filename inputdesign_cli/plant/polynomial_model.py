@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label
+from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label, row_parameters
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -78,7 +78,8 @@ class PolynomialModel(Parametrised):
             if letter in "bf":
                 found += self._entry_parameters(letter)
             else:
-                found += self._row_parameters(letter, {"a": self.A, "c": self.C, "d": self.D}[letter])
+                rows = {"a": self.A, "c": self.C, "d": self.D}[letter]
+                found += row_parameters(letter, rows, self.outputs, self.inputs)
         return tuple(found)
 
     def _entry_parameters(self, letter: str) -> list[Parameter]:
@@ -95,22 +96,6 @@ class PolynomialModel(Parametrised):
                     Parameter(letter, lag, ((i, j),), label, float(values[lag]))
                     for lag in range(first, len(values))
                 ]
-        return found
-
-    def _row_parameters(self, letter: str, rows: Sequence[Array]) -> list[Parameter]:
-        found = []
-        for i, values in enumerate(rows):
-            common = len(rows) == 1
-            outputs = range(self.outputs) if common else [i]
-            places = (
-                tuple((o, j) for o in outputs for j in range(self.inputs))
-                if letter == "a"
-                else tuple((o, o) for o in outputs)
-            )
-            label = "" if common else f"[{i + 1}]"
-            found += [
-                Parameter(letter, lag, places, label, float(values[lag])) for lag in range(1, len(values))
-            ]
         return found
 
     @cached_property
@@ -223,21 +208,22 @@ class PolynomialModel(Parametrised):
         q = unit_circle(w)
         gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)
         C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
-        noise = {
-            (letter, i): (factor[:, None] * source[:, i])
-            for i in range(self.outputs)
-            for letter, factor, source in (
-                ("a", -D[i] / C[i], y),
-                ("c", 1.0 / C[i], e),
-                ("d", -1.0 / D[i], e),
-            )
-        }
+        letters = {parameter.letter for parameter in self.parameters}
+        noise: dict[tuple[str, int], ComplexArray] = {}
+        for i in range(self.outputs):
+            if "a" in letters:
+                noise["a", i] = (-D[i] / C[i])[:, None] * y[:, i]
+            if "c" in letters:
+                noise["c", i] = e[:, i] / C[i][:, None]
+            if "d" in letters:
+                noise["d", i] = -e[:, i] / D[i][:, None]
         plant: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:
             F = evaluate(self.F[i][j], q)
             filtered = D[i] / (C[i] * F)
             plant["b", i, j] = filtered[:, None] * u[:, j]
-            plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
+            if "f" in letters:
+                plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
         for index, parameter in enumerate(self.parameters):
             shift = (q**parameter.power)[:, None]
             if parameter.letter in "bf":

@@ -92,7 +92,7 @@ class SignalGenerator:
             whole = self.factor.filtered(self.samples, rng)[:: settings.hold, None]
         else:
             whole = np.tile(self._period(rng), (settings.periods, 1))
-        return whole * settings.taper(len(whole))[:, None]
+        return whole * settings.taper(len(whole))[:, None] if settings.ramp else whole
 
     def _period(self, rng: np.random.Generator) -> Array:
         method, lines, length = self.method, self.lines, self.period

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.bounds import Bounds, limiter_of
@@ -51,17 +51,28 @@ def best_record(
 
     Args:
         plant: for records of the length of the generator's.
+
+    Raises:
+        OutOfTimeError: the time limit passed before the first was made.
     """
     bounds, settings = bounds or Bounds(), generator.settings
     limiter = limiter_of(plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
-    streams = np.random.SeedSequence(settings.seed).spawn(max(settings.candidates, settings.most_candidates))
-    best = candidates.record(np.random.default_rng(streams[0]))
-    for number, stream in enumerate(streams[1:], start=1):
+    best = candidates.record(_stream(settings.seed, 0))
+    for number in range(1, max(settings.candidates, settings.most_candidates)):
         if number >= settings.candidates and candidates.suffices(best):
             break
-        best = min((best, candidates.record(np.random.default_rng(stream))), key=candidates.rank)
+        try:
+            other = candidates.record(_stream(settings.seed, number))
+        except OutOfTimeError:
+            break
+        best = min((best, other), key=candidates.rank)
     return best
+
+
+def _stream(seed: int, number: int) -> np.random.Generator:
+    """Of the candidate of this number: the child that `SeedSequence.spawn` would make."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from inputdesign_cli.plant.polynomial import Array
 
@@ -40,14 +39,18 @@ def spectral_factor(autocovariances: Array) -> SpectralFactor:
     """
     c = np.asarray(autocovariances, dtype=float)
     m = c.size - 1
+    lags = np.arange(m + 1)
+    difference, total = lags - lags[:, None], lags + lags[:, None]
+    # One past the last tap stands a zero.
+    toeplitz = np.where(difference < 0, m + 1, difference)
+    hankel = np.minimum(total, m + 1)
     taps = np.zeros(m + 1)
     taps[0] = np.sqrt(np.abs(c).sum())
     best = SpectralFactor(taps, _residual(taps, c))
     for _ in range(_MAX_STEPS):
-        toeplitz = scipy.linalg.toeplitz(np.concatenate([taps[:1], np.zeros(m)]), taps)
-        hankel = scipy.linalg.hankel(taps)
+        padded = np.append(taps, 0.0)
         try:
-            taps = np.linalg.solve(toeplitz + hankel, c + autocorrelation(taps))
+            taps = np.linalg.solve(padded[toeplitz] + padded[hankel], c + autocorrelation(taps))
         except np.linalg.LinAlgError:
             break
         residual = _residual(taps, c)

@@ -13,10 +13,11 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time
+from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time, seconds_left, what_ended
 from inputdesign_cli.design.convex.designs import (
     Design,
     Question,
+    UnfinishedDesignError,
     solve_design,
     white_power,
     whitened_problem,
@@ -50,13 +51,13 @@ from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
+from inputdesign_cli.tasks.result.status import proof_status
+from inputdesign_cli.tasks.result.unfinished import no_record_in_time, unfinished_notes
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A record that needs a larger alpha is made anew, this often at the most.
 _RECORDS = 4
-# A gap up to this many tolerances is "almost optimal"; beyond, there is no answer.
-_ALMOST = 100.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class ConvexTask:
 
         Raises:
             InfeasibleError: nothing within the limits meets the requirements.
-            InaccurateError: the proof did not close.
+            InaccurateError: the proof did not close, or nothing that meets everything was found in time.
         """
         return self._delivered().results
 
@@ -110,7 +111,10 @@ class ConvexTask:
             SpecError: `nothing-to-simulate`; `not-supported` for an input to compare with.
             InfeasibleError, InaccurateError: see `solve`.
         """
-        return simulate(self.simulation, self._delivered(), executor)
+        delivered = self._delivered()
+        if delivered.record is None:
+            seconds_left()  # or else its time is the reason
+        return simulate(self.simulation, delivered, executor)
 
     def _delivered(self) -> Delivered:
         started = time.perf_counter()
@@ -122,11 +126,11 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
+        notes = unfinished_notes(result) if "ended_by" in how else []
         try:
             made = self._recorded(done)
         except OutOfTimeError:
-            value = result["objective"]["value"]
-            raise out_of_time(f"the design is proved (value {value:.6g}), but not yet its record") from None
+            made = Made(None, self.record, done.design, notes=(no_record_in_time(),))
         record = made.record
         tables, curves = self._illustrations(done, record)
         files: dict[str, bytes] = {}
@@ -135,7 +139,7 @@ class ConvexTask:
             tables["signal"], curves["signal"] = signal_curves(made.request, self.header.units, record)
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
-            notes = [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
+            notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
             known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
@@ -234,14 +238,20 @@ class ConvexTask:
         return Designed(self.header, self.question, design, experiment, self.cost, confidence), how
 
     def _by_exchange(self) -> tuple[Design, dict[str, Json]]:
+        ended: dict[str, Json] = {}
         try:
             design = solve_design(
                 self.question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
             )
         except UnreachableError as unreachable:
             raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
+        except UnfinishedDesignError as unfinished:
+            if self.calibration is not None:  # it need not keep the confidence that alpha is sought for
+                raise
+            design, ended = unfinished.design, {"ended_by": what_ended()}
         found = design.result
-        if found.gap > _ALMOST * self.tolerance:
+        status = proof_status(found.gap, self.tolerance)
+        if status == "gap_open" and not ended:
             raise InaccurateError.because(
                 "gap-not-closed",
                 f"the design is proved only to within {found.gap:.1e} of the optimum; solver.tolerance "
@@ -250,14 +260,15 @@ class ConvexTask:
                 "that are nearly indistinguishable",
                 key="solver.tolerance",
             )
-        status = "optimal" if found.gap <= self.tolerance else "almost_optimal"
-        return design, {
+        how: dict[str, Json] = {
             "method": "exchange",
             "status": "nothing_needed" if found.objective == 0.0 else status,
             "rounds": found.rounds,
             "cuts": found.cuts,
-            "any_spectrum_gap": design.any_spectrum.gap,
         }
+        if design.any_spectrum is not None:
+            how["any_spectrum_gap"] = design.any_spectrum.gap
+        return design, how | ended
 
     def _by_grid(self, method: GridMethod) -> tuple[Design, dict[str, Json]]:
         white = replace(self.question, basis=flat_basis(self.experiment))
@@ -287,6 +298,10 @@ class ConvexTask:
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
         least = int(np.ceil(result["objective"]["lower_bound"]))
+        if least <= most and "ended_by" in result["solver"]:
+            raise out_of_time(
+                f"the best design so far takes {result['samples']} samples, and limits.samples is {most}"
+            )
         longest = replace(self.question, experiment=replace(self.experiment, samples=most), goal="factor")
         best = solve_design(longest, tolerance=self.tolerance)
         problem = best.problem.on(best.result.basis)

@@ -1,5 +1,8 @@
 """What tests of several tasks share."""
 
+from importlib import import_module
+
+import clarabel
 import pytest
 
 from inputdesign_cli.runs.results import Table
@@ -16,3 +19,28 @@ def write(tmp_path):
         return path
 
     return written
+
+
+class Clock:
+    """In place of the module time: it goes on only when told."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+
+@pytest.fixture
+def slow_solver(monkeypatch):
+    """Each call of the solver takes three seconds of a clock of its own; the limits that it was given."""
+    clock, given, make = Clock(), [], clarabel.DefaultSolver
+
+    def slow(*arguments):
+        given.append(arguments[-1].time_limit)
+        clock.now += 3.0
+        return make(*arguments)
+
+    monkeypatch.setattr(import_module("inputdesign_cli.compute.time_limit"), "time", clock)
+    monkeypatch.setattr(clarabel, "DefaultSolver", slow)
+    return given

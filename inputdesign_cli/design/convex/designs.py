@@ -22,7 +22,7 @@ from inputdesign_cli.design.convex.candidate import (
     scaled_up,
 )
 from inputdesign_cli.design.convex.certificate import Certificate
-from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
+from inputdesign_cli.design.convex.exchange import ExchangeResult, UnfinishedError, exchange
 from inputdesign_cli.design.convex.feasible import strictly_feasible
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit, implied_power
 from inputdesign_cli.design.convex.problem import Goal, Problem, RequirementFactory, Weight
@@ -77,7 +77,8 @@ class Design:
     `problem` is stated in coordinates whitened by flat excitation (`balanced_powers`). `white` is even
     over the inputs and meets the same requirements (or exhausts the same limits); `white_power` is its power,
     `white_within` tells whether it keeps to the limits. `any_spectrum` is the same problem over all
-    spectra; its certificate bounds every excitation whatever (limits on the density left out).
+    spectra; its certificate bounds every excitation whatever (limits on the density left out). None where
+    there was no time for it.
     """
 
     problem: Problem
@@ -85,7 +86,20 @@ class Design:
     white_power: float
     white_within: bool
     result: ExchangeResult
-    any_spectrum: ExchangeResult
+    any_spectrum: ExchangeResult | None
+
+
+class UnfinishedDesignError(OutOfTimeError):
+    """The time limit has passed; `design` is the best so far, with what is proved of it."""
+
+    design: Design
+
+    @classmethod
+    def of(cls, design: Design) -> UnfinishedDesignError:
+        """The error that tells what the design reaches."""
+        error = cls(_stopped(design).diagnostics)
+        error.design = design
+        return error
 
 
 def solve_design(
@@ -97,7 +111,8 @@ def solve_design(
         SpecError: `not-identifiable` when no excitation can tell some parameters apart;
             `too-few-lines` when the given lines cannot.
         UnreachableError: the requirements cannot be met within the limits.
-        OutOfTimeError: with the best design so far.
+        UnfinishedDesignError: with the best design so far.
+        OutOfTimeError: no design that meets everything is known yet.
     """
     power = white_power(question)
     powers = balanced_powers(question, power or 1.0)
@@ -113,15 +128,24 @@ def solve_design(
         return Design(problem, white, 0.0, True, _nothing(problem), _nothing(anywhere))
     within = excess(flat, white) <= _KEEPS
     _check_excites(problem, start)
-    result = _without_faint_lines(problem, _solve(problem, start, tolerance))
+    design = Design(problem, white, white_level, within, _nothing(problem), None)
+    try:
+        result = _without_faint_lines(problem, _solve(problem, start, tolerance))
+    except UnfinishedError as ended:
+        result = _without_faint_lines(problem, ended.found)
+        anything = result if question.basis.free else None
+        found = replace(design, result=result, any_spectrum=anything)
+        raise UnfinishedDesignError.of(found) from None
     if question.basis.free:
-        return Design(problem, white, white_level, within, result, result)
+        return replace(design, result=result, any_spectrum=result)
     loose = max(tolerance, any_spectrum_tolerance)
     try:
         anything = _solve(anywhere, anywhere.basis.spread(powers), loose, known=result.active)
-    except OutOfTimeError:
-        raise _stopped(problem, (result.objective, result.certificate.bound)) from None
-    return Design(problem, white, white_level, within, result, anything)
+    except OutOfTimeError as ended:
+        proved = ended.found if isinstance(ended, UnfinishedError) else None
+        found = replace(design, result=result, any_spectrum=proved)
+        raise UnfinishedDesignError.of(found) from None
+    return replace(design, result=result, any_spectrum=anything)
 
 
 def white_power(question: Question) -> float:
@@ -207,28 +231,65 @@ def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
 
 
 def _solve(problem: Problem, start: Array, tolerance: float, known: Sequence[Place] = ()) -> ExchangeResult:
-    floors = problem.has_floors
-    limited = bool(problem.limits or problem.densities)
+    floors, limited = problem.has_floors, bool(problem.limits or problem.densities)
+    free: ExchangeResult | None = None
     if problem.goal == "cost" and limited and not floors:
         # Limits that the cheapest design keeps anyway cost nothing.
         unlimited = replace(problem, limits=(), densities=(), finer=problem)
-        free = exchange(unlimited, start, tolerance=tolerance, known=known)
-        kept = problem.on(free.basis)
-        if excess(kept, candidate_at(kept, free.x, 1.0)) <= _KEEPS:
-            no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
-            return replace(free, certificate=no_weight)
+        try:
+            free = exchange(unlimited, start, tolerance=tolerance, known=known)
+        except UnfinishedError as ended:
+            raise _within_limits(ended, problem, start, ended.found) from None
+        if _keeps_limits(problem, free):
+            return _unweighted(problem, free)
     basis, interior = problem.basis, None
     if floors or problem.side or (problem.goal == "cost" and limited):
-        basis, interior = strictly_feasible(problem, start)
-    try:
-        return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior, known=known)
-    except OutOfTimeError as ended:
-        raise ended if ended.reached is None else _stopped(problem, ended.reached) from None
+        try:
+            basis, interior = strictly_feasible(problem, start)
+        except OutOfTimeError as ended:
+            raise _within_limits(ended, problem, start, free) from None
+    return exchange(problem.on(basis), start, tolerance=tolerance, interior=interior, known=known)
 
 
-def _stopped(problem: Problem, reached: tuple[float, float]) -> OutOfTimeError:
+def _within_limits(
+    ended: OutOfTimeError, problem: Problem, start: Array, free: ExchangeResult | None
+) -> OutOfTimeError:
+    """The error with a design that keeps the limits, if one is known.
+
+    Args:
+        free: of the problem without limits. It may keep them, or else even excitation; its bound holds.
+    """
+    within = None if free is None else _known_within_limits(problem, start, free)
+    if within is None:
+        return out_of_time("no design within the limits is known yet")
+    return UnfinishedError.of(ended, within)
+
+
+def _known_within_limits(problem: Problem, start: Array, free: ExchangeResult) -> ExchangeResult | None:
+    if _keeps_limits(problem, free):
+        return _unweighted(problem, free)
+    even = scaled_up(replace(problem, limits=(), densities=(), finer=problem), start, 0.0, [])
+    found = replace(
+        free, basis=problem.basis, x=even.z, objective=even.objective, information=even.information, active=()
+    )
+    return _unweighted(problem, found) if _keeps_limits(problem, found) else None
+
+
+def _keeps_limits(problem: Problem, found: ExchangeResult) -> bool:
+    kept = problem.on(found.basis)
+    return excess(kept, candidate_at(kept, found.x, 1.0)) <= _KEEPS
+
+
+def _unweighted(problem: Problem, free: ExchangeResult) -> ExchangeResult:
+    """A design without limits as one of the problem with limits, which have no weight."""
+    no_weight = replace(free.certificate, limits=np.zeros(len(problem.limits)))
+    return replace(free, certificate=no_weight)
+
+
+def _stopped(design: Design) -> OutOfTimeError:
     """The error that tells the best design so far and what is proved of all others."""
-    value, bound = reached
+    problem = design.problem
+    value, bound = design.result.objective, design.result.certificate.bound
     criterion = problem.stated_criterion
     if criterion is not None:
         best, most = criterion.value(1.0 / value), criterion.value(1.0 / max(bound, 1e-300))

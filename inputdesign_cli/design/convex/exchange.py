@@ -52,6 +52,19 @@ _PATIENCE, _PATIENCE_GROWING = 6, 16
 Enough = Callable[[float, float], bool]
 
 
+class UnfinishedError(OutOfTimeError):
+    """The time limit has passed; `found` is the best so far, with what is proved of it."""
+
+    found: ExchangeResult
+
+    @classmethod
+    def of(cls, ended: OutOfTimeError, found: ExchangeResult) -> UnfinishedError:
+        """The error that says the same, with what was found."""
+        error = cls(ended.diagnostics)
+        error.found = found
+        return error
+
+
 @dataclass(frozen=True)
 class ExchangeResult:
     """A spectrum `x` of `basis` that meets everything, its information, and the proved bound.
@@ -108,7 +121,7 @@ def exchange(
         known: places that are likely to bind, such as those of a like design: cuts to begin with.
 
     Raises:
-        OutOfTimeError: with what was reached.
+        UnfinishedError: with what was reached.
     """
     done = enough or (lambda objective, bound: False)
     coarser = [] if interior is not None else problem.basis.coarser()
@@ -126,9 +139,7 @@ def exchange(
             try:
                 solved = state.improve(tolerance)
             except OutOfTimeError as ended:
-                if stage is problem:
-                    ended.reached = (state.best.objective, state.certificate.bound)
-                raise
+                raise UnfinishedError.of(ended, _result(state.on(problem).tight(), rounds)) from None
             gaps.append(state.gap)
             tell(Round(rounds, state.best.objective, state.certificate.bound, len(state.cuts)))
             grows = state.problem.basis.size > stage.basis.size
@@ -138,10 +149,14 @@ def exchange(
                 break
             if done(state.best.objective, state.certificate.bound):
                 break
-    best = state.best
+    return _result(state, rounds)
+
+
+def _result(state: _State, rounds: int) -> ExchangeResult:
+    best, problem = state.best, state.problem
     whole = problem.goal == "samples" or not problem.scaled
     return ExchangeResult(
-        basis=state.problem.basis,
+        basis=problem.basis,
         x=best.z / best.s,
         s=best.s,
         objective=best.objective,
@@ -260,6 +275,23 @@ class _State:
         if self.interior is not None:
             self.interior = replace(self.interior, z=np.pad(self.interior.z, (0, more)))
         self.rows = [on_basis(problem, row) for row in self.rows]
+
+    def on(self, problem: Problem) -> _State:
+        """The best so far as a spectrum of `problem`, with the proof that holds there."""
+        if self.problem.basis.size >= problem.basis.size:
+            return self
+        if self.solved:
+            return self.moved_to(problem)
+        z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
+        return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
+
+    def tight(self) -> _State:
+        """The same, its best design with just the s that it needs: an interior one has room to spare."""
+        if self.problem.goal != "factor":
+            return self
+        worst = max((v.ratio for _, v in self.problem.violations(self.best.information)), default=1.0)
+        best = candidate_at(self.problem, worst**2 * self.best.z, worst**2 * self.best.s)
+        return replace(self, best=best)
 
     def moved_to(self, problem: Problem) -> _State:
         """The same knowledge for a richer family of spectra: its first face comes from the prices so far."""

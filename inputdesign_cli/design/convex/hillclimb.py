@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.plant.polynomial import Array
 
 CriterionName = Literal["D", "A", "E", "T"]
@@ -124,8 +124,10 @@ def hill_climb(
 def _climb(design: QuadraticDesign, step: _Step, H: Array) -> tuple[Array, list[float]]:
     history = [design.value(design.information(H))]
     for _ in range(_MAX_STEPS):
-        seconds_left()
-        found = step.best(H)
+        try:
+            found = step.best(H)
+        except OutOfTimeError:  # the best so far is an answer
+            found = None
         if found is None:
             break
         candidates = [design.feasible(found)] + [design.feasible(found + a * (found - H)) for a in _STRETCH]

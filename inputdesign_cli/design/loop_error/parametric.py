@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.design.loop_error.closed_form import power_of
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.errors import InaccurateError
@@ -98,6 +98,9 @@ def least_error(
     The bound holds for every spectrum: with Y = M^-1 W M^-1 the value of any Phi' is at least
     2 tr(W M^-1) - tr(Y M0) - max mean tr(Psi Phi'), and the maximum is at most s lambda^T c when
     Psi <= s sum lambda_i M_i at every frequency.
+
+    Raises:
+        OutOfTimeError: not even the first lines were computed in time.
     """
     lines = grid[np.unique(np.linspace(0, grid.size - 1, _START).round().astype(int))]
     best: LineDesign | None = None
@@ -105,7 +108,12 @@ def least_error(
     M: Array | None = None
     least_gap, stalled = np.inf, 0
     for step in range(1, _MAX_ROUNDS + 1):
-        Phi, multipliers = _restricted(criterion, lines, metrics(lines), limits, M)
+        try:
+            Phi, multipliers = _restricted(criterion, lines, metrics(lines), limits, M)
+        except OutOfTimeError:
+            if best is None:
+                raise
+            break
         powers = np.einsum("pkab,kba->p", metrics(lines), Phi).real
         Phi = Phi / np.max(powers / limits)
         powers = powers / np.max(powers / limits)

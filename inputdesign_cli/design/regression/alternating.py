@@ -6,6 +6,7 @@ leaves its start. It is here so that one can see what it does; its gap comes fro
 
 from __future__ import annotations
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.regression.local import Counter, Goal
 from inputdesign_cli.design.regression.steps import extend, rescale
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
@@ -28,10 +29,13 @@ def alternate(
             value = goal.value(shape)
             weight = goal.weight(value) if value < float("inf") else Weight(0.0, goal.biased)
             counter.solves += 1
-            if half is extend:
-                rho = extend(problem, weight, shape.rho[: problem.m])
-            else:
-                rho = rescale(problem, weight, shape)
+            try:
+                if half is extend:
+                    rho = extend(problem, weight, shape.rho[: problem.m])
+                else:
+                    rho = rescale(problem, weight, shape)
+            except OutOfTimeError:  # the best so far is an answer
+                return shape
             trial = None if rho is None else problem.evaluate(rho)
             if trial is not None and weight(trial) < weight(shape):
                 shape = trial

@@ -13,6 +13,7 @@ from itertools import count
 
 import numpy as np
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.regression.lift import Box, Lift, NodeBound
 from inputdesign_cli.design.regression.limits import box_limits
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem
@@ -75,7 +76,7 @@ class BranchAndBound:
         most_nodes: int,
         suggest: Callable[[Array], None] = lambda _: None,
     ) -> bool:
-        """Split boxes until |b|^2 + kappa v >= level on all of them.
+        """Split boxes until |b|^2 + kappa v >= level on all of them, or until the time is over.
 
         kappa must not fall and may rise: a bound at one energy holds for every smaller one. `suggest` is
         given the autocorrelations of each relaxed optimum below the level; it may improve the incumbent,
@@ -88,9 +89,13 @@ class BranchAndBound:
                 self.closed_assumed |= node.assumed
                 continue
             boxes = (node.box,) if node.found is None else self._halves(node.box, node.found)
-            for box in boxes:
-                if not _without_shapes(box):
-                    self._examine(node, box, kappa(), largest_v(), level, suggest)
+            try:
+                for box in boxes:
+                    if not _without_shapes(box):
+                        self._examine(node, box, kappa(), largest_v(), level, suggest)
+            except OutOfTimeError:
+                heapq.heappush(self.open, node)  # with its halves not all examined, its own bound counts
+                break
         return self.bound >= level()
 
     def _examine(

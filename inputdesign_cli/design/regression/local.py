@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.regression.steps import Region, step
 from inputdesign_cli.design.regression.toeplitz import Autocorrelations, ToeplitzProblem, Weight
 
@@ -110,7 +111,10 @@ def _trust_region(
             break
         weight = weight_at(shape)
         counter.solves += 1
-        found = step(problem, region, weight, shape, radius)
+        try:
+            found = step(problem, region, weight, shape, radius)
+        except OutOfTimeError:  # the best so far is an answer
+            break
         if found is None:
             radius /= 4.0
             if radius < _SMALLEST_RADIUS:

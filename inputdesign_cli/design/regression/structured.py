@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
+from inputdesign_cli.compute.time_limit import finishing, seconds_left
 from inputdesign_cli.design.regression.alternating import alternate
 from inputdesign_cli.design.regression.branch import BranchAndBound
 from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
@@ -108,6 +109,7 @@ def design_toeplitz(
 
     Raises:
         OutOfReachError: no energy meets the target.
+        OutOfTimeError: no shape that meets the target was found in time.
     """
     problem, norm = ToeplitzProblem.of(regression), Normalisation(regression)
     if most_nodes is None:
@@ -132,7 +134,8 @@ def design_toeplitz(
     proof = _Proof(problem, goal, shape, counter, keep=alternating)
     bound = proof.run(tolerance, most_nodes)
     if not alternating:
-        proof.shape = _tidied(problem, goal, _least_biased(problem, proof.shape))
+        with finishing():
+            proof.shape = _tidied(problem, goal, _least_biased(problem, proof.shape))
     spent = energy if energy is not None else norm.energy(1.0 / goal.value(proof.shape))
     R = scipy.linalg.toeplitz(proof.shape.rho) * (spent / problem.n)
     return ToeplitzDesign(
@@ -202,7 +205,8 @@ class _Proof:
         # At any smaller energy the error has grown by the variance at least.
         kappa = 1.0 / (kept * self._value())
         missing = target - max(self.tree.bound, 0.0)
-        return 1.0 / (kappa + missing / least_variance(self.problem))
+        with finishing():
+            return 1.0 / (kappa + missing / least_variance(self.problem))
 
     def _value(self) -> float:
         return self.goal.value(self.challenger)
@@ -240,6 +244,7 @@ def _out_of_reach(
     target = goal.target
     bias = float(np.sqrt(shape.bias_squared))
     for multiple in _PROVED_MULTIPLES:
+        seconds_left()
         proof = BranchAndBound.start(problem)
         if proof.prove(
             _always(target / multiple), _always(target), largest_v=_always(multiple), most_nodes=most_nodes

@@ -160,29 +160,31 @@ def _cost(done: Designed, basis: Basis, x: Array) -> float:
 
 
 def _objective(design: Design) -> dict[str, Json]:
+    """The value with its bounds; those of which nothing is proved yet are left out."""
     found, anything = design.result, design.any_spectrum
-    value, bound, any_bound = found.objective, found.certificate.bound, anything.certificate.bound
+    value, bound = found.objective, found.certificate.bound
+    any_bound = 0.0 if anything is None else anything.certificate.bound
+    proved, proved_of_any = (b > 0.0 or value == 0.0 for b in (bound, any_bound))
     criterion, goal = design.problem.stated_criterion, design.problem.goal
+    entry: dict[str, Json]
     if goal == "factor" and criterion is not None:
         # s is the inverse of the level, so that its lower bound is an upper bound of the criterion.
-        reached, best = criterion.value(1.0 / value), criterion.value(1.0 / max(bound, 1e-300))
-        size = design.problem.experiment.size if criterion.letter == "D" else abs(reached)
-        return {
-            "kind": criterion.letter,
-            "value": reached,
-            "upper_bound": best,
-            "relative_gap": abs(best - reached) / size,
-            "any_spectrum_bound": criterion.value(1.0 / max(any_bound, 1e-300)),
-        }
+        reached = criterion.value(1.0 / value)
+        entry = {"kind": criterion.letter, "value": reached}
+        if proved:
+            best = criterion.value(1.0 / max(bound, 1e-300))
+            size = design.problem.experiment.size if criterion.letter == "D" else abs(reached)
+            entry |= {"upper_bound": best, "relative_gap": abs(best - reached) / size}
+        if proved_of_any:
+            entry["any_spectrum_bound"] = criterion.value(1.0 / max(any_bound, 1e-300))
+        return entry
     if goal == "factor":
         value, bound, any_bound = (float(np.sqrt(v)) for v in (value, bound, any_bound))
-    return {
-        "kind": _KINDS[goal],
-        "value": value,
-        "lower_bound": bound,
-        "relative_gap": abs(value - bound) / value if value > 0 else 0.0,
-        "any_spectrum_bound": any_bound,
-    }
+    entry = {"kind": _KINDS[goal], "value": value, "lower_bound": bound}
+    entry["relative_gap"] = abs(value - bound) / value if value > 0 else 0.0
+    if proved_of_any:
+        entry["any_spectrum_bound"] = any_bound
+    return entry
 
 
 def _white(done: Designed, cost: float) -> dict[str, Json]:

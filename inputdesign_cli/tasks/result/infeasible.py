@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.design.convex.designs import Question, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
@@ -33,16 +34,13 @@ def explain(
     if unreachable.limits_alone:
         return _contradiction(involved, nearest.certificate.bound)
     names = " and ".join(dict.fromkeys(problem.requirement(index).name for index, _ in nearest.active))
-    needs = {limit: _needed(unreachable, limit) for limit in involved if limit.upper}
-    parts = [f"{named(limit)} is exhausted" for limit, need in needs.items() if not need]
-    parts += [need for need in needs.values() if need]
-    if not any(needs.values()):
-        # The optimum of the goal "factor" meets the accuracy within limits so many times as large.
-        times = f"would have to be {rounded_up(nearest.objective)} times as large"
-        only_density = problem.densities and not question.limits
-        together = f"no change of a single limit is enough; all of them together {times}"
-        parts.append(f"limits.spectrum {times}" if only_density else together)
-    message = f"{names} cannot be met within the limits: {bought.sentence}; " + "; ".join(parts)
+    try:
+        parts = _what_would_do(
+            unreachable, involved, only_density=bool(problem.densities and not question.limits)
+        )
+    except OutOfTimeError:  # that it is infeasible is proved
+        parts = []
+    message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
     hint = (
         f"raise the limit, or loosen the accuracy: within the limits the error can be made no smaller than "
         f"{bought.proved:.4g} times what is asked"
@@ -57,6 +55,21 @@ def explain(
         hint += "; limits.spectrum takes part"
     key = involved[0].key if involved else "limits"
     return InfeasibleError(Diagnostic("infeasible", message, hint, key, details=bought.details))
+
+
+def _what_would_do(
+    unreachable: UnreachableError, involved: Sequence[PowerLimit], *, only_density: bool
+) -> list[str]:
+    """Which limits are exhausted, and what they would have to be."""
+    needs = {limit: _needed(unreachable, limit) for limit in involved if limit.upper}
+    parts = [f"{named(limit)} is exhausted" for limit, need in needs.items() if not need]
+    parts += [need for need in needs.values() if need]
+    if not any(needs.values()):
+        # The optimum of the goal "factor" meets the accuracy within limits so many times as large.
+        times = f"would have to be {rounded_up(unreachable.nearest.objective)} times as large"
+        together = f"no change of a single limit is enough; all of them together {times}"
+        parts.append(f"limits.spectrum {times}" if only_density else together)
+    return parts
 
 
 def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
@@ -80,7 +93,7 @@ def _within_reach_of_any(question: Question) -> bool:
     anything = LinesBasis.anywhere(*experiment.band, experiment.inputs)
     try:
         solve_design(replace(question, basis=anything), tolerance=_TOLERANCE)
-    except (UnreachableError, np.linalg.LinAlgError):
+    except (UnreachableError, OutOfTimeError, np.linalg.LinAlgError):
         return False
     return True
 

@@ -17,6 +17,7 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.runs.results import Curves, DirectionCurves, SpectrumCurves, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.result.spectrum import hermitian_columns
+from inputdesign_cli.tasks.result.status import proof_status
 
 # Frequencies of the plots, and what share of the band they reach down to.
 _POINTS = 800
@@ -56,7 +57,7 @@ def design_result(terms: LoopErrorTerms, design: LoopErrorDesign) -> Entry:
     return {
         "format": 1,
         "title": terms.header.title,
-        "status": "optimal" if design.gap <= terms.tolerance else "almost_optimal",
+        "status": proof_status(design.gap, terms.tolerance),
         "objective": {
             "kind": "closed_loop_error",
             "value": design.value,

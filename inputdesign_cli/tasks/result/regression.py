@@ -20,6 +20,7 @@ from inputdesign_cli.monte_carlo.regression import Estimates
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import ErrorCurves
 from inputdesign_cli.runs.units import Header
+from inputdesign_cli.tasks.result.status import proof_status
 
 _POINTS = 400
 
@@ -83,7 +84,7 @@ def moments_result(terms: RegressionTerms, design: MomentsDesign) -> Entry:
     return {
         "format": 1,
         "title": terms.header.title,
-        "status": _status(gap, design.tolerance),
+        "status": proof_status(gap, design.tolerance),
         "objective": {
             "kind": kind,
             "value": value,
@@ -144,12 +145,6 @@ def trial_entry(regression: Regression, Phi: Array, theta: Array, found: Estimat
         entry["mse_standard_error"] = float(squared.std(ddof=1) / np.sqrt(runs))
         entry["mean_estimate_standard_error"] = (found.theta.std(axis=0, ddof=1) / np.sqrt(runs)).tolist()
     return entry
-
-
-def _status(gap: float, tolerance: float) -> str:
-    if gap <= tolerance * (1.0 + 1e-6):
-        return "optimal"
-    return "almost_optimal" if gap <= 100.0 * tolerance else "gap_open"
 
 
 def _moments(terms: RegressionTerms, design: MomentsDesign) -> Entry:

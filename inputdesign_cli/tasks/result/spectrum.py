@@ -127,6 +127,8 @@ def optimality_curves(units: Units, design: Design) -> tuple[Table, OptimalityCu
     no such bound.
     """
     anything = design.any_spectrum
+    if anything is None:
+        return None
     price, value = anything.certificate.price, anything.certificate.value
     if price is None or value is None:
         return None

@@ -1,0 +1,113 @@
+"""Whenever its time ends, a design is delivered that meets what is required, with bounds that hold."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, simulate, solve
+from inputdesign_cli.compute.time_limit import stoppable
+from inputdesign_cli.errors import InaccurateError
+from tests.fuzzing.judge import independent_ratio
+
+PLANT = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 500}
+"""
+BOUND = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}\n"
+SPECS = {
+    "cost": BOUND + "spectrum: {type: fir, order: 20}\n",
+    "sinusoids": BOUND + "spectrum: {type: free}\n",
+    "limits that bind": BOUND + "spectrum: {type: fir, order: 12}\nlimits: {output_power: 30}\n",
+    "limits that white keeps": BOUND + "spectrum: {type: fir, order: 12}\nlimits: {input_power: 1.8}\n",
+    "best accuracy": BOUND + "objective: best_accuracy\nspectrum: {type: fir, order: 12}\n"
+    "limits: {input_power: 1}\n",
+    "shortest": BOUND + "objective: shortest_experiment\nspectrum: {type: fir, order: 12}\n"
+    "limits: {input_power: 1}\n",
+    "criterion": "accuracy: {criterion: D}\nspectrum: {type: fir, order: 12}\nlimits: {input_power: 1}\n",
+    "side": "accuracy: {criterion: A, standard_deviation: {b1: 0.2}}\nspectrum: {type: fir, order: 12}\n"
+    "limits: {input_power: 1}\n",
+}
+
+
+@pytest.mark.parametrize("text", SPECS.values(), ids=SPECS)
+def test_what_is_delivered_meets_everything_and_its_bounds_hold(slow_solver, text):
+    best = solve(parse_spec(PLANT + text)).result["objective"]
+    statuses = []
+    for calls in count():
+        spec = parse_spec(f"{PLANT}{text}solver: {{time_limit: {3 * calls + 1}}}\n")
+        try:
+            result = solve(spec).result
+        except InaccurateError as ended:
+            statuses.append(ended.diagnostics[0].code)
+            continue
+        found, status = result["objective"], result["status"]
+        statuses.append(status)
+        ratio = independent_ratio(spec, result)
+        assert ratio is None or ratio <= 1.0 + 1e-6
+        assert all(limit["value"] <= limit["max"] * (1.0 + 1e-7) for limit in result.get("limits", []))
+        slack = 1e-7 * max(1.0, abs(best["value"]))
+        side = 1.0 if "upper_bound" in best else -1.0
+        for name in ("value", "lower_bound", "upper_bound"):
+            beyond = side if name != "value" else -side
+            assert beyond * (found.get(name, best["value"]) - best["value"]) >= -slack
+        if "any_spectrum_bound" in found:
+            assert side * (found["any_spectrum_bound"] - found["value"]) >= -slack
+        assert (status == "gap_open") == (found.get("relative_gap", 1.0) > 1e-5)
+        if status == "gap_open":
+            assert result["solver"]["ended_by"] == "solver.time_limit"
+            assert "ended the design" in result["notes"][0]
+            assert "there is no record" in " ".join(result["notes"])
+        if status == "optimal" and "signal" in result and "any_spectrum_bound" in found:
+            assert "notes" not in result or "came before" not in " ".join(result["notes"])
+            break
+    assert {"gap_open", "optimal"} <= set(statuses)
+    assert set(statuses[: statuses.index("gap_open")]) <= {"out-of-time"}
+    assert "out-of-time" not in statuses[statuses.index("gap_open") :]
+
+
+def test_nothing_is_simulated_without_a_record(slow_solver):
+    spec = parse_spec(f"{PLANT}{SPECS['cost']}solver: {{time_limit: 1}}\nsimulation: {{runs: 2}}")
+    with pytest.raises(InaccurateError) as ended:
+        simulate(spec)
+    assert ended.value.diagnostics[0].code == "out-of-time"
+
+
+def test_an_exact_confidence_is_not_claimed_of_an_unfinished_design(slow_solver):
+    text = SPECS["cost"].replace("alpha: 2.45", "confidence: {exact: 0.9, draws: 200}")
+    with pytest.raises(InaccurateError) as ended:
+        solve(parse_spec(f"{PLANT}{text}solver: {{time_limit: 1}}"))
+    assert ended.value.diagnostics[0].code == "out-of-time"
+
+
+def test_an_interrupt_is_as_the_end_of_the_time():
+    with stoppable() as stop:
+        stop()
+        result = solve(parse_spec(PLANT + SPECS["cost"])).result
+    assert (result["status"], result["solver"]["ended_by"]) == ("gap_open", "the interrupt")
+    assert result["notes"][0].startswith("the interrupt ended the design")
+
+
+MOMENTS = """
+plant: {regression: {estimated: 2, neglected: 3}}
+noise: {variance: 1.0}
+accuracy:
+  mean_squared_error: {target: 1.2, estimated: [1, 1], neglected: [0.5, 0.3, 0.4], neglected_norm: 1.0}
+spectrum: {type: moments, structure: toeplitz}
+"""
+
+
+def test_moments_are_delivered_with_the_bound_so_far(slow_solver):
+    best = solve(parse_spec(MOMENTS)).result["objective"]
+    gaps = []
+    for seconds in (1, 31, 91, 301, 601):
+        result = solve(parse_spec(f"{MOMENTS}solver: {{time_limit: {seconds}}}")).result
+        found = result["objective"]
+        assert result["mean_squared_error"]["value"] <= 1.2 * (1.0 + 1e-6)
+        assert found["lower_bound"] <= best["value"] * (1.0 + 1e-6) <= found["value"] * (1.0 + 2e-6)
+        gaps.append(found["relative_gap"])
+    assert np.all(np.diff(gaps) <= 1e-9)
+    assert gaps[0] > 1e-3
