@@ -95,13 +95,19 @@ def larger_polynomials(model: PolynomialModel, *, feedback: bool) -> Iterator[tu
         yield replace(model, D=_longer(model.D, i)), "coefficient in D"
 
 
-def larger_transfer_matrices(model: ContinuousModel) -> Iterator[tuple[ContinuousModel, str]]:
-    """One more zero in each entry where it stays proper, or a dead time where there is none; and which."""
+def larger_transfer_matrices(
+    model: ContinuousModel, *, feedback: bool
+) -> Iterator[tuple[ContinuousModel, str]]:
+    """One more zero in each entry where it stays proper, or a dead time where there is none; and which it is.
+
+    Args:
+        feedback: whether u(t) answers y(t), so that it cannot act at once.
+    """
     none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
     model = replace(model, delay=model.delay or none)
     for i, j in model.active:
         above = model.numerator[i][j]
-        if above.size < model.denominator[i][j].size:
+        if above.size + int(feedback) < model.denominator[i][j].size:
             more = _with(model.numerator, i, j, np.append(above, 0.0))
             yield replace(model, numerator=more), "coefficient in the numerator"
         shared = model.active if model.common_delay else [(i, j)]

@@ -110,7 +110,7 @@ class TransferKind:
                 what,
                 partial(TransferRecord, larger, intersample=self.between),
             )
-            for larger, what in larger_transfer_matrices(self.model.at(theta))
+            for larger, what in larger_transfer_matrices(self.model.at(theta), feedback=feedback)
         )
 
     def simulated(

@@ -12,7 +12,8 @@ from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.adequacy import DIRECTED_LEVEL
 from inputdesign_cli.identification.polynomials import PolynomialKind
 from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.plant import ContinuousModel, SampledModel
+from inputdesign_cli.identification.transfer_matrix import TransferKind
+from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
 from tests.support.records import shifted, simulated
@@ -94,6 +95,10 @@ def test_an_input_that_answers_the_output_does_not_act_at_once():
     kind = PolynomialKind(model, Structure.of(model))
     names = [{e.name for e in kind.extensions(model.theta, feedback=loop)} for loop in (False, True)]
     assert names[0] - names[1] == {"b0"}
+    lag = ContinuousModel(((np.ones(1),),), ((np.array([0.5, 1.0]),),), np.eye(1))
+    in_s = TransferKind(lag, Intersample(0.4, hold=True))
+    names = [{e.name for e in in_s.extensions(lag.theta, feedback=loop)} for loop in (False, True)]
+    assert names == [{"b1", "delay"}, {"delay"}]
 
 
 def test_what_acts_alike_where_it_is_small_shares_a_test():
