@@ -45,9 +45,14 @@ def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> b
     return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type)
 
 
-def figure(curves: Curves, time_unit: str = "s") -> Figure:
-    """The same as an object of matplotlib, to be shown or changed in a notebook."""
-    return painted(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit))
+def figure(results: Results, name: str) -> Figure:
+    """A figure of a run, such as "bound", as an object of matplotlib to be shown or changed in a notebook.
+
+    Raises:
+        KeyError: the run has no such figure.
+    """
+    curves = results.curves[name]
+    return painted(lambda page: _DRAWN_BY[type(curves)](page, curves, results.time_unit))
 
 
 def draw_all(results: Results) -> dict[str, bytes]:

@@ -86,8 +86,11 @@ def parse_spec(
     if diagnostics or spec is None:
         raise SpecError(_sorted(diagnostics, tree.places))
     spec = _with_defaults(spec)
-    spec._source = Source(tree.data, tree.places, folder)
+    spec._source, spec._design = Source(tree.data, tree.places, folder), design
     return spec
+
+
+Spec.reader = parse_spec
 
 
 def read_tree(
