@@ -9,14 +9,16 @@ from typing import Protocol
 
 import numpy as np
 
+from inputdesign_cli.identification.coloured import ColouredKind
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
-from inputdesign_cli.identification.kind import Kind, identify_records
+from inputdesign_cli.identification.kind import Kind, fit_batches, identify_records
 from inputdesign_cli.identification.polynomials import PolynomialKind, fit_polynomials
-from inputdesign_cli.identification.reparametrised import ReparametrisedKind, fit_reparametrised
+from inputdesign_cli.identification.reparametrised import ReparametrisedKind
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.identification.transfer_matrix import TransferKind, fit_transfer_matrices
 from inputdesign_cli.plant import (
+    Coloured,
     ContinuousModel,
     Intersample,
     Model,
@@ -58,11 +60,11 @@ class _TransferMatrix:
 
 
 @dataclass(frozen=True)
-class _Reparametrised:
-    kind: ReparametrisedKind
+class _Recorded:
+    kind: Kind
 
     def fit_batch(self, u: Array, y: Array, start: Array) -> BatchEstimate:
-        return fit_reparametrised(self.kind, u, y, start)
+        return fit_batches(self.kind, u, y, start)
 
 
 @singledispatch
@@ -92,7 +94,12 @@ def _(model: SampledModel, step: float) -> Estimator:
 
 @estimator.register
 def _(model: Reparametrised, step: float) -> Estimator:
-    return _Reparametrised(ReparametrisedKind(model, estimator(model.coefficients, step).kind))
+    return _Recorded(ReparametrisedKind(model, estimator(model.coefficients, step).kind))
+
+
+@estimator.register
+def _(model: Coloured, step: float) -> Estimator:
+    return _Recorded(ColouredKind(model, estimator(model.plant, step).kind))
 
 
 def identify(

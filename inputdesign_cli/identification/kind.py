@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.earlier import Earlier
@@ -154,3 +154,19 @@ def fit_records(records: Sequence[Records], start: Array, steps: Array, own: Arr
         converged=found.converged,
         steps=found.steps + steps.astype(np.int64),
     )
+
+
+def fit_batches(kind: Kind, u: ArrayLike, y: ArrayLike, start: ArrayLike) -> BatchEstimate:
+    """The same, of records as arrays.
+
+    Args:
+        kind: of which the structure is meant.
+        u: (N, r) common to all runs, or (runs, N, r).
+        y: (runs, N, p).
+        start: (k,) for all runs, or (runs, k).
+    """
+    outputs, given = np.asarray(y, dtype=float), np.asarray(u, dtype=float)
+    inputs = np.broadcast_to(given, (*outputs.shape[:2], given.shape[-1]))
+    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.names)))
+    records = [Records((kind.record(*run),)) for run in zip(inputs, outputs, strict=True)]
+    return fit_records(records, np.array(begin), np.zeros(len(outputs), dtype=np.int64), kind.own())

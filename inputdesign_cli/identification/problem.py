@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import block_length, stream
-from inputdesign_cli.identification.stability import is_stable, reflected
+from inputdesign_cli.identification.stability import is_stable, reflected, without_integrators
 from inputdesign_cli.plant.polynomial import Array
 
 
@@ -78,12 +78,17 @@ class PredictionErrors:
         return replace(self, u=u, y=y)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta (runs, k) with the roots of C, D and F mirrored into the unit circle where they leave it."""
+        """theta (runs, k) with the roots of C, D and F mirrored into the unit circle where they leave it.
+
+        Roots of F that are exactly one are those of integrators, and stay.
+        """
         theta = theta.copy()
-        for columns in self._monic:
+        for letter, columns in self._monic:
             monic = np.concatenate([np.ones((theta.shape[0], 1)), theta[:, columns]], axis=1)
             for run in np.flatnonzero(~is_stable(monic)):
-                theta[run, columns] = reflected(monic[run])[1:]
+                moving = without_integrators(monic[run]) if letter == "f" else monic[run]
+                if not is_stable(moving[None])[0]:
+                    theta[run, columns] = reflected(monic[run])[1:]
         return theta
 
     def at(self, theta: Array) -> tuple[Array, NDArray[np.float64], Array]:
@@ -150,16 +155,16 @@ class PredictionErrors:
         return np.eye(self.size)[np.concatenate(self.places)]
 
     @cached_property
-    def _monic(self) -> tuple[NDArray[np.int64], ...]:
-        """Where the coefficients of each C, D and F stand in theta."""
+    def _monic(self) -> tuple[tuple[str, NDArray[np.int64]], ...]:
+        """The letters of C, D and F, and where the coefficients of each stand in theta."""
         found = {
-            tuple(place[block.columns].tolist())
+            (letter, tuple(place[block.columns].tolist()))
             for row, place in zip(self.rows, self.places, strict=True)
             for letter in "cdf"
             for block in row.by_letter[letter]
             if block.lags
         }
-        return tuple(np.array(columns) for columns in sorted(found))
+        return tuple((letter, np.array(columns)) for letter, columns in sorted(found))
 
 
 def inverses(covariances: NDArray[np.float64]) -> tuple[NDArray[np.float64], Array]:

@@ -13,10 +13,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy.optimize
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from inputdesign_cli.identification.estimate import BatchEstimate
-from inputdesign_cli.identification.kind import Kind, Part, Starts, fit_records
+from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.record_problem import Point, evaluate
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.search import Search
@@ -199,21 +198,3 @@ class ReparametrisedKind:
         """The same search, its point given by the coefficients."""
         theta = self.model.parametrisation.at(found.point.theta).coefficients
         return replace(found, point=replace(found.point, theta=theta))
-
-
-def fit_reparametrised(
-    kind: ReparametrisedKind, u: ArrayLike, y: ArrayLike, start: ArrayLike
-) -> BatchEstimate:
-    """The estimates of many records, each from its one start, without checks.
-
-    Args:
-        kind: of which the structure is meant.
-        u: (N, r) common to all runs, or (runs, N, r).
-        y: (runs, N, p).
-        start: (k,) for all runs, or (runs, k).
-    """
-    outputs = np.asarray(y, dtype=float)
-    inputs = np.broadcast_to(np.asarray(u, dtype=float), (*outputs.shape[:2], kind.model.inputs))
-    begin = np.broadcast_to(np.asarray(start, dtype=float), (len(outputs), len(kind.names)))
-    records = [Records((kind.record(*run),)) for run in zip(inputs, outputs, strict=True)]
-    return fit_records(records, np.array(begin), np.zeros(len(outputs), dtype=np.int64), kind.own())

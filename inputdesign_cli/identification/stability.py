@@ -9,6 +9,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 # A root is never moved closer to the circle than this.
 _MARGIN = 1e-3
+# A sum of coefficients that is zero, as far as decimals can tell.
+_EXACT = 1e-12
 
 
 def is_stable(monic: Array) -> NDArray[np.bool_]:
@@ -24,6 +26,13 @@ def is_stable(monic: Array) -> NDArray[np.bool_]:
         room = np.where(np.abs(last) < 1.0, 1.0 - last**2, 1.0)
         p = ((p - last * p[:, ::-1]) / room)[:, :-1]
     return stable
+
+
+def without_integrators(monic: Array) -> Array:
+    """(m + 1 - n,): a polynomial in q^-1 divided by 1 - q^-1 as often (n times) as it can be."""
+    while monic.size > 1 and abs(np.sum(monic)) <= _EXACT * np.sum(np.abs(monic)):
+        monic = np.cumsum(monic)[:-1]
+    return monic
 
 
 def reflected(monic: Array) -> Array:

@@ -111,11 +111,16 @@ def _output_error(
         for b, f, x, entry in zip(bs, denominators, inputs, row.entries, strict=True):
             v -= filtered(np.concatenate([np.zeros(entry.delay), b]), f, x)
         v = filtered(shaped, [1.0], v)
-        long = max(1, min(10 + 2 * (row.c + row.d), y.size // 6))
-        _, noise = regress(v, [(-v, range(1, long + 1))])
-        (d, c), _ = regress(v, [(-v, D.lags), (noise, C.lags)])
-        parts += [(D, d), (C, c)]
+        parts += zip((C, D), noise_polynomials(v, row.c, row.d), strict=True)
     return _theta(row, parts)
+
+
+def noise_polynomials(v: Array, c: int, d: int) -> tuple[Array, Array]:
+    """The coefficients after the first of C (c,) and D (d,), from samples v of C/D e."""
+    long = max(1, min(10 + 2 * (c + d), v.size // 6))
+    _, noise = regress(v, [(-v, range(1, long + 1))])
+    (below, above), _ = regress(v, [(-v, range(1, d + 1)), (noise, range(1, c + 1))])
+    return above, below
 
 
 def _iterated(target: Array, below: range, above: list[tuple[Array, range]]) -> tuple[Array, list[Array]]:

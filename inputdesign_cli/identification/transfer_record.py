@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.held import HeldEntry, polynomial_roots
+from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 
@@ -109,13 +109,15 @@ class TransferRecord:
     def stabilised(self, theta: Array) -> Array:
         """theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
 
-        Dead times are kept between zero and the length of the record.
+        Poles that are exactly zero are those of integrators, and stay. Dead times are kept between
+        zero and the length of the record.
         """
         step = self.intersample.sample_time
         slowest, fastest = _LEAST_DECAY / (self.samples * step), _FASTEST / step
         out = theta.copy()
         out[self._late] = np.clip(out[self._late], 0.0, (self.samples - 1) * step)
-        for columns in self._denominators:
+        for every in self._denominators:
+            columns = every[integrators(np.append(theta[every], 1.0)) :]
             poles = polynomial_roots(np.append(theta[columns], 1.0))
             if np.all(poles.real <= -slowest) and np.all(np.abs(poles) <= fastest):
                 continue

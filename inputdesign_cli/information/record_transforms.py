@@ -76,13 +76,19 @@ class RecordTransforms:
     @cached_property
     def _decay(self) -> float:
         """rho, zero where the padding outlasts the memory."""
-        return 0.0 if self._padded == self._length else _FORGOTTEN / self._length
+        outlasts = self._padded == self._length and not self._integrates
+        return 0.0 if outlasts else _FORGOTTEN / self._length
 
     @cached_property
     def _length(self) -> int:
-        if self.experiment.model.continuous:
+        if self.experiment.model.continuous and not self._integrates:
             return self._padded
         return min(self._padded, int(2 ** np.ceil(np.log2(_RECORDS * self.samples))))
+
+    @property
+    def _integrates(self) -> bool:
+        """Whether there is no response at frequency zero."""
+        return float(np.min(np.abs(self.experiment.singularities), initial=1.0)) == 0.0
 
     @cached_property
     def _padded(self) -> int:
@@ -98,9 +104,8 @@ class RecordTransforms:
     @cached_property
     def _frequencies(self) -> Array | ComplexArray:
         w = 2.0 * np.pi * np.arange(self._length // 2 + 1) / self._length
-        if self.experiment.model.continuous:
-            return w / self.step
-        return np.asarray(w - 1j * self._decay, dtype=complex) if self._decay else w
+        unit = self.step if self.experiment.model.continuous else 1.0
+        return np.asarray(w - 1j * self._decay, dtype=complex) / unit if self._decay else w / unit
 
     @cached_property
     def _kept(self) -> dict[PowerKind, ComplexArray]:

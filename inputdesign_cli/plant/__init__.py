@@ -1,6 +1,8 @@
 """Plants: G, H, their parameter gradients and the loop around them, at any frequencies."""
 
+from inputdesign_cli.plant.coloured import Coloured as Coloured
 from inputdesign_cli.plant.continuous_model import ContinuousModel as ContinuousModel
+from inputdesign_cli.plant.discretised import delayed as delayed, discretised as discretised, pid as pid
 from inputdesign_cli.plant.frequencies import (
     graded_grid as graded_grid,
     local_maxima as local_maxima,
@@ -8,7 +10,12 @@ from inputdesign_cli.plant.frequencies import (
 )
 from inputdesign_cli.plant.intersample import Intersample as Intersample
 from inputdesign_cli.plant.loop import Loop as Loop, LoopResponse as LoopResponse, close_loop as close_loop
-from inputdesign_cli.plant.model import Fraction as Fraction, Model as Model, Parameter as Parameter
+from inputdesign_cli.plant.model import (
+    Fraction as Fraction,
+    Listed as Listed,
+    Model as Model,
+    Parameter as Parameter,
+)
 from inputdesign_cli.plant.parametrisation import Parametrisation as Parametrisation
 from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop
 from inputdesign_cli.plant.polynomial_model import PolynomialModel as PolynomialModel

@@ -59,8 +59,8 @@ class HeldEntry:
         n = denominator.size - 1
         padded = np.zeros(n + 1)
         padded[: numerator.size] = numerator
-        poles = np.abs(polynomial_roots(denominator))
-        unit = float(np.exp(np.mean(np.log(poles)))) if n else 1.0
+        moving = np.abs(polynomial_roots(denominator[integrators(denominator) :]))
+        unit = float(np.exp(np.mean(np.log(moving)))) if moving.size else 1.0 / sample_time
         below = denominator * unit ** (np.arange(n + 1.0) - n)
         companion = np.eye(n, k=1)
         if n:
@@ -161,11 +161,11 @@ class HeldEntry:
     def _through(self, driven: ComplexArray | Array, z: ComplexArray) -> ComplexArray:
         """(m, 2 order): the states that inputs (m or 1, 2 order) drive, at points z.
 
-        By back-substitution in Schur's triangular form, for all points at once.
+        By back-substitution in a triangular form, for all points at once.
         """
         if not self.order:
             return np.zeros((z.size, 0), dtype=complex)
-        triangle, basis = self._schur
+        triangle, basis = self._triangular
         into = basis.conj().T @ driven.T
         modes = np.zeros((len(into), z.size), dtype=complex)
         for row in reversed(range(len(into))):
@@ -174,13 +174,25 @@ class HeldEntry:
         return np.asarray((basis @ modes).T, dtype=complex)
 
     @cached_property
-    def _schur(self) -> tuple[ComplexArray, ComplexArray]:
-        """Schur's triangular form of the transition, and its basis."""
-        triangle, basis = scipy.linalg.schur(self.transition, output="complex")
-        return triangle, basis
+    def _triangular(self) -> tuple[ComplexArray, ComplexArray]:
+        """The transition in triangular form, and its basis.
 
-    def interpolated(self, w: Array) -> ComplexArray:
-        """(m, columns): what the interpolation of samples causes, at frequencies w, without a hold."""
+        The second copy of the states depends on the first, and integrators on the other states of theirs.
+        Only these are turned (into Schur's form), so that the ones of integrators stay ones, and a state in
+        which they cancel is free of them near frequency zero.
+        """
+        n, m = self.order, integrators(self.denominator)
+        turn = np.eye(n, dtype=complex)
+        turn[m:, m:] = scipy.linalg.schur(self.transition[m:n, m:n], output="complex")[1]
+        basis = np.zeros((2 * n, 2 * n), dtype=complex)
+        basis[n:, :n] = basis[:n, n:] = turn
+        return np.triu(basis.conj().T @ self.transition @ basis), basis
+
+    def interpolated(self, w: Array | ComplexArray) -> ComplexArray:
+        """(m, columns): what the interpolation of samples causes, at frequencies w, without a hold.
+
+        With w - j sigma of samples that are weighted with e^(-sigma t).
+        """
         s = 1j * w[:, None] / self.unit
         scaled = self.denominator * self.unit ** (np.arange(self.order + 1.0) - self.order)
         below = ascending.polyval(s, scaled)
@@ -277,6 +289,13 @@ class HeldEntry:
         return np.concatenate([np.roots(below), np.roots(above)]).astype(complex)
 
 
+def integrators(denominator: Array) -> int:
+    """The number of poles at s = 0 of a denominator with ascending coefficients."""
+    return int(np.flatnonzero(denominator)[0])
+
+
 def polynomial_roots(coefficients: Array) -> ComplexArray:
-    """Roots of a polynomial with ascending coefficients."""
-    return np.asarray(ascending.polyroots(np.trim_zeros(coefficients, "b")), dtype=complex)
+    """Roots of a polynomial with ascending coefficients, those at zero exact."""
+    trimmed = np.trim_zeros(coefficients)
+    zeros = np.trim_zeros(coefficients, "b").size - trimmed.size
+    return np.concatenate([np.zeros(zeros), ascending.polyroots(trimmed)]).astype(complex)

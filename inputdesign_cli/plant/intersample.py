@@ -14,8 +14,11 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from inputdesign_cli.plant.held import HeldEntry
+from inputdesign_cli.plant.held import HeldEntry, integrators
 from inputdesign_cli.plant.polynomial import Array
+
+# Rounding grows by e to this power over a record.
+_DECAY = 4.0
 
 
 @dataclass(frozen=True)
@@ -33,12 +36,17 @@ class Intersample:
         samples = signal.shape[-1]
         length = 2 * scipy.fft.next_fast_len(samples, real=True)
         angles = 2.0 * np.pi * np.arange(length // 2 + 1) / length
-        z = np.exp(1j * angles)
-        columns = entry.responses(z) if hold else entry.interpolated(angles / self.sample_time)
+        if not integrators(entry.denominator):
+            weights, w = np.ones(samples), angles.astype(complex)
+        else:  # they have no response at zero: signals are weighted with e^(-rho t)
+            decay = _DECAY / samples
+            weights, w = np.exp(-decay * np.arange(samples)), angles - 1j * decay
+        z = np.exp(1j * w)
+        columns = entry.responses(z) if hold else entry.interpolated(w / self.sample_time)
         columns = entry.forgetting(columns, z, samples)
-        transform = scipy.fft.rfft(signal, length, axis=-1)
+        transform = scipy.fft.rfft(signal * weights, length, axis=-1)
         driven = scipy.fft.irfft(transform[..., None] * columns, length, axis=-2)
-        return np.asarray(driven[..., :samples, :])
+        return np.asarray(driven[..., :samples, :] / weights[:, None])
 
     def caused(self, entry: HeldEntry, u: Array) -> NDArray[np.float64]:
         """The output (.., N) of an entry that samples u (.., N) drive."""

@@ -16,6 +16,9 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import TransferMatrix
 
 _WELL_POSED = 1e-9
+# A pole this near to z = 1 integrates. The loop is then read off this far from frequency zero, in shares of
+# the distance of its nearest pole: there all is as at zero, to the square of that share.
+_INTEGRATES, _BESIDE = 1e-7, 1e-5
 _DELAY = (
     "give the plant its delay (a leading 0 in B; in s a numerator of lower order than the denominator) or "
     "the controller one (a leading 0 in its numerator)"
@@ -90,6 +93,26 @@ class Loop(ABC):
         return logarithmic_distance(np.concatenate([self.closed_poles, self.predictor_poles]))
 
     @property
+    def integrates(self) -> bool:
+        """Whether filters of the prediction are infinite at frequency zero; what the loop causes is not."""
+        return bool(np.any(np.abs(self.predictor_poles - 1.0) < _INTEGRATES))
+
+    @cached_property
+    def _nearest(self) -> float:
+        """The frequency below which all is taken to be as it is there."""
+        if not self.integrates:
+            return 0.0
+        near = np.abs(logarithmic_distance(self.closed_poles))
+        return _BESIDE * float(np.min(near, initial=1.0))
+
+    def _beside_zero(self, w: ArrayLike) -> ComplexArray | Array:
+        """The frequencies `w`, moved off zero where the loop integrates; those off the axis stay."""
+        given = np.asarray(w)
+        if np.iscomplexobj(given):
+            return given
+        return np.where(np.abs(given) < self._nearest, self._nearest, given)
+
+    @property
     def memory(self) -> float:
         """How long, in samples, signals matter beyond what the poles remember."""
         return self.model.memory + self.controller.memory
@@ -145,7 +168,8 @@ class Loop(ABC):
 
         y_x = G S_i, u_x = S_i = (I + C G)^-1, y_e = S_o H, u_e = -C S_o H with S_o = (I + G C)^-1.
         """
-        left, noise = self.left_at(w), self.noise_at(w)
+        beside = self._beside_zero(w)
+        left, noise = self.left_at(beside), self.noise_at(beside)
         n, p, r = len(left), self.model.outputs, self.model.inputs
         if p == r == 1:
             return _single_responses(left, noise)
@@ -160,7 +184,7 @@ class Loop(ABC):
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
-        left, p = self.left_at(w), self.model.outputs
+        left, p = self.left_at(self._beside_zero(w)), self.model.outputs
         if left.shape[1] == 2:
             R, minus_N, P, Q = _blocks(left)
             below = R * Q - minus_N * P
@@ -173,13 +197,13 @@ class Loop(ABC):
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""
         t = self.responses(w)
-        return self.model.prediction_gradient(w, t.y_x, t.u_x, np.zeros_like(t.y_x))
+        return self.model.prediction_gradient(self._beside_zero(w), t.y_x, t.u_x, np.zeros_like(t.y_x))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what e contributes, through the noise model and around the loop."""
         t = self.responses(w)
         e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), t.y_e.shape)
-        return self.model.prediction_gradient(w, t.y_e, t.u_e, e)
+        return self.model.prediction_gradient(self._beside_zero(w), t.y_e, t.u_e, e)
 
 
 def _single_responses(left: ComplexArray, noise: ComplexArray) -> LoopResponse:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, Self
@@ -127,6 +128,30 @@ class Parameter:
 def entry_label(output: int, input: int, *, single: bool) -> str:
     """The channels of a parameter as they stand in its name, counted from one: `[2,1]`."""
     return "" if single else f"[{output + 1},{input + 1}]"
+
+
+def row_parameters(letter: str, rows: Sequence[Array], outputs: int, inputs: int) -> list[Parameter]:
+    """The coefficients of A, C or D after the first: of one common to all outputs, or of one an output."""
+    found = []
+    for i, values in enumerate(rows):
+        common = len(rows) == 1
+        acting = range(outputs) if common else [i]
+        places = (
+            tuple((o, j) for o in acting for j in range(inputs))
+            if letter == "a"
+            else tuple((o, o) for o in acting)
+        )
+        label = "" if common else f"[{i + 1}]"
+        found += [Parameter(letter, lag, places, label, float(values[lag])) for lag in range(1, len(values))]
+    return found
+
+
+class Listed(Model, Protocol):
+    """A model that knows its parameters one by one."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """(k,): in the order of theta."""
 
 
 class Parametrised:

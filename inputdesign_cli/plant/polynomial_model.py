@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label
+from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label, row_parameters
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
@@ -78,7 +78,8 @@ class PolynomialModel(Parametrised):
             if letter in "bf":
                 found += self._entry_parameters(letter)
             else:
-                found += self._row_parameters(letter, {"a": self.A, "c": self.C, "d": self.D}[letter])
+                rows = {"a": self.A, "c": self.C, "d": self.D}[letter]
+                found += row_parameters(letter, rows, self.outputs, self.inputs)
         return tuple(found)
 
     def _entry_parameters(self, letter: str) -> list[Parameter]:
@@ -95,22 +96,6 @@ class PolynomialModel(Parametrised):
                     Parameter(letter, lag, ((i, j),), label, float(values[lag]))
                     for lag in range(first, len(values))
                 ]
-        return found
-
-    def _row_parameters(self, letter: str, rows: Sequence[Array]) -> list[Parameter]:
-        found = []
-        for i, values in enumerate(rows):
-            common = len(rows) == 1
-            outputs = range(self.outputs) if common else [i]
-            places = (
-                tuple((o, j) for o in outputs for j in range(self.inputs))
-                if letter == "a"
-                else tuple((o, o) for o in outputs)
-            )
-            label = "" if common else f"[{i + 1}]"
-            found += [
-                Parameter(letter, lag, places, label, float(values[lag])) for lag in range(1, len(values))
-            ]
         return found
 
     @cached_property

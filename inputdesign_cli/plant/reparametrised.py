@@ -168,6 +168,11 @@ class ReparametrisedLoop(Loop):
         return self._loop.predictor_poles
 
     @property
+    def integrates(self) -> bool:
+        """Whether plant or noise do."""
+        return self._loop.integrates
+
+    @property
     def instantaneous(self) -> Array:
         """(p + r, p + r): what acts without delay."""
         return self._loop.instantaneous

@@ -17,7 +17,7 @@ from inputdesign_cli.plant.transfer import TransferMatrix
 
 @dataclass(frozen=True)
 class SampledLoop(Loop):
-    """`Loop` with R = I and N = G, which is stable, and H = I.
+    """`Loop` with R = I and N = G, which has no poles outside the unit circle, and H = I.
 
     Poles and signals are those of the states of the entries of G and of the rows of C: polynomials in q^-1
     would lose the digits of poles that crowd at z = 1 when sampling is fast. States of G that feedback does
@@ -44,7 +44,9 @@ class SampledLoop(Loop):
     def closed_poles(self) -> ComplexArray:
         """All poles of the loop in z."""
         A, B, C = self._states
-        return np.linalg.eigvals(A + B @ np.linalg.solve(self.instantaneous, C)).astype(complex)
+        poles = np.linalg.eigvals(A + B @ np.linalg.solve(self.instantaneous, C)).astype(complex)
+        repeated = self.model.repeated_integrators
+        return poles[np.argsort(np.abs(poles - 1.0))][repeated:]
 
     @property
     def predictor_poles(self) -> ComplexArray:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.held import HeldEntry
+from inputdesign_cli.plant.held import HeldEntry, integrators
 from inputdesign_cli.plant.intersample import Intersample
 from inputdesign_cli.plant.model import Fraction, Parameter, WhiteNoise
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -77,6 +77,22 @@ class SampledModel(WhiteNoise):
     def poles(self) -> ComplexArray:
         """Poles in z of all entries."""
         return np.exp(self.continuous_plant.poles * self.sample_time)
+
+    @cached_property
+    def repeated_integrators(self) -> int:
+        """The integrators of single entries that are the same for the plant as a whole.
+
+        Of simple ones there are as many as the rank of their gains; no feedback moves the others, for they
+        take no part in G.
+        """
+        gains = np.zeros((self.outputs, self.inputs))
+        for (i, j), entry in self._entries.items():
+            count = integrators(entry.denominator)
+            if count > 1:
+                return 0
+            gains[i, j] = count and entry.numerator[0] / entry.denominator[1]
+        scale = max(float(np.abs(gains).max(initial=0.0)), 1e-300)
+        return int(np.count_nonzero(gains) - np.linalg.matrix_rank(gains / scale))
 
     @cached_property
     def realisation(self) -> StateSpace:

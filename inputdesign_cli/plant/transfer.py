@@ -145,6 +145,20 @@ class TransferMatrix:
         return cls(stack(rows), tuple(below))
 
     @classmethod
+    def of(cls, rows: Sequence[Sequence[Rational]]) -> TransferMatrix:
+        """From entries with denominators in factors; a factor that entries of a row share is kept once."""
+        tops, below = [], []
+        for row in rows:
+            own = [Counter(map(tuple, entry.denominator if np.any(entry.numerator) else ())) for entry in row]
+            shared = reduce(or_, own)
+            missing = [list((shared - factors).elements()) for factors in own]
+            tops.append(
+                [product_of([e.numerator, *rest]).tolist() for e, rest in zip(row, missing, strict=True)]
+            )
+            below.append(tuple(np.array(factor, dtype=float) for factor in shared.elements()))
+        return cls(stack(tops), tuple(below))
+
+    @classmethod
     def diagonal(cls, entry: Rational, size: int) -> TransferMatrix:
         """t(q) I of `size` rows."""
         return cls(np.eye(size)[:, :, None] * entry.numerator, (entry.denominator,) * size)

@@ -111,3 +111,73 @@ def test_the_bound_over_every_spectrum_closes_where_power_near_zero_is_free(samp
         load_spec(spec, [f"sample_time={sample_time}", "solver.any_spectrum_tolerance=1e-6"])
     ).result
     assert found["solver"]["any_spectrum_gap"] <= 1e-6
+
+
+TANK = """
+sample_time: 2
+noise: {variance: 0.04}
+experiment: {samples: 600}
+accuracy: {model_error: {relative: 0.1, band: [0.02, 1.5]}}
+spectrum: {type: multisine, lines: 60}
+signal: {seed: 1, samples: 240}
+solver: {tolerance: 1.0e-10}
+"""
+IN_WORDS = [
+    "{parameters: {k: 0.05, T: 10}, sample: zoh, "
+    "continuous: {numerator: [k], denominator: [[1, 0], [T, 1]]}}",
+    "{continuous: {numerator: [0.005], denominator: [1, 0.1, 0]}, sample: zoh, known: [a0]}",
+    # behind the hold, with E = exp(-2/T): poles 1 and E, and the numerator of the response to a step
+    "{parameters: {k: 0.05, E: 0.8187307530779818}, F: [1, -1 - E, E], "
+    "B: [0, k*(2 + 2/log(E)*(1 - E)), -k*(2*E + 2/log(E)*(1 - E))]}",
+]
+PI = "experiment: {samples: 600, controller: {numerator: [0.5, -0.48], denominator: [1, -1]}}"
+
+
+@pytest.mark.parametrize("loop", [None, PI], ids=["open loop", "PI"])
+def test_one_tank_in_three_words_is_one_design(loop):
+    rest = TANK if loop is None else TANK.replace("experiment: {samples: 600}", loop)
+    costs = [solve(parse_spec(f"plant: {plant}{rest}")).result["cost"] for plant in IN_WORDS]
+    np.testing.assert_allclose(costs, costs[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "spectrum={type: fir, order: 4}",
+        "spectrum={type: white}",
+        "spectrum={type: multisine, frequencies: [0, 0.1, 0.4]}",
+    ],
+)
+def test_power_at_the_pole_is_refused_in_open_loop(change):
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(f"plant: {IN_WORDS[0]}{TANK}", overrides=[change]))
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == ("infinite-information", "spectrum")
+    assert "of k" in found.message
+
+
+def test_a_band_without_the_pole_will_do():
+    text = f"plant: {IN_WORDS[0]}{TANK}limits: {{band: [0.02, 1.5]}}\n"
+    assert solve(parse_spec(text, overrides=["spectrum={type: white}"])).result["status"] == "optimal"
+
+
+def test_a_free_pole_that_white_noise_drives_has_no_finite_information():
+    rest = TANK.replace("experiment: {samples: 600}", PI)
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(f"plant: {IN_WORDS[1].replace(', known: [a0]', '')}{rest}"))
+    (found,) = caught.value.diagnostics
+    assert found.code == "infinite-information"
+    assert "known: [a0]" in found.hint
+
+
+def test_a_criterion_of_the_loop_error_refuses_integrators():
+    text = """
+plant: {B: [0, 0.2], F: [1, -1]}
+noise: {variance: 0.1}
+experiment: {samples: 100}
+accuracy: {closed_loop_error: {control: {minimum_variance: true}, reference: {variance: 1}}}
+limits: {input_power: 1}
+"""
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(text))
+    assert caught.value.diagnostics[0].code == "not-supported"

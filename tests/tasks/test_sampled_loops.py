@@ -185,7 +185,7 @@ def test_a_loop_is_identified_directly_and_topped_up(text, tmp_path):
         ("plant.continuous={numerator: [1, 9], denominator: [1, 2]}", "algebraic-loop"),
         ("plant.sample=null", "unsuitable-key"),
         ("experiment.controller={numerator: [[[40]]]}", "wrong-shape"),
-        ("plant.continuous.denominator=[1, 12, 0]", "unstable-polynomial"),
+        ("plant.continuous.denominator=[1, 12, 0]", "infinite-information"),
         ("accuracy.model_error.sensitivity.max_db=4", "admissible-not-positive"),
         (
             "accuracy.model_error.sensitivity={max_db: 6, controller: {numerator: [-11], denominator: [1]}}",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
 from inputdesign_cli.specification.models.shapes import size_of
 from inputdesign_cli.specification.models.spec import Spec
-from inputdesign_cli.specification.models.transfer import Controller
 from inputdesign_cli.specification.wording import count
 
 _SENSITIVITY = ("accuracy", "model_error", "sensitivity")
@@ -47,17 +47,25 @@ def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[Pa
         yield PathDiagnostic("unsuitable-key", message, "add sample: zoh to the plant", path)
     channels = (plant.inputs, plant.outputs)
     has = f"but the plant has {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
-    shape = size_of(controller.numerator)
-    if controller.kind == "discrete" and channels != (1, 1):
-        message = f"{{key}} is a single transfer function, {has}"
-        rows = "write numerator as rows (inputs) of columns (outputs) of coefficients"
-        hint = f"{rows}, and denominator likewise or as one for all entries"
-        yield PathDiagnostic("wrong-shape", message, hint, path)
-    elif controller.kind == "discrete_matrix" and channels == (1, 1):
+    if controller.kind == "loops":
+        for n, one in enumerate(controller.loops):
+            ends = ("input", one.input, plant.inputs), ("output", one.output, plant.outputs)
+            for key, place, most in ends:
+                if place > most:
+                    message = f"{{key}} is {place}, {has}"
+                    hint = f"count them from 1 to {most}"
+                    yield PathDiagnostic("wrong-shape", message, hint, (*path, "loops", n, key))
+    elif controller.kind != "discrete_matrix":
+        if channels != (1, 1):
+            message = f"{{key}} is a single transfer function, {has}"
+            rows = "write loops: [{output: 1, input: 1, controller: {..}}, ..], or numerator as rows (inputs)"
+            hint = f"{rows} of columns (outputs) of coefficients, and denominator likewise or one for all"
+            yield PathDiagnostic("wrong-shape", message, hint, path)
+    elif channels == (1, 1):
         message = "{key} is a matrix, but the plant has one input and one output"
         hint = "write numerator: [..] and denominator: [..]"
         yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))
-    elif shape != channels:
+    elif (shape := size_of(controller.numerator)) != channels:
         message = f"{{key}} is {shape[0]} x {shape[1]}, {has}"
         hint = "write a row for each input u and in it a column for each output y"
         yield PathDiagnostic("wrong-shape", message, hint, (*path, "numerator"))

@@ -8,14 +8,14 @@ from dataclasses import replace
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
-from inputdesign_cli.specification.models.polynomials import check_delay_stable
+from inputdesign_cli.specification.models.polynomials import check_no_growth
 from inputdesign_cli.specification.models.shapes import check_each, check_per_output
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.wording import count
 
 
 def stable_unless_controlled(spec: Spec) -> Iterator[PathDiagnostic]:
-    """A is stable in open loop; under a controller the loop must be, which the mathematics checks."""
+    """A is stable in open loop, integrators aside; under a controller the loop must be (see `plant`)."""
     yield from check_stable(spec, spec.plant, "plant")
 
 
@@ -23,7 +23,7 @@ def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnosti
     """A of the plant at `path` is stable unless a controller acts on it."""
     if spec.closed_loop or plant.kind != "polynomial":
         return
-    for found in check_each(plant.A, check_delay_stable, *path, "A"):
+    for found in check_each(plant.A, check_no_growth, *path, "A"):
         unstable = found.code == "unstable-polynomial"
         needs = "an unstable plant needs a loop: add experiment.controller, or " if unstable else ""
         yield replace(found, hint=needs + found.hint)
@@ -40,12 +40,15 @@ def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagn
     has = f"but the plant has {count(outputs, 'output')}"
     white = "the noise of a regression is white" if spec.plant.kind == "regression" else ""
     kind = white or ("" if spec.plant.sampled else "the plant is not sampled")
-    for key, value in (("C", noise.C), ("D", noise.D)):
+    for key, value in (("C", noise.C), ("D", noise.D), ("drift", ())):
         if kind and key in noise.model_fields_set:
-            message = f"{{key}} is a polynomial in q^-1, but {kind}"
+            message = f"{{key}} is {'a polynomial' if value else 'a root'} in q^-1, but {kind}"
             yield PathDiagnostic("unsuitable-key", message, f"remove {key}", (*path, key))
-        else:
+        elif value:
             yield from check_per_output(value, outputs, *path, key)
+    if len(noise.drifts) not in (1, outputs):
+        message = f"{{key}} is a list of {len(noise.drifts)}, {has}"
+        yield PathDiagnostic("wrong-shape", message, "write true, or one for each output", (*path, "drift"))
     variance = noise.variance
     if isinstance(variance, tuple) and len(variance) != outputs:
         message = f"{{key}} is {len(variance)} x {len(variance)}, {has}"

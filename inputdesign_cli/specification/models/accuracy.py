@@ -10,6 +10,7 @@ from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.control import ClosedLoopError
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import check_names
 from inputdesign_cli.specification.models.fields import (
     Band,
@@ -29,7 +30,7 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
 from inputdesign_cli.specification.models.sizes import SIZES
-from inputdesign_cli.specification.models.transfer import Controller, DiscreteTransfer, Transfer
+from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
 
 DEFAULT_CONFIDENCE = 0.95
 # Draws that lie on the rarer side.

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import Discriminator, Field
 
 from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.fields import (
     Count,
     CovarianceMatrix,
     FileName,
+    Flag,
+    MonicPerOutput,
     Names,
     NonNegative,
     Number,
@@ -23,10 +27,14 @@ from inputdesign_cli.specification.models.fields import (
     Variance,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.specification.models.section import TAG, Section, tag
 from inputdesign_cli.specification.models.shapes import with_paths
-from inputdesign_cli.specification.models.transfer import Controller
+from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import count
+
+# Roots on the unit circle come inside, as far as decimals can tell, when they are shrunk by this.
+_INSIDE = 1.0 - 1e-7
 
 InformationSource = Annotated[
     Annotated[FileName, tag("file")] | Annotated[SemidefiniteMatrix, tag("matrix")],
@@ -48,7 +56,13 @@ class NoiseShape(Section):
     """The filter C(q)/D(q) that colours the noise; one polynomial, or one per output."""
 
     C: StablePerOutput = Field(default=(1.0,), description="Monic, stable numerator in q^-1 (default 1).")
-    D: StablePerOutput = Field(default=(1.0,), description="Monic, stable denominator in q^-1 (default 1).")
+    D: MonicPerOutput = Field(
+        default=(1.0,),
+        description="Monic denominator in q^-1 (default 1), stable; on the unit circle where it is known.",
+    )
+    drift: PerChannel[Flag] = Field(
+        default=False, description="Whether the noise integrates as well; one for all outputs, or a list."
+    )
     variance: Variance | None = Field(default=None, description="Variance of e, or its covariance matrix.")
     known: Names | None = Field(
         default=None, description="Names of coefficients of C and D that are known and not estimated."
@@ -61,10 +75,29 @@ class NoiseShape(Section):
         return (self.variance or 1.0) * np.eye(outputs)
 
     @property
-    def filters(self) -> tuple[str, ...]:
-        """Which of C and D are not 1."""
-        stated = {"C": with_paths(self.C), "D": with_paths(self.D)}
-        return tuple(name for name, all_ in stated.items() if any(any(p[1:]) for _, p in all_))
+    def held(self) -> tuple[bool, ...]:
+        """Of each D, whether all of its coefficients are known."""
+        known, single = self.known or (), depth(self.D) == 1
+        return tuple(
+            len(p) > 1 and all(f"d{k}" + ("" if single else f"[{i + 1}]") in known for k in range(1, len(p)))
+            for i, (_, p) in enumerate(with_paths(self.D))
+        )
+
+    @property
+    def drifts(self) -> tuple[bool, ...]:
+        """Whether the noise integrates: one for all outputs, or one an output."""
+        return self.drift if isinstance(self.drift, tuple) else (self.drift,)
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """D is stable where it is estimated, and does not grow where it is known."""
+        for (place, polynomial), held in zip(with_paths(self.D), self.held, strict=True):
+            shrunk = tuple(c * _INSIDE**k for k, c in enumerate(polynomial)) if held else polynomial
+            if found := check_delay_stable(shrunk):
+                circle = (
+                    "" if held else "; noise that integrates is drift: true, and D may have such roots where "
+                )
+                hint = found.hint + (circle and circle + "noise.known lists all its coefficients")
+                yield replace(found, path=("D", *place), hint=hint)
 
 
 class Noise(NoiseShape):
@@ -82,6 +115,7 @@ class SimulationNoise(NoiseShape):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Its size is given once."""
+        yield from super().check()
         yield from self.exactly_one("variance", "relative_std")
 
 
@@ -136,8 +170,8 @@ class Experiment(Section):
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
     controller: Controller | None = Field(
         default=None,
-        description="C of the loop u = r - C y, in q^-1; present: the experiment is in closed loop. With "
-        "several channels numerator and denominator are rows (inputs) of columns (outputs).",
+        description="C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
+        "closed loop. With several channels: loops, or numerator and denominator as rows (inputs) of columns.",
     )
     prior: Prior | None = Field(default=None, description="Information already at hand.")
 

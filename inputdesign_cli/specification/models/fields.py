@@ -25,6 +25,7 @@ from inputdesign_cli.specification.models.polynomials import (
     check_delay_stable,
     check_leading,
     check_monic,
+    check_no_growth,
     check_not_zero,
 )
 from inputdesign_cli.specification.models.section import TAG, tag
@@ -159,7 +160,8 @@ Denominator = Annotated[_OneOrList[_Leading], AfterValidator(product_exists), _F
 """One polynomial or a list of factors, in whatever variable."""
 MonicPerOutput = Annotated[_OneOrList[_Monic], _PER_OUTPUT]
 StablePerOutput = Annotated[_OneOrList[_Stable], _PER_OUTPUT]
-StableMatrix = Annotated[_OneOrRows[_Stable], _MATRIX]
+StableMatrix = Annotated[_OneOrRows[Annotated[_Monic, holds(check_no_growth)]], _MATRIX]
+"""Stable but for integrators."""
 GainMatrix = Annotated[_OneOrRows[_Coefficients], _MATRIX]
 RowsMatrix = Annotated[
     _Rows[_Coefficients],

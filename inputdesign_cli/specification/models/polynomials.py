@@ -12,6 +12,9 @@ from inputdesign_cli.specification.wording import show
 
 Polynomial = tuple[float, ...]
 
+# Coefficients of which the sum is this small have a root at z = 1, as far as decimals can tell.
+_ROUNDING = 1e-12
+
 
 def product(factors: Iterable[Polynomial]) -> Polynomial:
     """The product of polynomials given by their coefficients (the order of the powers does not matter)."""
@@ -88,6 +91,20 @@ def _decimal_comma(polynomial: Polynomial) -> str:
     return ""
 
 
+def check_no_growth(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In q^-1, ascending: all roots lie inside the unit circle, but for integrators at z = 1."""
+    rest = np.asarray(polynomial, dtype=float)
+    while rest.size > 1 and abs(np.sum(rest)) <= _ROUNDING * np.sum(np.abs(rest)):
+        rest = np.cumsum(rest)[:-1]  # divided by 1 - q^-1
+    return check_delay_stable(tuple(rest.tolist()))
+
+
+def check_no_growth_in_s(polynomial: Polynomial) -> PathDiagnostic | None:
+    """In s, descending: all roots lie in the open left half plane, but for integrators at s = 0."""
+    last = max((i for i, c in enumerate(polynomial) if c), default=0)
+    return check_left_half_plane(polynomial[: last + 1])
+
+
 def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
     """In s, descending: all roots lie in the open left half plane."""
     roots, found = _roots(polynomial)
@@ -96,7 +113,7 @@ def check_left_half_plane(polynomial: Polynomial) -> PathDiagnostic | None:
     worst = roots[np.argmax(roots.real)]
     if worst.real < 0:
         return None
-    place = f"{worst.real:.4g}" + (f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else "")
+    place = f"{worst.real + 0.0:.4g}" + (f" +- {abs(worst.imag):.4g}j" if abs(worst.imag) > 1e-12 else "")
     return PathDiagnostic(
         "unstable-polynomial",
         f"{{key}} has a root at s = {place}; all poles must lie in the left half plane",

@@ -85,6 +85,7 @@ SIZES = {
     "simulation.runs": Size(1_000_000, "every run is an experiment and an estimate"),
     "coefficients of a numerator": Size(1001, "a longer delay calls for slower sampling"),
     "coefficients of a denominator": Size(301, "roots of higher orders mean nothing in double precision"),
+    "controller.delay": Size(1000, "a longer delay calls for slower sampling"),
     "inputs or outputs": Size(20, "a model has parameters for each pair of them"),
     "plant.regression": Size(200, "a design has an unknown for each pair of regressors"),
     "report.ellipses": Size(100, "every pair is a panel of the figure"),

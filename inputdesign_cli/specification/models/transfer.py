@@ -29,6 +29,7 @@ from inputdesign_cli.specification.models.polynomials import (
     Polynomial,
     check_delay_stable,
     check_left_half_plane,
+    check_no_growth_in_s,
     product,
 )
 from inputdesign_cli.specification.models.section import Section, pick
@@ -129,15 +130,20 @@ class ContinuousMatrix(_Matrix):
         if shapes := list(super().check()):
             yield from shapes
             return
-        yield from check_each(self.denominator, check_left_half_plane, "denominator")
+        yield from check_each(self.denominator, self.check_poles, "denominator")
         for i, row in enumerate(self.numerator_matrix):
             for j, entry in enumerate(row):
                 where = (i, j) if depth(self.numerator) == 3 else ()
                 yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
 
+    @staticmethod
+    def check_poles(denominator: Polynomial) -> PathDiagnostic | None:
+        """They lie in the open left half plane."""
+        return check_left_half_plane(denominator)
+
 
 class DelayedMatrix(ContinuousMatrix, family="continuous", phrase="a transfer matrix in s"):
-    """The same with dead times: those of a plant."""
+    """The same with dead times and integrators: those of a plant."""
 
     kind: ClassVar[Literal["rational"]] = "rational"
 
@@ -160,6 +166,11 @@ class DelayedMatrix(ContinuousMatrix, family="continuous", phrase="a transfer ma
         if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
+
+    @staticmethod
+    def check_poles(denominator: Polynomial) -> PathDiagnostic | None:
+        """They lie in the open left half plane, or at zero."""
+        return check_no_growth_in_s(denominator)
 
     @property
     def common(self) -> bool:
@@ -229,16 +240,6 @@ Transfer = Annotated[
     ),
 ]
 """A filter or weight, in q^-1 or in s."""
-
-Controller = Annotated[
-    DiscreteTransfer | DiscreteMatrix,
-    pick(lambda v: (DiscreteMatrix if depth(v.get("numerator")) > 1 else DiscreteTransfer).phrase),
-    Wording(
-        "a mapping of keys",
-        "write {numerator: [..], denominator: [..]} in q^-1; with several channels rows of columns of them",
-    ),
-]
-"""C of a loop u = r - C y: one transfer function, or rows (inputs) of columns (outputs) of them."""
 
 Target = Annotated[
     DiscreteTransfer | ContinuousTransfer | DiscreteMatrix | ContinuousMatrixTransfer,

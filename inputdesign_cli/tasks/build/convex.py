@@ -20,7 +20,7 @@ from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
-from inputdesign_cli.tasks.build.system import build_cost, build_experiment
+from inputdesign_cli.tasks.build.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
 from inputdesign_cli.tasks.factor_columns import FewColumns
 
@@ -41,7 +41,7 @@ def build_convex(spec: Spec) -> ConvexTask:
     experiment.whitened(1.0)  # says which parameters cannot be told apart
     check_pairs(spec, experiment.model.names)
     check_signal(spec)
-    basis = build_basis(spec, experiment.inputs, experiment.band)
+    basis = build_basis(spec, experiment.inputs, excitation_band(spec))
     grid = _grid_method(spec)
     check_design(spec, experiment, basis)
     question = Question(

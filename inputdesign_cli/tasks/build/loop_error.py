@@ -31,6 +31,8 @@ from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms
 
 _GRID = 512
 _CANDIDATES = 20
+# A pole this near to z = 1.
+_INTEGRATES = 1e-7
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
@@ -84,6 +86,13 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             hint="write variance in place of relative_std",
             key="simulation.noise",
         )
+    if any(noise.drifts):
+        raise bad_spec(
+            "not-supported",
+            "this version designs for the closed-loop error with noise that does not drift",
+            hint="write a root of D inside the unit circle in place of drift",
+            key="noise.drift",
+        )
     if plant.kind != "parameters" and plant.kind != "regression":
         for part, listed in (("noise", noise.known), (key, plant.known or plant.named_parameters)):
             if listed:
@@ -103,7 +112,15 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             hint="add sample: zoh to a continuous-time plant",
             key=key,
         )
-    return MatrixPlant.of(polynomial_model(plant, noise, noise.covariance(plant.outputs)))
+    made = MatrixPlant.of(polynomial_model(plant, noise, noise.covariance(plant.outputs)))
+    if np.any(np.abs(made.singularities) < _INTEGRATES):
+        raise bad_spec(
+            "not-supported",
+            "this version designs for the closed-loop error of plants that do not integrate",
+            hint="move the pole into the unit circle, or state the accuracy as model_error",
+            key=key,
+        )
+    return made
 
 
 def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, ControlLaw]:

@@ -220,7 +220,7 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
     given = None if asked is None else asked.controller or spec.experiment.controller
     if asked is None or given is None:
         raise ValueError("the spec has been checked: a bound on the sensitivity has a loop")
-    loop = build_loop(model, given)
+    loop = build_loop(spec, model, given)
     if not np.any(loop.controller.numerator):
         raise spec.complain(
             "no-feedback",

@@ -7,23 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.expressions import Expression
-from inputdesign_cli.plant import (
-    ContinuousModel,
-    Model,
-    Parameter,
-    Parametrisation,
-    PolynomialModel,
-    Reparametrised,
-    SampledModel,
-    Words,
-)
+from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
-
-_Coefficients = PolynomialModel | ContinuousModel | SampledModel
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
@@ -43,7 +32,7 @@ def delays_of(plant: ContinuousPlant) -> Rows:
     return rows if any(entry.size for row in rows for entry in row) else ()
 
 
-def reparametrised(spec: Spec, plant: PolynomialPlant | ContinuousPlant, model: _Coefficients) -> Model:
+def reparametrised(spec: Spec, plant: PolynomialPlant | ContinuousPlant, model: Listed) -> Model:
     """The model in the parameters that the spec names and without those that it knows.
 
     Raises:

@@ -47,13 +47,15 @@ def _true_system(spec: Spec) -> TrueSystem | None:
     plant, noise = study.plant or spec.plant, spec.noise
     if study.noise is not None:
         stated = study.noise
-        noise = Noise.model_construct(C=stated.C, D=stated.D, variance=stated.variance or 1.0)
-    if plant.kind == "continuous" and (spec.plant.kind == "polynomial" or noise.filters):
+        noise = Noise.model_construct(
+            C=stated.C, D=stated.D, drift=stated.drift, known=stated.known, variance=stated.variance or 1.0
+        )
+    if plant.kind == "continuous" and spec.plant.kind == "polynomial":
         plant = held_plant(plant, spec.sample_time)
     model = build_model(spec.model_copy(update={"plant": plant, "noise": noise}))
     controller = spec.experiment.controller
     try:
-        loop = None if controller is None else build_loop(model, controller)
+        loop = None if controller is None else build_loop(spec, model, controller)
     except SpecError as error:
         found = error.diagnostics[0]
         raise bad_spec(

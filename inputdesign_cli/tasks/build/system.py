@@ -10,17 +10,19 @@ import numpy as np
 from inputdesign_cli.design.convex.problem import Weight
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
+    Coloured,
     ContinuousModel,
+    Listed,
     Loop,
     Model,
     PolynomialModel,
     SampledModel,
-    TransferMatrix,
     close_loop,
     hold_entries,
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
 from inputdesign_cli.specification.models.spectrum import (
@@ -30,36 +32,31 @@ from inputdesign_cli.specification.models.spectrum import (
     MultisineSpectrum,
     PolynomialSpectrum,
 )
-from inputdesign_cli.specification.models.transfer import DiscreteMatrix, DiscreteTransfer
 from inputdesign_cli.specification.models.values import depth
+from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.demand import check_model
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.tables import read_columns
-from inputdesign_cli.tasks.build.weights import rational
 
 
 def build_model(spec: Spec) -> Model:
     """The model of `plant` and `noise`.
 
     Raises:
-        SpecError: `not-supported` for a regression, and for a plant in s whose noise is not white; what
-            is wrong with known and with named parameters.
+        SpecError: `not-supported` for a regression; what is wrong with known and with named parameters.
     """
     covariance = np.asarray(spec.noise.covariance(spec.plant.outputs), dtype=float)
     match spec.plant:
         case PolynomialPlant() as plant:
-            return reparametrised(spec, plant, polynomial_model(plant, spec.noise, covariance))
+            noise = spec.noise
+            one, pairs = np.ones(1), tuple(zip(_rows(noise.D), noise.held, strict=True))
+            inside = polynomial_model(plant, noise, covariance, [one if held else d for d, held in pairs])
+            outside = [d if held else one for d, held in pairs]
+            return reparametrised(spec, plant, _coloured(inside, noise, [one], outside))
         case ContinuousPlant() as plant:
-            for name in spec.noise.filters:
-                raise spec.complain(
-                    "not-supported",
-                    "this version takes the noise of a plant in s as white",
-                    hint="sample the plant and write it as polynomials A, B, F in q^-1, with coloured "
-                    f"noise; without {name} the noise, and with it the design, would be another",
-                    key=f"noise.{name}",
-                )
             matrix = plant.continuous
             continuous = ContinuousModel.monic(
                 _reversed(matrix.numerator_matrix),
@@ -70,7 +67,8 @@ def build_model(spec: Spec) -> Model:
                 common_delay=matrix.common_delay,
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
-            return reparametrised(spec, plant, model)
+            C, D = _rows(spec.noise.C), _rows(spec.noise.D)
+            return reparametrised(spec, plant, _coloured(model, spec.noise, C, D))
     raise spec.complain(
         "not-supported",
         "a regression has no dynamics to be estimated here",
@@ -79,14 +77,27 @@ def build_model(spec: Spec) -> Model:
     )
 
 
-def polynomial_model(plant: PolynomialPlant, noise: NoiseShape, covariance: Array) -> PolynomialModel:
-    """A plant in q^-1; A, C and D that the spec states once are common to the outputs."""
+def _coloured(model: Listed, noise: NoiseShape, C: Sequence[Array], D: Sequence[Array]) -> Listed:
+    """The model with these C and D and the drift of the noise; itself where there is nothing to add."""
+    if not any(noise.drifts) and all(len(p) == 1 for p in (*C, *D)):
+        return model
+    return Coloured(model, tuple(C), tuple(D), noise.held, noise.drifts)
+
+
+def polynomial_model(
+    plant: PolynomialPlant, noise: NoiseShape, covariance: Array, D: Sequence[Array] | None = None
+) -> PolynomialModel:
+    """A plant in q^-1; A, C and D that the spec states once are common to the outputs.
+
+    Args:
+        D: in place of those of the noise.
+    """
     return PolynomialModel(
         B=_arrays(plant.B_matrix),
         A=_rows(plant.A),
         F=_arrays(plant.F_matrix),
         C=_rows(noise.C),
-        D=_rows(noise.D),
+        D=_rows(noise.D) if D is None else tuple(D),
         covariance=covariance,
     )
 
@@ -104,30 +115,27 @@ def build_experiment(spec: Spec) -> Experiment:
     """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
     Raises:
-        SpecError: `needs-band`; `too-large`; an unstable or algebraic loop; a prior that does
-            not fit the parameters.
+        SpecError: `needs-band`; `too-large`; `infinite-information`; an unstable or algebraic
+            loop; a prior that does not fit the parameters.
         DataError: the record of a prior cannot be used.
     """
     model, controller = build_model(spec), spec.experiment.controller
     check_model(spec, model)
-    loop = None if controller is None else build_loop(model, controller)
+    loop = None if controller is None else build_loop(spec, model, controller)
     if loop is not None:
         loop.check_delay()
     experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+    experiment = on_finite_information(spec, experiment)
     return replace(experiment, prior=_prior(spec, experiment))
 
 
-def build_loop(model: Model, controller: DiscreteTransfer | DiscreteMatrix) -> Loop:
-    """The loop of a model that is sampled; a single transfer function is a controller of one entry.
+def build_loop(spec: Spec, model: Model, controller: Controller) -> Loop:
+    """The loop of a model that is sampled.
 
     Raises:
         SpecError: the loop is unstable or algebraic.
     """
-    match controller:
-        case DiscreteMatrix():
-            C = TransferMatrix.build(controller.numerator_matrix, controller.denominator_matrix)
-        case _:
-            C = TransferMatrix.diagonal(rational(controller), 1)
+    C = controller_matrix(controller, spec.sample_time, (model.inputs, model.outputs))
     loop = close_loop(model, C)
     loop.check_stability()
     return loop

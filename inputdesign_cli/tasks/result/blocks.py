@@ -6,7 +6,14 @@ import copy
 from collections.abc import Sequence
 from functools import singledispatch
 
-from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel, Reparametrised, SampledModel
+from inputdesign_cli.plant import (
+    Coloured,
+    ContinuousModel,
+    Model,
+    PolynomialModel,
+    Reparametrised,
+    SampledModel,
+)
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.plant.reparametrised import Place
@@ -61,6 +68,20 @@ def _(model: SampledModel) -> Blocks:
 
 
 @blocks_of.register
+def _(model: Coloured) -> Blocks:
+    blocks = blocks_of(model.plant)
+    own: dict[str, Json] = {
+        name: _rows(rows) for name, rows in (("C", model.C), ("D", model.D)) if _matter(rows)
+    }
+    inside = blocks["noise"].get("D")
+    if inside is not None and "D" in own:  # of each output one is 1
+        own["D"] = [one if len(one) > 1 else other for one, other in zip(own["D"], inside, strict=True)]
+    if any(model.drift):
+        own["drift"] = model.drift[0] if len(model.drift) == 1 else list(model.drift)
+    return {**blocks, "noise": blocks["noise"] | own}
+
+
+@blocks_of.register
 def _(model: Reparametrised) -> Blocks:
     words, blocks = model.words, blocks_of(model.coefficients)
     if words.plant is not None:
@@ -93,6 +114,12 @@ def predictor_of(model: Model) -> dict[str, list[Array]]:
 @predictor_of.register
 def _(model: PolynomialModel) -> dict[str, list[Array]]:
     return {"C": list(model.C), "D": list(model.D), "F": [p for row in model.F for p in row]}
+
+
+@predictor_of.register
+def _(model: Coloured) -> dict[str, list[Array]]:
+    free = [d for d, held in zip(model.D, model.held, strict=True) if not held]
+    return {**predictor_of(model.plant), "C": list(model.C), "D": free}
 
 
 @predictor_of.register

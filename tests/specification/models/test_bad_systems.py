@@ -19,7 +19,7 @@ ROWS: list[Row] = [
     ("unstable-polynomial", "plant.F", "radius 1.7 at 3.142 rad", {"plant": "{B: [1], F: §[1, 1.7]}"}),
     # z^2 + 1.21: roots +-1.1j, a quarter turn
     ("unstable-polynomial", "plant.F", "radius 1.1 at 1.571 rad", {"plant": "{B: [1], F: §[1, 0, 1.21]}"}),
-    ("unstable-polynomial", "plant.F", "radius 1 at", {"plant": "{B: [1], F: §[1, -1]}"}),
+    ("unstable-polynomial", "plant.F", "radius 1 at", {"plant": "{B: [1], F: §[1, 1]}"}),
     ("unstable-polynomial", "noise.D", "radius", {"noise": "{variance: 1, D: §[1, -2]}"}),
     ("unstable-polynomial", "plant.A", "experiment.controller", {"plant": "{B: [0, 1], A: §[1, -2]}"}),
     ("unstable-polynomial", "plant.A[1]", "radius 3", {
@@ -44,7 +44,7 @@ ROWS: list[Row] = [
     ("unstable-polynomial", "plant.continuous.denominator", "s = 1", {
         "plant": "{continuous: {numerator: [1], denominator: §[1, -1]}}"}),
     ("unstable-polynomial", "plant.continuous.denominator", "s = 0", {
-        "plant": "{continuous: {numerator: [1], denominator: §[1, 1, 0]}}"}),
+        "plant": "{continuous: {numerator: [1], denominator: §[1, 0, 1]}}"}),
     ("unstable-polynomial", "plant.continuous.denominator[1]", "left half", {
         "plant": "{continuous: {numerator: [1], denominator: [[1, 2], §[1, -3]]}}"}),
     ("unstable-polynomial", "plant.continuous.denominator[0][1]", "left half", {

@@ -1,0 +1,246 @@
+"""Estimates of models with noise that is coloured besides, or drifts: see `plant.coloured`.
+
+The records are those of the plant; their prediction errors and all that depends on them go through
+D (1 - q^-1) / C. Starts of the plant are made from differences where the noise drifts, those of C and D from
+what the plant leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.kind import Kind, Part, Starts
+from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.identification.search import Search
+from inputdesign_cli.identification.stability import is_stable, reflected
+from inputdesign_cli.identification.starts import noise_polynomials
+from inputdesign_cli.plant import Coloured
+from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.plant.polynomial import Array
+
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class ColouredRecord:
+    """A record of the plant against parameters (k,) of plant, C and D; see `Record`."""
+
+    record: Record
+    structure: Coloured
+
+    @property
+    def u(self) -> Array:
+        """(N, r)."""
+        return self.record.u
+
+    @property
+    def y(self) -> Array:
+        """(N, p)."""
+        return self.record.y
+
+    @property
+    def size(self) -> int:
+        """Number of parameters k."""
+        return len(self.structure.parameters)
+
+    def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Prediction errors (N, p) from rest, and psi (k, N, p)."""
+        model = self.structure.at(theta)
+        raw, of_plant = self.record.errors_and_gradient(self._of_plant(theta))
+        errors, psi = np.empty(raw.shape), np.zeros((self.size, *raw.shape))
+        for i, (above, below) in enumerate(model.inverse_filters):
+            errors[:, i] = filtered(above, below, raw[:, i])
+            psi[: len(of_plant), :, i] = filtered(above, below, of_plant[:, :, i])
+        for index, parameter in enumerate(model.own_parameters, start=len(of_plant)):
+            for i, _ in parameter.places:
+                polynomial, sign = model.below(parameter.letter, i)
+                if polynomial is not None and parameter.power < len(errors):
+                    late = filtered([sign], polynomial, errors[:, i])
+                    psi[index, parameter.power :, i] = late[: len(errors) - parameter.power]
+        return errors, psi
+
+    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): those of the plant, filtered, and impulses through 1 / C for past noise."""
+        model = self.structure.at(theta)
+        found = []
+        raw = self.record.free_responses(self._of_plant(theta))
+        for responses, (above, below) in zip(raw, model.inverse_filters, strict=True):
+            impulses = np.eye(max(above.size, below.size) - 1, responses.shape[1])
+            past = filtered([1.0], below, impulses) if len(impulses) else impulses
+            found.append(np.concatenate([filtered(above, below, responses), past]))
+        return tuple(found)
+
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those of the plant, and C and D."""
+        own = np.arange(len(self.structure.plant.parameters), self.size)
+        return np.concatenate([self.record.in_starts, own])
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """The derivatives of the free responses: of C and D by central differences."""
+        first = len(self.structure.plant.parameters)
+        if index < first:
+            filters = self.structure.at(theta).inverse_filters
+            slopes = self.record.free_slopes(self._of_plant(theta), index)
+            none = [np.zeros((max(a.size, b.size) - 1, len(self.y))) for a, b in filters]
+            return tuple(
+                np.concatenate([filtered(*own, x), zero])
+                for own, x, zero in zip(filters, slopes, none, strict=True)
+            )
+        step = _STEP * np.eye(self.size)[index]
+        ends = self.free_responses(theta + step), self.free_responses(theta - step)
+        return tuple((a - b) / (2.0 * _STEP) for a, b in zip(*ends, strict=True))
+
+    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
+        """(k, N, p): none; no instruments are used."""
+        return np.zeros((self.size, *errors.shape))
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """(p, N, m): signals (N, m) through the inverse of each output's noise model."""
+        raw = self.record.whitened(self._of_plant(theta), signals)
+        filters = self.structure.at(theta).inverse_filters
+        return np.array([filtered(*own, x, axis=0) for own, x in zip(filters, raw, strict=True)])
+
+    def stabilised(self, theta: Array) -> Array:
+        """theta with a stable predictor."""
+        first = len(self.structure.plant.parameters)
+        out = theta.copy()
+        out[:first] = self.record.stabilised(theta[:first])
+        for columns in self._monic:
+            monic = np.concatenate([[1.0], theta[columns]])
+            if not is_stable(monic[None])[0]:
+                out[columns] = reflected(monic)[1:]
+        return out
+
+    @cached_property
+    def _monic(self) -> list[NDArray[np.int64]]:
+        """Where the coefficients of each C, and of each D that is estimated, stand in theta."""
+        groups: dict[tuple[str, tuple[tuple[int, int], ...]], list[int]] = {}
+        for index, parameter in enumerate(self.structure.parameters):
+            own = index >= len(self.structure.plant.parameters)
+            if own and self.structure.below(parameter.letter, parameter.places[0][0])[0] is not None:
+                groups.setdefault((parameter.letter, parameter.places), []).append(index)
+        return [np.array(indices) for indices in groups.values()]
+
+    def _of_plant(self, theta: Array) -> Array:
+        return theta[: len(self.structure.plant.parameters)]
+
+
+@dataclass(frozen=True)
+class ColouredKind:
+    """The structure of `model`; that of its plant is `plant`; see `Kind`."""
+
+    model: Coloured
+    plant: Kind
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the parameters."""
+        return self.model.names
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.model.outputs
+
+    @property
+    def recent(self) -> int:
+        """The lag up to which the structure looks at the inputs."""
+        return self.plant.recent
+
+    @property
+    def explaining(self) -> NDArray[np.bool_]:
+        """(k,): those of the plant."""
+        return np.concatenate([self.plant.explaining, np.zeros(self._own, dtype=bool)])
+
+    @property
+    def whitening(self) -> NDArray[np.bool_]:
+        """(k,): those of the plant, and C and D."""
+        return np.concatenate([self.plant.whitening, np.ones(self._own, dtype=bool)])
+
+    @property
+    def _own(self) -> int:
+        return len(self.model.own_parameters)
+
+    def own(self) -> Array:
+        """(p,): how many parameters each output has; those that several share count by their share."""
+        taken = self.plant.own()
+        for parameter in self.model.own_parameters:
+            rows = [i for i, _ in parameter.places]
+            taken[rows] += 1.0 / len(rows)
+        return taken
+
+    def record(self, u: Array, y: Array) -> ColouredRecord:
+        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        return ColouredRecord(self.plant.record(u, y), self.model)
+
+    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+        """Those of the plant, each with C and D from what it leaves, and the `given` one."""
+        first = len(self.model.plant.parameters)
+        known = reduce(np.convolve, {tuple(p): p for p in self.model.fixed}.values())
+        found = self.plant.starts(
+            [(_clear(known, u), _clear(known, y)) for u, y in parts], None if given is None else given[:first]
+        )
+        points = [np.concatenate([theta, self._noise(parts, theta)]) for theta in found.points]
+        listed = [given] if given is not None else []
+        return Starts(
+            np.array([*listed, *points]),
+            np.append(np.zeros(len(listed), dtype=np.int64), found.steps),
+            found.tried + len(listed),
+        )
+
+    def _noise(self, parts: Sequence[Part], theta: Array) -> Array:
+        """C and D from what the plant leaves of the first part; those common to outputs by their mean."""
+        u, y = parts[0]
+        errors, _ = self.plant.record(u, y).errors_and_gradient(theta)
+        if not np.all(np.isfinite(errors)):
+            return np.zeros(self._own)
+        orders = {letter: [0] * self.outputs for letter in "cd"}
+        for parameter in self.model.own_parameters:
+            for i, _ in parameter.places:
+                orders[parameter.letter][i] = max(orders[parameter.letter][i], parameter.power)
+        values: dict[tuple[str, int, int], float] = {}
+        for i, fixed in enumerate(self.model.fixed):
+            c, d = (orders[letter][i] for letter in "cd")
+            for letter, row in zip("cd", noise_polynomials(_clear(fixed, errors[:, i]), c, d), strict=True):
+                values |= {(letter, lag, i): float(value) for lag, value in enumerate(row, start=1)}
+        return np.array(
+            [
+                np.mean([values[one.letter, one.power, i] for i, _ in one.places])
+                for one in self.model.own_parameters
+            ]
+        )
+
+    def holding(self, known: NDArray[np.bool_]) -> ColouredKind:
+        """The same; the plant keeps what it knows."""
+        return replace(self, plant=self.plant.holding(known[: len(self.model.plant.parameters)]))
+
+    def simulated(
+        self, found: Search, y: Array, lengths: Sequence[int] | None
+    ) -> tuple[Array, Sequence[bool]]:
+        """As the plant tells, of the errors and starts before they were filtered."""
+        theta = found.point.theta[: len(self.model.plant.parameters)]
+        shaped = self.model.at(found.point.theta).shaped
+        at = np.cumsum(found.records.lengths)[:-1]
+        errors, begun = (
+            np.concatenate([shaped(part) for part in np.split(whole, at)])
+            for whole in (found.point.errors, found.point.near.begun)
+        )
+        records = replace(found.records, parts=_of_plant(found.records, self.plant), earlier=None)
+        near = replace(found.point.near, errors=errors, begun=begun)
+        point = replace(found.point, theta=theta, near=near)
+        return self.plant.simulated(replace(found, records=records, point=point), y, lengths)
+
+
+def _of_plant(records: Records, plant: Kind) -> tuple[Record, ...]:
+    return tuple(plant.record(part.u, part.y) for part in records.parts)
+
+
+def _clear(known: Array, signals: Array) -> Array:
+    """Signals (N, ..) through a polynomial, without the samples that it begins with."""
+    return filtered(known, [1.0], signals, axis=0)[known.size - 1 :]

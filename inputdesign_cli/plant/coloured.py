@@ -1,0 +1,278 @@
+"""Any model with noise that is coloured besides, by polynomials in q^-1, or drifts.
+
+With H = H0 C / (D (1 - q^-1)) the prediction errors of output i are those of the model, filtered once more:
+epsilon_i = (D_i (1 - q^-1) / C_i) epsilon0_i ([ljung-1999], Section 4.2). What integrates is known and has no
+parameter, so that it is no more than this filter: signals are differenced, and noise is summed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.loop import Loop, close_loop
+from inputdesign_cli.plant.model import Fraction, Listed, Parameter, Parametrised, row_parameters
+from inputdesign_cli.plant.polynomial import (
+    Array,
+    ComplexArray,
+    evaluate,
+    join_roots,
+    roots_in_z,
+    unit_circle,
+)
+from inputdesign_cli.plant.transfer import TransferMatrix
+
+_T = TypeVar("_T")
+_ONE = (np.ones(1),)
+_DIFFERENCE = np.array([1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Coloured(Parametrised):
+    """`plant` with H0, its noise filtered by C_i / (D_i Delta_i); H0 is diagonal.
+
+    Attributes:
+        C, D: monic, one common to all outputs or one an output. Their coefficients are parameters, after
+            those of the plant.
+        held: of each D, whether it is known; then it may have roots on the unit circle, and the gradient with
+            respect to its coefficients is not asked for (and given as zero).
+        drift: whether the noise integrates, Delta = 1 - q^-1; one for all outputs or one an output.
+    """
+
+    plant: Listed
+    C: tuple[Array, ...] = _ONE
+    D: tuple[Array, ...] = _ONE
+    held: tuple[bool, ...] = (False,)
+    drift: tuple[bool, ...] = (False,)
+
+    @property
+    def continuous(self) -> bool:
+        """Whether frequencies are in rad per time unit."""
+        return self.plant.continuous
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs r."""
+        return self.plant.inputs
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.plant.outputs
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) of e."""
+        return self.plant.covariance
+
+    @cached_property
+    def own_parameters(self) -> tuple[Parameter, ...]:
+        """The coefficients of C and D."""
+        return tuple(
+            one
+            for letter, rows in (("c", self.C), ("d", self.D))
+            for one in row_parameters(letter, rows, self.outputs, self.inputs)
+        )
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those of the plant, then the coefficients of C and D."""
+        return (*self.plant.parameters, *self.own_parameters)
+
+    @cached_property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): the parameters on which G depends."""
+        return np.concatenate([self.plant.in_plant, np.zeros(len(self.own_parameters), dtype=bool)])
+
+    @cached_property
+    def fixed(self) -> tuple[Array, ...]:
+        """What is known of the filter of each output, a polynomial: D where it is held, and Delta."""
+        return tuple(
+            np.convolve(d if held else np.ones(1), _DIFFERENCE if drifts else np.ones(1))
+            for d, held, drifts in zip(*map(self._per_output, (self.D, self.held, self.drift)), strict=True)
+        )
+
+    @cached_property
+    def inverse_filters(self) -> tuple[tuple[Array, Array], ...]:
+        """Output by output D Delta and C: their quotient filters the prediction errors of the plant."""
+        free = [
+            np.ones(1) if held else d
+            for d, held in zip(self._per_output(self.D), self._per_output(self.held), strict=True)
+        ]
+        return tuple(
+            (np.convolve(d, fixed), c)
+            for d, fixed, c in zip(free, self.fixed, self._per_output(self.C), strict=True)
+        )
+
+    def _per_output(self, rows: Sequence[_T]) -> Sequence[_T]:
+        return tuple(rows) * self.outputs if len(rows) == 1 else rows
+
+    @cached_property
+    def estimated_roots(self) -> ComplexArray:
+        """Roots in z of what is estimated of C and D."""
+        free = [d for d, held in zip(self.D, self.held, strict=True) if not held]
+        return join_roots(roots_in_z(p) for p in (*self.C, *free))
+
+    @property
+    def integrates(self) -> bool:
+        """Whether some noise has infinite power at frequency zero."""
+        return any(abs(np.sum(p)) < 1e-9 for p in self.fixed)
+
+    @property
+    def memory(self) -> float:
+        """See `Model`."""
+        return self.plant.memory + max(above.size + below.size for above, below in self.inverse_filters)
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        return np.concatenate([self.plant.singularities, logarithmic_distance(self.estimated_roots)])
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        return self.plant.entry_singularities(output, input)
+
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): those of the plant."""
+        return np.concatenate(
+            [self.plant.bends(output, input), np.zeros(len(self.own_parameters), dtype=bool)]
+        )
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """That of the plant; it does not depend on C and D."""
+        part = self.plant.entry_fraction(output, input, w)
+        none = np.zeros((len(part.numerator), len(self.own_parameters)), dtype=complex)
+        return replace(
+            part,
+            numerator_gradient=np.concatenate([part.numerator_gradient, none], axis=1),
+            denominator_gradient=np.concatenate([part.denominator_gradient, none], axis=1),
+        )
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
+        return self.plant.plant_at(w)
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
+        return self._with_own(self.plant.plant_gradient(w))
+
+    def shape_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p): C / (D Delta)."""
+        return 1.0 / self._inverse_at(w)
+
+    def _inverse_at(self, w: ArrayLike) -> ComplexArray:
+        q = unit_circle(w)
+        return np.stack([evaluate(a, q) / evaluate(b, q) for a, b in self.inverse_filters], axis=-1)
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dtheta (n, k, p, r)."""
+        return self._with_own(self.plant.input_gradient(w) * self._inverse_at(w)[:, None, :, None])
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dtheta (n, k, p, p)."""
+        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
+        return self._with_own(self.plant.noise_gradient(w), w, e)
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """(n, k, p, m), see `Model`."""
+        of_signals = self.plant.prediction_gradient(w, y, u, np.zeros_like(e))
+        of_errors = self.plant.prediction_gradient(w, np.zeros_like(y), np.zeros_like(u), e)
+        return self._with_own(of_signals * self._inverse_at(w)[:, None, :, None] + of_errors, w, e)
+
+    def _with_own(
+        self, of_plant: ComplexArray, w: ArrayLike | None = None, e: NDArray | None = None
+    ) -> ComplexArray:
+        """A gradient (n, k, p, m) from that of the plant; C and D show in what e (n, p, m) causes."""
+        shape = (len(of_plant), len(self.own_parameters), *of_plant.shape[2:])
+        own = np.zeros(shape, dtype=complex)
+        if w is not None and e is not None:
+            q = unit_circle(w)
+            for index, parameter in enumerate(self.own_parameters):
+                for i, _ in parameter.places:
+                    below, sign = self.below(parameter.letter, i)
+                    if below is not None:
+                        factor = sign * q**parameter.power / evaluate(below, q)
+                        own[:, index, i] = factor[:, None] * e[:, i]
+        return np.concatenate([of_plant, own], axis=1)
+
+    def below(self, letter: str, output: int) -> tuple[Array | None, float]:
+        """C or D of an output, and the sign of its gradient; None of a D that is held."""
+        if letter == "c":
+            return self._per_output(self.C)[output], 1.0
+        return None if self._per_output(self.held)[output] else self._per_output(self.D)[output], -1.0
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> Coloured:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        values, rows = np.asarray(theta, dtype=float), {"c": list(self.C), "d": list(self.D)}
+        first = len(self.plant.parameters)
+        tables = {letter: [p.copy() for p in polynomials] for letter, polynomials in rows.items()}
+        for parameter, value in zip(self.own_parameters, values[first:], strict=True):
+            own = tables[parameter.letter]
+            own[0 if len(own) == 1 else parameter.places[0][0]][parameter.power] = value
+        return replace(
+            self, plant=self.plant.at(values[:first], covariance), C=tuple(tables["c"]), D=tuple(tables["d"])
+        )
+
+    def shaped(self, e: Array) -> Array:
+        """e (.., n, p) through C / (D Delta), from rest."""
+        shaped = [filtered(b, a, e[..., i]) for i, (a, b) in enumerate(self.inverse_filters)]
+        return np.stack(shaped, axis=-1)
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        return self.plant.simulate(u, self.shaped(e), step)
+
+
+@dataclass(frozen=True)
+class ColouredLoop(Loop):
+    """The loop around the plant, driven by noise that is filtered first."""
+
+    model: Coloured
+
+    @cached_property
+    def _loop(self) -> Loop:
+        return close_loop(self.model.plant, self.controller)
+
+    @property
+    def closed_poles(self) -> ComplexArray:
+        """All poles of the loop in z."""
+        return self._loop.closed_poles
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction."""
+        return np.concatenate([self._loop.predictor_poles, self.model.estimated_roots])
+
+    @property
+    def integrates(self) -> bool:
+        """Whether plant or noise do."""
+        return self._loop.integrates or self.model.integrates
+
+    @property
+    def instantaneous(self) -> Array:
+        """(p + r, p + r): what acts without delay."""
+        return self._loop.instantaneous
+
+    def left_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p + r, p + r): the matrix on the left of `Loop`."""
+        return self._loop.left_at(w)
+
+    def noise_at(self, w: ArrayLike) -> ComplexArray:
+        """R H (n, p, p)."""
+        return self._loop.noise_at(w) * self.model.shape_at(w)[:, None, :]
+
+    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
+        """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
+        return self._loop.signals(r, self.model.shaped(e))
+
+
+@close_loop.register
+def _(model: Coloured, controller: TransferMatrix) -> ColouredLoop:
+    return ColouredLoop(model, controller)

@@ -1,0 +1,84 @@
+"""Controllers in s as a computer runs them: q^-1 in place of s ([astrom-wittenmark-1997], Chapter 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.sampling import zero_order_hold
+from inputdesign_cli.plant.transfer import Rational, product_of
+
+Rule = Literal["tustin", "backward", "zoh"]
+_DIFFERENCE = np.array([1.0, -1.0])
+_SUM = np.array([1.0, 1.0])
+
+
+def discretised(
+    numerator: Sequence[float], factors: Sequence[Sequence[float]], period: float, rule: Rule
+) -> Rational:
+    """A proper transfer function in s in q^-1.
+
+    Args:
+        numerator: descending in s; `factors` of the denominator likewise.
+        period: between samples, in the unit of time of s.
+    """
+    if rule == "zoh":
+        return zero_order_hold(numerator, product_of(factors).tolist(), period)
+    orders = [len(factor) - 1 for factor in factors]
+    below = [_substituted(factor, order, period, rule) for factor, order in zip(factors, orders, strict=True)]
+    lead = float(np.prod([p[0] for p in below]))
+    top = _substituted(np.trim_zeros(np.asarray(numerator, dtype=float), "f"), sum(orders), period, rule)
+    return Rational(top / lead, tuple(p / p[0] for p in below))
+
+
+def _substituted(descending: Sequence[float] | Array, order: int, period: float, rule: Rule) -> Array:
+    """A polynomial at s = (1 - q^-1) / (h or h/2 (1 + q^-1)), times the denominator to the power `order`."""
+    total = np.zeros(order + 1)
+    for power, coefficient in enumerate(descending[::-1]):
+        ups = [_DIFFERENCE] * power
+        downs = [_SUM] * (order - power) if rule == "tustin" else []
+        rate = (2.0 if rule == "tustin" else 1.0) / period
+        term = coefficient * rate**power * product_of([*ups, *downs])
+        total[: term.size] += term
+    return total
+
+
+def pid(
+    gain: float, integral: float | None, derivative: float, filtering: float, period: float, rule: Rule
+) -> Rational:
+    """Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)) in q^-1; its integrator is a factor of its own.
+
+    Args:
+        integral: Ti, None for no integral action; `derivative` Td, `filtering` Tf.
+    """
+    parts = [Rational(np.array([gain]), ())]
+    if integral is not None:
+        parts.append(discretised([gain / integral], [[1.0, 0.0]], period, rule))
+        parts[-1] = Rational(parts[-1].numerator, (_DIFFERENCE,))
+    if derivative:
+        slope = [gain * derivative, 0.0]
+        if filtering:
+            parts.append(discretised(slope, [[filtering, 1.0]], period, rule))
+        else:
+            parts.append(Rational(gain * derivative / period * _DIFFERENCE, ()))
+    return _added(parts)
+
+
+def _added(parts: Sequence[Rational]) -> Rational:
+    """The sum of parts that have no pole in common."""
+    below = tuple(factor for part in parts for factor in part.denominator)
+    total = np.zeros(1)
+    for part in parts:
+        others = [factor for other in parts if other is not part for factor in other.denominator]
+        term = product_of([part.numerator, *others])
+        size = max(term.size, total.size)
+        total = np.pad(total, (0, size - total.size)) + np.pad(term, (0, size - term.size))
+    return Rational(total, below)
+
+
+def delayed(transfer: Rational, samples: int) -> Rational:
+    """The same, so many samples later."""
+    return Rational(np.concatenate([np.zeros(samples), transfer.numerator]), transfer.denominator)

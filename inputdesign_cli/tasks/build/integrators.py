@@ -1,0 +1,89 @@
+"""Spec -> where the excitation of a plant that integrates may have power, so that what it tells is finite."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.spectrum import (
+    GivenMultisine,
+    GivenSignal,
+    GivenSpectrum,
+    MultisineSpectrum,
+)
+from inputdesign_cli.tasks.build.header import build_units
+
+_FAR, _CLOSE = 1e-3, 1e-4
+_GROWS = 5.0
+# Of the band, what is left out where nothing else says it.
+_MARGIN = 0.01
+
+
+def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
+    """The experiment, its band without frequency zero where only lines beside it are excited.
+
+    Next to a pole at z = 1 that is not in a loop the gradient of the prediction grows without end, and so
+    does what any power there tells.
+
+    Raises:
+        SpecError: `infinite-information`.
+    """
+    source = experiment.model if experiment.loop is None else experiment.loop
+    if not experiment.model.continuous:
+        endless = _growing(experiment, source.noise_gradient)
+        if endless:
+            raise spec.complain(
+                "infinite-information",
+                f"the noise alone, integrated by the plant, tells without end of {endless}",
+                hint=f"list it in plant.known: [{endless.split(', ')[0]}]; in q^-1 it may be free as "
+                "a root of A, where the noise passes through it as well",
+                key="plant",
+            )
+    lo, hi = experiment.band
+    grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
+    if not grown:
+        return experiment
+    lowest = _lowest_line(spec, hi)
+    if lowest is not None and lowest > 0.0:
+        return replace(experiment, band=(0.5 * lowest, hi))
+    unit = build_units(spec).frequency
+    loop = ", under a controller" if experiment.loop is None else ", under a controller that integrates"
+    raise spec.complain(
+        "infinite-information",
+        f"the plant integrates: power at frequency zero tells without end of {grown}, so that no design with "
+        "power there has a value",
+        hint=f"leave it out, limits: {{band: [{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}} or spectrum: "
+        f"{{type: multisine, lines: 100}}; or make the experiment in closed loop{loop}",
+        key="spectrum" if spec.spectrum is not None else "plant",
+    )
+
+
+def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
+    """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero."""
+    source = experiment.model if experiment.loop is None else experiment.loop
+    distance = np.abs(source.singularities)
+    scale = float(np.min(distance[distance > 1e-7], initial=experiment.band[1]))
+    size: Array = np.abs(gradient(scale * np.array([_FAR, _CLOSE]))).max(axis=(2, 3))
+    grows = size[1] > _GROWS * size[0]
+    return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
+
+
+def _lowest_line(spec: Spec, hi: float) -> float | None:
+    """The lowest frequency of an excitation of lines, in the unit of the experiment; None for others."""
+    unit = build_units(spec).frequency
+    match spec.spectrum:
+        case MultisineSpectrum(frequencies=given) if given:
+            return given[0] * unit
+        case MultisineSpectrum(lines=lines):
+            return hi / ((lines or 1) + (not spec.plant.sampled))
+        case GivenSpectrum(given=GivenMultisine(frequencies=given)):
+            return given[0] * unit
+        case GivenSpectrum(given=GivenSignal()):
+            return hi / spec.experiment.samples
+    return None

@@ -1,0 +1,177 @@
+"""Noise that is coloured besides, or drifts: the same models by polynomials inside, and by differences."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.identification import identify
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.plant import (
+    Coloured,
+    ContinuousModel,
+    Parametrisation,
+    PolynomialModel,
+    Reparametrised,
+    SampledModel,
+    TransferMatrix,
+    close_loop,
+)
+from inputdesign_cli.spectrum import FirBasis
+from tests.support.plants import arrays, descending
+
+W = np.concatenate([np.geomspace(1e-3, 0.1, 10), np.linspace(0.1, np.pi, 20)])
+C, D = np.array([1.0, 0.5, 0.2]), np.array([1.0, -0.7])
+B, F = [0, 0.4, 0.1], [1, -1.2, 0.5]
+PI = TransferMatrix.build([[[0.5, -0.3]]], [[[1, -1]]])
+COVARIANCE = np.array([[1.0, 0.3], [0.3, 0.5]])
+ROWS = [[[0, 0.3], [0, 0, -0.2]], [[0.0], [0, 0.5]]], [[[1, -0.5], [1, 0.2]], [[1], [1, -0.8]]]
+
+
+def outside():
+    """C and D around a model with none, in the order of the one that has them inside: b, c, d, f."""
+    model = Coloured(PolynomialModel.single(B, F=F, variance=0.3), (C,), (D,))
+    order = [0, 1, 4, 5, 6, 2, 3]
+    assert [model.names[i] for i in order] == ["b1", "b2", "c1", "c2", "d1", "f1", "f2"]
+    return model, order
+
+
+def inside(D=D):
+    return PolynomialModel.single(B, F=F, C=C, D=D, variance=0.3)
+
+
+def test_gradients_are_those_of_polynomials_inside():
+    (model, order), known = outside(), inside()
+    rng = np.random.default_rng(0)
+    y, u, e = (rng.standard_normal((W.size, 1, 2)) + 0j for _ in range(3))
+    for one, other in (
+        (model.input_gradient(W), known.input_gradient(W)),
+        (model.noise_gradient(W), known.noise_gradient(W)),
+        (model.plant_gradient(W), known.plant_gradient(W)),
+        (model.prediction_gradient(W, y, u, e), known.prediction_gradient(W, y, u, e)),
+    ):
+        np.testing.assert_allclose(one[:, order], other, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_experiments_are_those_of_polynomials_inside(loop):
+    (model, order), known = outside(), inside()
+    loops = [close_loop(m, PI) if loop else None for m in (model, known)]
+    a, b = (Experiment(m, 50, loop=one) for m, one in zip((model, known), loops, strict=True))
+    pick = np.ix_(order, order)
+    np.testing.assert_allclose(a.noise_information[pick], b.noise_information, rtol=1e-9, atol=1e-9)
+    basis = FirBasis(3)
+    maps = [basis.integrals(e.information_density, e.singularities) for e in (a, b)]
+    np.testing.assert_allclose(maps[0][:, order][:, :, order], maps[1], rtol=1e-9, atol=1e-9)
+    record = np.random.default_rng(1).standard_normal((90, 1))
+    psi = [FiniteRecord(e, 90).gradient(record) for e in (a, b)]
+    np.testing.assert_allclose(psi[0][:, order], psi[1], atol=1e-9)
+    if loop:
+        r, e = np.random.default_rng(2).standard_normal((2, 4, 60, 1))
+        for one, other in zip(loops[0].signals(r, e), loops[1].signals(r, e), strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-10)
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_drift_is_a_root_of_d_that_is_known(loop):
+    """D (1 - q^-1) inside, its coefficients known: F_x and the noise information of the others."""
+    drifting = Coloured(inside(), drift=(True,))
+    whole = inside(np.convolve(D, [1, -1]))
+    known = Reparametrised(whole, Parametrisation.identity(whole.names, whole.theta, ["d1", "d2"]))
+    held = Reparametrised(drifting, Parametrisation.identity(drifting.names, drifting.theta, ["d1"]))
+    w = W[W > 0.02]
+    models = [Experiment(model, 50, loop=close_loop(model, PI) if loop else None) for model in (held, known)]
+    gradients = [e.excitation_gradient(w) for e in models]
+    np.testing.assert_allclose(gradients[0], gradients[1], rtol=1e-8, atol=1e-12)
+    noises = [e.noise_gradient(w) for e in models]
+    np.testing.assert_allclose(noises[0], noises[1], rtol=1e-8, atol=1e-12)
+    assert np.all(np.isfinite(models[0].noise_information))
+
+
+def test_each_output_has_its_own_drift_and_filters():
+    """Simulated noise of two outputs, one of which is summed; the gradient of a record by differences."""
+    one = (np.ones(1),)
+    plant = PolynomialModel(arrays(ROWS[0]), one, arrays(ROWS[1]), one, one, COVARIANCE)
+    model = Coloured(plant, (C, np.ones(1)), (np.ones(1), D), (False, False), (True, False))
+    assert model.names[-3:] == ("c1[1]", "c2[1]", "d1[2]")
+    e = np.random.default_rng(0).standard_normal((80, 2))
+    _, v = model.simulate(np.zeros((80, 2)), e, 1.0)
+    np.testing.assert_allclose(np.diff(v[:, 0], prepend=0.0), np.convolve(C, e[:, 0])[:80], atol=1e-12)
+    np.testing.assert_allclose(np.convolve(D, v[:, 1])[:80], e[:, 1], atol=1e-12)
+    check_record(model, 120)
+
+
+def check_record(model, samples):
+    """psi of a record with noise by differences of its errors, which at the truth are the noise itself."""
+    rng = np.random.default_rng(3)
+    u, e = rng.standard_normal((samples, model.inputs)), rng.standard_normal((samples, model.outputs))
+    kind = estimator(model, 1.0).kind
+    record = kind.record(u, sum(model.simulate(u, e, 1.0)))
+    errors, psi = record.errors_and_gradient(model.theta)
+    np.testing.assert_allclose(errors, e, atol=1e-9)
+    for k, step in enumerate(1e-6 * np.eye(model.theta.size)):
+        up, down = (record.errors_and_gradient(model.theta + s * step)[0] for s in (1, -1))
+        np.testing.assert_allclose(psi[k], (down - up) / 2e-6, atol=1e-6 * max(np.abs(psi[k]).max(), 1.0))
+
+
+def test_record_of_a_sampled_plant():
+    check_record(Coloured(heater(), (C,), (D,), drift=(True,)), 150)
+
+
+def heater():
+    late = ((np.array([1.685]),),)
+    plant = ContinuousModel.monic(
+        descending([[[2.0]]]), descending([[[3.0, 1]]]), 0.01 * np.eye(1), delay=late
+    )
+    return SampledModel(plant, 0.5)
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [{"C": (C,), "D": (D,)}, {"drift": (True,)}, {"C": (np.array([1.0, -0.4]),), "drift": (True,)}],
+    ids=["ARMA", "random walk", "IMA"],
+)
+@pytest.mark.parametrize("feedback", [False, True])
+def test_estimates_with_coloured_and_drifting_noise(noise, feedback):
+    """Within four standard deviations of the truth from afar, in open loop and in a loop."""
+    model = Coloured(heater(), **noise)
+    rng = np.random.default_rng(7)
+    r = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
+    e = 0.1 * rng.standard_normal((800, 1))
+    if feedback:
+        loop = close_loop(model, TransferMatrix.build([[[0.4, -0.35]]], [[[1, -1]]]))
+        loop.check_stability()
+        y, u = (x[0] for x in loop.signals(r[None], e[None]))
+    else:
+        u, y = r, sum(model.simulate(r, e, 1.0))
+    far = model.theta * np.where(np.array(model.names) == "delay", 2.0, 0.5)
+    found = identify(model, u, y, start=far, feedback=feedback, rest=True)
+    assert found.converged
+    assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+    assert found.failed == ()
+
+
+def test_a_level_that_is_unknown_is_no_matter_to_a_drift():
+    """A record about another level, begun away from rest."""
+    model = Coloured(PolynomialModel.single([0, 0.5], F=[1, -0.8], variance=0.01), drift=(True,))
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.choice([-1.0, 1.0], (200, 1)), 4, axis=0)
+    y = sum(model.simulate(u, 0.1 * rng.standard_normal((800, 1)), 1.0))
+    found = identify(model, u[100:], 20.0 + y[100:], start=model.theta)
+    assert np.all(np.abs(found.theta - model.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+    assert found.free
+
+
+def test_a_root_on_the_circle_may_be_known():
+    """A disturbance of a known period: D = 1 - 2 cos(w0) q^-1 + q^-2."""
+    seasonal = np.array([1.0, -2.0 * np.cos(0.4), 1.0])
+    plant = PolynomialModel.single([0, 0.5], F=[1, -0.8], variance=0.01)
+    coloured = Coloured(plant, D=(seasonal,), held=(True,))
+    model = Reparametrised(coloured, Parametrisation.identity(coloured.names, coloured.theta, ["d1", "d2"]))
+    experiment = Experiment(model, 100)
+    white = FirBasis(0).integrals(experiment.information_density, experiment.singularities)[0]
+    impulse = np.eye(1, 400)[0]
+    by_b = scipy.signal.lfilter(seasonal, [1, -0.8], np.roll(impulse, 1))
+    by_f = scipy.signal.lfilter([0, -0.5], [1, -0.8], by_b)
+    psi = np.stack([by_b, by_f])
+    np.testing.assert_allclose(white, 100 / 0.01 * psi @ psi.T, rtol=1e-9)
