@@ -110,19 +110,38 @@ def plants(draw, outputs, inputs):
     return {"plant": plant, "noise": noise}
 
 
-@st.composite
-def controllers(draw, plant, outputs, inputs):
-    """Weak feedback, with or without an integrator: small enough for many plants to stay stable."""
-    gain = draw(st.sampled_from([0.005, 0.02, 0.1, 0.3]))
-    integral = draw(st.booleans())
-    above = [gain, float(f"{-0.9 * gain:.6g}")] if integral else [gain]
-    below = [1.0, -1.0] if integral else draw(st.sampled_from([[1.0], [1.0, -0.2]]))
-    if outputs * inputs == 1:
-        sign = 1.0 if sum(plant["plant"]["B"]) >= 0.0 else -1.0
-        size = sum(abs(b) for b in plant["plant"]["B"]) or 1.0
-        return {"numerator": [float(f"{sign * c / size:.6g}") for c in above], "denominator": below}
-    rows = [[above if i == j else [0.0] for j in range(outputs)] for i in range(inputs)]
-    return {"numerator": rows, "denominator": below}
+_GAINS = (0.005, 0.02, 0.1, 0.3, 1.0)
+_FORMS = (([1.0], [1.0]), ([1.0], [1.0, -0.2]), ([1.0, -0.9], [1.0, -1.0]))  # the last one integrates
+
+
+def controllers(plant, outputs, inputs):
+    """Feedback with or without an integrator; that of one input and output is stable where possible."""
+    if outputs * inputs > 1:
+        return st.builds(_decentralised, st.just((inputs, outputs)), *map(st.sampled_from, (_GAINS, _FORMS)))
+    B = np.array(plant["plant"]["B"])
+    below = np.convolve(plant["plant"].get("A", [1.0]), plant["plant"].get("F", [1.0]))
+    size = np.abs(B).sum() or 1.0
+    tried = [
+        {"numerator": [float(f"{gain * c / size:.6g}") for c in form[0]], "denominator": form[1]}
+        for gain in (*_GAINS, *(-gain for gain in _GAINS))
+        for form in _FORMS
+    ]
+    return st.sampled_from([one for one in tried if _stable(B, below, one)] or tried)
+
+
+def _decentralised(shape, gain, form):
+    own = [gain * c for c in form[0]]
+    rows = [[own if i == j else [0.0] for j in range(shape[1])] for i in range(shape[0])]
+    return {"numerator": rows, "denominator": form[1]}
+
+
+def _stable(above, below, controller):
+    opened, fed_back = (
+        np.convolve(below, controller["denominator"]),
+        np.convolve(above, controller["numerator"]),
+    )
+    closed = np.polynomial.polynomial.polyadd(opened, fed_back)
+    return bool(np.all(np.abs(np.roots(closed)) < 0.9999))
 
 
 @st.composite
@@ -181,13 +200,22 @@ spectra = st.sampled_from(
 )
 
 
+def _unstable(spec):
+    """Whether a plant with one input and output has a pole on or outside the unit circle."""
+    plant = spec["plant"]
+    if isinstance(plant["B"][0], list):
+        return False
+    poles = np.concatenate([np.roots(plant.get(letter, [1.0])) for letter in "AF"])
+    return bool(np.any(np.abs(poles) > 1.0 - 1e-9))
+
+
 @st.composite
 def specs(draw):
     """A spec with all its sections, well posed or not."""
     size = draw(weighted((6, st.just((1, 1))), (2, st.just((2, 2))), (1, st.sampled_from([(1, 2), (2, 1)]))))
     spec = draw(plants(*size))
     spec["experiment"] = {"samples": draw(st.sampled_from([100, 500, 2000, 10_000]))}
-    if draw(weighted((3, st.just(False)), (2, st.just(True)))):
+    if draw(weighted((3, st.just(False)), (2, st.just(True)))) or _unstable(spec):
         spec["experiment"]["controller"] = draw(controllers(spec, *size))
     spec |= draw(questions(*size))
     spec["spectrum"] = draw(spectra)
