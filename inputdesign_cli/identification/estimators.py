@@ -15,6 +15,7 @@ from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.kind import Kind, fit_batches, identify_records
 from inputdesign_cli.identification.polynomials import PolynomialKind, fit_polynomials
 from inputdesign_cli.identification.reparametrised import ReparametrisedKind
+from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.identification.transfer_matrix import TransferKind, fit_transfer_matrices
 from inputdesign_cli.plant import (
@@ -25,6 +26,7 @@ from inputdesign_cli.plant import (
     PolynomialModel,
     Reparametrised,
     SampledModel,
+    StateSpaceModel,
 )
 from inputdesign_cli.plant.polynomial import Array
 
@@ -95,6 +97,11 @@ def _(model: SampledModel, step: float) -> Estimator:
 @estimator.register
 def _(model: Reparametrised, step: float) -> Estimator:
     return _Recorded(ReparametrisedKind(model, estimator(model.coefficients, step).kind))
+
+
+@estimator.register
+def _(model: StateSpaceModel, step: float) -> Estimator:
+    return _Recorded(StateSpaceKind(model))
 
 
 @estimator.register

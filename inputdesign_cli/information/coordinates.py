@@ -127,7 +127,7 @@ def factor_of(rows: NDArray[np.float64], names: Sequence[str], *, excitation: st
             "not-identifiable",
             f"no {excitation} can tell these parameters apart: {taking_part(names, untold)}",
             hint="look for a factor that B and A (or B and F, C and D, A and C) have in common, or for an "
-            "order too high, and take it out",
+            "order too high, and take it out; or list in plant.known what is known of them",
             key="plant",
         )
     return factor

@@ -88,7 +88,7 @@ class RecordTransforms:
     @property
     def _integrates(self) -> bool:
         """Whether there is no response at frequency zero."""
-        return float(np.min(np.abs(self.experiment.singularities), initial=1.0)) == 0.0
+        return float(np.min(np.abs(self.experiment.singularities), initial=1.0)) < 1e-9
 
     @cached_property
     def _padded(self) -> int:

@@ -107,10 +107,7 @@ class HeldEntry:
     @cached_property
     def _split(self) -> tuple[int, float]:
         """Whole samples of the dead time, and what is left of it in the time of the spec."""
-        samples = (self.delay or 0.0) / self.sample_time
-        whole = int(np.floor(samples + _ON_BOUNDARY))
-        left = samples - whole
-        return whole, left * self.sample_time if left > _ON_BOUNDARY else 0.0
+        return whole_samples(self.delay or 0.0, self.sample_time)
 
     @property
     def _fraction(self) -> float:
@@ -287,6 +284,14 @@ class HeldEntry:
         above, below = self.sampled
         above = above[int(np.argmax(np.abs(above) > 1e-12 * np.abs(above).max())) :]
         return np.concatenate([np.roots(below), np.roots(above)]).astype(complex)
+
+
+def whole_samples(delay: float, sample_time: float) -> tuple[int, float]:
+    """Whole samples of a dead time, and what is left of it in the unit of time."""
+    samples = delay / sample_time
+    whole = int(np.floor(samples + _ON_BOUNDARY))
+    left = samples - whole
+    return whole, left * sample_time if left > _ON_BOUNDARY else 0.0
 
 
 def integrators(denominator: Array) -> int:

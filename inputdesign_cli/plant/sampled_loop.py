@@ -4,15 +4,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.plant.loop import Loop, close_loop
+from inputdesign_cli.plant.model import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.sampled_model import SampledModel
-from inputdesign_cli.plant.transfer import TransferMatrix
+from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix
+
+
+class Realised(Model, Protocol):
+    """A sampled model that has states."""
+
+    @property
+    def realisation(self) -> StateSpace:
+        """From inputs to outputs."""
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles in z."""
+
+    @property
+    def repeated_integrators(self) -> int:
+        """The integrators of the realisation that take no part in G."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +44,12 @@ class SampledLoop(Loop):
     y(t) is measured before u(t) is applied and held; a controller that needs time to compute has a delay.
     """
 
-    model: SampledModel
+    model: Realised
+
+    @property
+    def noise_gain(self) -> Array:
+        """(states, p): how e enters the states besides its way through the outputs."""
+        return np.zeros((len(self._states[0]), self.model.outputs))
 
     @cached_property
     def _states(self) -> tuple[Array, Array, Array]:
@@ -80,10 +103,11 @@ class SampledLoop(Loop):
         at_once = np.linalg.inv(self.instantaneous).T
         found = np.concatenate([e, r], axis=-1) @ at_once
         from_states, onward, next_state = C.T @ at_once, B.T, A.T
+        by_noise = e @ self.noise_gain.T
         x = np.zeros((*r.shape[:-2], len(A)))
         for t in range(r.shape[-2]):
             found[..., t, :] += x @ from_states
-            x = x @ next_state + found[..., t, :] @ onward
+            x = x @ next_state + found[..., t, :] @ onward + by_noise[..., t, :]
         return found[..., : self.model.outputs], found[..., self.model.outputs :]
 
 

@@ -73,7 +73,9 @@ def _system(spec: Spec) -> str:
     if plant.kind == "regression":
         return "The system is a linear regression with neglected regressors."
     size = f"{_count(plant.inputs, 'input')} and {_count(plant.outputs, 'output')}"
-    kind = _structure(plant, spec.noise) if plant.kind == "polynomial" else "continuous-time"
+    kind = "state-space" if plant.kind == "state_space" else "continuous-time"
+    if plant.kind == "polynomial":
+        kind = _structure(plant, spec.noise)
     clock = f", sampled every {spec.sample_time:g} {spec.time_unit}" if plant.sampled else ""
     article = "an" if kind[0] in "AEFIOaeio" else "a"
     return f"The system is {article} {kind} system with {size}{clock}."

@@ -67,10 +67,14 @@ def _wrong_size(key: str, value: tuple, noun: str, size: int) -> PathDiagnostic:
 def delays(spec: Spec) -> Iterator[PathDiagnostic]:
     """Dead times end within the record, and are not too many samples."""
     plant = spec.plant
-    if plant.kind != "continuous":
+    path: Path
+    if plant.kind == "state_space":
+        longest, path = plant.state_space.delay, ("plant", "state_space", "delay")
+    elif plant.kind == "continuous":
+        longest = max(max(row) for row in plant.continuous.delays)
+        path = ("plant", "continuous", "dead_time" if plant.continuous.kind == "process" else "delay")
+    else:
         return
-    longest = max(max(row) for row in plant.continuous.delays)
-    path = ("plant", "continuous", "dead_time" if plant.continuous.kind == "process" else "delay")
     whole = spec.experiment.samples * spec.sample_time
     if "samples" in spec.experiment.model_fields_set and longest >= whole:
         message = f"{{key}} is {show(longest)} {spec.time_unit}, and the experiment lasts {show(whole)}"

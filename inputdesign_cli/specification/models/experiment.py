@@ -171,7 +171,7 @@ class Experiment(Section):
     controller: Controller | None = Field(
         default=None,
         description="C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "
-        "closed loop. With several channels: loops, or numerator and denominator as rows (inputs) of columns.",
+        "closed loop. With several channels: loops, or numerator and denominator as rows of columns.",
     )
     prior: Prior | None = Field(default=None, description="Information already at hand.")
 

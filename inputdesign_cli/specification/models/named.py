@@ -40,6 +40,9 @@ def _with_texts(node: Plain) -> Plain:
 
 EXPRESSIONS = TakesExpressions()
 
+# Keys whose texts are words.
+_WORDS = ("time",)
+
 Texts = tuple[str, ...]
 TextMatrix = tuple[tuple[Texts, ...], ...]
 
@@ -110,7 +113,10 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
     if isinstance(value, list | tuple):
         return [worth(part, parameters, (*path, i), found) for i, part in enumerate(value)]
     if isinstance(value, dict):
-        return {key: worth(part, parameters, (*path, key), found) for key, part in value.items()}
+        return {
+            key: part if key in _WORDS else worth(part, parameters, (*path, key), found)
+            for key, part in value.items()
+        }
     if not isinstance(value, str):
         return value
     try:
@@ -148,7 +154,8 @@ def texts_in(value: Plain) -> list[str]:
     """Every text of a nested value."""
     if isinstance(value, str):
         return [value]
-    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    listed = value if isinstance(value, list | tuple) else ()
+    parts = [v for k, v in value.items() if k not in _WORDS] if isinstance(value, dict) else listed
     return [found for part in parts for found in texts_in(part)]
 
 

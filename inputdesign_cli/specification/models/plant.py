@@ -42,6 +42,7 @@ from inputdesign_cli.specification.models.shapes import (
     size_of,
 )
 from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.state_space import StateSpace
 from inputdesign_cli.specification.models.transfer import DelayedMatrix
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -216,6 +217,54 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
         raise ValueError("the coefficients of this plant are its parameters")
 
 
+class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
+    """Matrices of numbers and expressions in named parameters."""
+
+    kind: ClassVar[Literal["state_space"]] = "state_space"
+    sampled: ClassVar[bool] = True
+    TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("state_space",)
+
+    state_space: StateSpace = Field(description="A, B, C, D, and K of the noise.")
+    sample: Literal["zoh"] | None = Field(
+        default=None, description="zoh: matrices in continuous time are sampled with a zero-order hold."
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """Something is estimated, and matrices in continuous time are sampled."""
+        if self.parameters is None:
+            message = "{key} needs parameters: numbers in its matrices are not estimated"
+            hint = "write parameters: {k: 2.0}, and k in the matrices"
+            yield PathDiagnostic("missing-key", message, hint, keys=("parameters",))
+        continuous = self.state_space.time == "continuous"
+        if continuous and self.sample is None:
+            message = "{key} in continuous time must say how it is sampled"
+            yield PathDiagnostic("missing-key", message, "add sample: zoh", keys=("sample",))
+        elif not continuous and self.sample is not None:
+            message = "{key} is for matrices in continuous time, and these are those of samples"
+            yield PathDiagnostic("unsuitable-key", message, "remove it", ("sample",), at_key=True)
+
+    @property
+    def outputs(self) -> int:
+        """The number of outputs."""
+        return len(self.state_space.C)
+
+    @property
+    def inputs(self) -> int:
+        """The number of inputs."""
+        return len(self.state_space.B[0])
+
+    @property
+    def stated_matrices(self) -> tuple[str, ...]:
+        """The letters of those that are written."""
+        return self.state_space.stated("A", "B", "C", "D", "K")
+
+    def term(self, letter: str, row: int, column: int) -> str:
+        """An entry of a matrix, or the dead time, as an expression in the named parameters."""
+        written = self.written["state_space"]
+        value = written.get("delay", 0.0) if letter == "delay" else written[letter][row][column]
+        return str(text(value))
+
+
 class RegressionSize(Section):
     """The numbers of regressors."""
 
@@ -250,20 +299,25 @@ class TrueParameters(Section, family="plant", phrase="a list of true parameters"
     parameters: Numbers = Field(description="True values of all regression parameters, estimated ones first.")
 
 
-_FORMS = Wording("a mapping of keys", "write {B: [0, 1], F: [1, -0.5]}, {continuous: ..} or {regression: ..}")
+_FORMS = Wording(
+    "a mapping of keys",
+    "write {B: [0, 1], F: [1, -0.5]}, {continuous: ..}, {state_space: ..} or {regression: ..}",
+)
 
 
 def _kind(value: dict[str, object]) -> str:
     if "regression" in value:
         return RegressionPlant.phrase
+    if "state_space" in value:
+        return StateSpacePlant.phrase
     return (ContinuousPlant if "continuous" in value else PolynomialPlant).phrase
 
 
-Plant = Annotated[PolynomialPlant | ContinuousPlant | RegressionPlant, pick(_kind), _FORMS]
+Plant = Annotated[PolynomialPlant | ContinuousPlant | StateSpacePlant | RegressionPlant, pick(_kind), _FORMS]
 """The nominal plant."""
 
 TruePlant = Annotated[
-    PolynomialPlant | ContinuousPlant | RegressionPlant | TrueParameters,
+    PolynomialPlant | ContinuousPlant | StateSpacePlant | RegressionPlant | TrueParameters,
     pick(lambda v: TrueParameters.phrase if set(v) == {"parameters"} else _kind(v)),
     _FORMS,
 ]

@@ -86,6 +86,7 @@ SIZES = {
     "coefficients of a numerator": Size(1001, "a longer delay calls for slower sampling"),
     "coefficients of a denominator": Size(301, "roots of higher orders mean nothing in double precision"),
     "controller.delay": Size(1000, "a longer delay calls for slower sampling"),
+    "states": Size(100, "responses at every frequency take the cube of their number"),
     "inputs or outputs": Size(20, "a model has parameters for each pair of them"),
     "plant.regression": Size(200, "a design has an unknown for each pair of regressors"),
     "report.ellipses": Size(100, "every pair is a panel of the figure"),

@@ -12,7 +12,7 @@ from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
+from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
@@ -32,7 +32,9 @@ def delays_of(plant: ContinuousPlant) -> Rows:
     return rows if any(entry.size for row in rows for entry in row) else ()
 
 
-def reparametrised(spec: Spec, plant: PolynomialPlant | ContinuousPlant, model: Listed) -> Model:
+def reparametrised(
+    spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, model: Listed
+) -> Model:
     """The model in the parameters that the spec names and without those that it knows.
 
     Raises:
@@ -64,7 +66,7 @@ def reparametrised(spec: Spec, plant: PolynomialPlant | ContinuousPlant, model: 
 
 
 def _of_named(
-    spec: Spec, plant: PolynomialPlant | ContinuousPlant, parameters: Sequence[Parameter]
+    spec: Spec, plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameters: Sequence[Parameter]
 ) -> Parametrisation:
     """The named parameters of the plant, and those of the noise as they are."""
     named = plant.named_parameters
@@ -93,9 +95,11 @@ def _of_named(
     )
 
 
-def _term(plant: PolynomialPlant | ContinuousPlant, parameter: Parameter) -> str:
+def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> str:
     """A coefficient of the model as an expression in the named parameters of the plant."""
     i, j = parameter.places[0]
+    if plant.kind == "state_space":
+        return plant.term(parameter.letter, i, j)
     if plant.kind == "polynomial":
         return plant.coefficients(parameter.letter, i, j)[parameter.power]
     texts = plant.texts

@@ -24,7 +24,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.experiment import NoiseShape
-from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant
+from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
     GivenSignal,
@@ -39,6 +39,7 @@ from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
+from inputdesign_cli.tasks.build.state_space import state_space_model
 from inputdesign_cli.tasks.build.tables import read_columns
 
 
@@ -69,6 +70,10 @@ def build_model(spec: Spec) -> Model:
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
             C, D = _rows(spec.noise.C), _rows(spec.noise.D)
             return reparametrised(spec, plant, _coloured(model, spec.noise, C, D))
+        case StateSpacePlant() as plant:
+            C, D = _rows(spec.noise.C), _rows(spec.noise.D)
+            states = state_space_model(spec, plant, covariance)
+            return reparametrised(spec, plant, _coloured(states, spec.noise, C, D))
     raise spec.complain(
         "not-supported",
         "a regression has no dynamics to be estimated here",

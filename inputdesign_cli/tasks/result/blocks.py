@@ -13,6 +13,7 @@ from inputdesign_cli.plant import (
     PolynomialModel,
     Reparametrised,
     SampledModel,
+    StateSpaceModel,
 )
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
@@ -65,6 +66,11 @@ def _(model: ContinuousModel) -> Blocks:
 def _(model: SampledModel) -> Blocks:
     blocks = blocks_of(model.continuous_plant)
     return {**blocks, "plant": {**blocks["plant"], "sample": "zoh"}}
+
+
+@blocks_of.register
+def _(model: StateSpaceModel) -> Blocks:
+    return {"plant": {}, "noise": _variance(model)}  # the plant is in the words of its parameters
 
 
 @blocks_of.register

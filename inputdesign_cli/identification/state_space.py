@@ -1,0 +1,182 @@
+"""State-space models against records: prediction errors, gradients, free responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.kind import Part, Starts
+from inputdesign_cli.identification.records import shifted, split
+from inputdesign_cli.identification.search import Search
+from inputdesign_cli.plant import StateSpaceModel
+from inputdesign_cli.plant.polynomial import Array
+
+# Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
+_MARGIN = 1e-9
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class StateSpaceRecord:
+    """Samples u (N, r), y (N, p), and the `structure` that is to explain them; see `Record`."""
+
+    structure: StateSpaceModel
+    u: Array
+    y: Array
+
+    @property
+    def size(self) -> int:
+        """Number of parameters k."""
+        return len(self.structure.entries)
+
+    def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
+        """Prediction errors (N, p) from rest, and psi (k, N, p), one recursion for all."""
+        model = self.structure.at(theta)
+        (A, early, late), m, n = model.held, model.matrices, model.order
+        u0, u1 = (shifted(self.u, model.lag + lag, (len(self.u),)) for lag in (0, 1))
+        direct = shifted(self.u, model.direct_lag, (len(self.u),))
+        at_once = direct @ m.D.T
+        slopes = model.slopes
+        closed = A - m.K @ m.C
+        onward = np.zeros((n * (1 + len(slopes)),) * 2)
+        driven = np.zeros((len(self.y), len(onward)))
+        read = np.zeros((self.y.shape[1] * (1 + len(slopes)), len(onward)))
+        found = np.zeros((len(self.y), len(read)))
+        p = self.y.shape[1]
+        onward[:n, :n], read[:p, :n], found[:, :p] = closed, m.C, at_once
+        driven[:, :n] = u0 @ early.T + u1 @ late.T + (self.y - at_once) @ m.K.T
+        for k, d in enumerate(slopes, start=1):
+            own, out = slice(k * n, (k + 1) * n), slice(k * p, (k + 1) * p)
+            onward[own, own], onward[own, :n] = closed, d.A - m.K @ d.C - d.K @ m.C
+            read[out, own], read[out, :n] = m.C, d.C
+            found[:, out] = direct @ d.D.T
+            driven[:, own] = u0 @ d.early.T + u1 @ d.late.T - direct @ d.D.T @ m.K.T
+            driven[:, own] += (self.y - at_once) @ d.K.T
+        x, step, reading = np.zeros(len(onward)), onward.T, read.T
+        states = np.empty_like(driven)
+        for t in range(len(driven)):
+            states[t] = x
+            x = x @ step + driven[t]
+        found = found + states @ reading
+        psi = found[:, p:].reshape(len(found), len(slopes), p)
+        return self.y - found[:, :p], np.moveaxis(psi, 1, 0)
+
+    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): what levels of the outputs and the states at the start add."""
+        model = self.structure.at(theta)
+        m, n, p = model.matrices, model.order, model.outputs
+        closed = model.held[0] - m.K @ m.C
+        x = np.concatenate([np.eye(n), np.zeros((p, n))])
+        level = np.concatenate([np.zeros((n, p)), np.eye(p)])
+        found = np.empty((n + p, len(self.y), p))
+        for t in range(len(self.y)):
+            found[:, t] = level - x @ m.C.T
+            x = x @ closed.T + level @ m.K.T
+        return tuple(found[:, :, i] for i in range(p))
+
+    @property
+    def in_starts(self) -> NDArray[np.int64]:
+        """Those of A, C and K."""
+        return np.flatnonzero([letter in ("A", "C", "K") for letter, _, _ in self.structure.entries])
+
+    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+        """By central differences."""
+        size = _STEP * max(abs(theta[index]), _STEP)
+        step = size * np.eye(self.size)[index]
+        above, below = self.free_responses(theta + step), self.free_responses(theta - step)
+        return tuple((a - b) / (2.0 * size) for a, b in zip(above, below, strict=True))
+
+    def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
+        """(k, N, p): nothing; no instruments are used."""
+        return np.zeros((self.size, *errors.shape))
+
+    def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
+        """(p, N, m): signals (N, m) through the inverse of each output's own noise model."""
+        model = self.structure.at(theta)
+        m = model.matrices
+        closed = model.held[0] - m.K @ m.C
+        found = np.empty((model.outputs, *signals.shape))
+        for i in range(model.outputs):
+            x = np.zeros((signals.shape[1], model.order))
+            for t, sample in enumerate(signals):
+                found[i, t] = sample - x @ m.C[i]
+                x = x @ closed.T + np.outer(sample, m.K[:, i])
+        return found
+
+    def stabilised(self, theta: Array) -> Array:
+        """theta where its predictor is stable, or integrates, and otherwise nothing that is finite."""
+        delay = [k for k, (letter, _, _) in enumerate(self.structure.entries) if letter == "delay"]
+        out = theta.copy()
+        longest = (len(self.y) - 1) * (self.structure.sample_time or 1.0)
+        out[delay] = np.clip(out[delay], 0.0, longest)
+        if np.max(np.abs(self.structure.at(out).predictor_poles), initial=0.0) > 1.0 + _MARGIN:
+            return np.full_like(theta, np.inf)
+        return out
+
+
+@dataclass(frozen=True)
+class StateSpaceKind:
+    """A state-space model; see `Kind`."""
+
+    model: StateSpaceModel
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the parameters."""
+        return self.model.names
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.model.outputs
+
+    @property
+    def recent(self) -> int:
+        """No lag but that of the present: all others act through states."""
+        return 0
+
+    @property
+    def explaining(self) -> NDArray[np.bool_]:
+        """(k,): all that are in G."""
+        return self.model.in_plant
+
+    @cached_property
+    def whitening(self) -> NDArray[np.bool_]:
+        """(k,): those in H."""
+        coloured = bool(np.any(self.model.matrices.K))
+        return np.array(
+            [letter == "K" or (coloured and letter in "AC") for letter, _, _ in self.model.entries],
+            dtype=bool,
+        )
+
+    def own(self) -> Array:
+        """(p,): outputs share the parameters."""
+        return np.full(self.outputs, len(self.names) / self.outputs)
+
+    def record(self, u: Array, y: Array) -> StateSpaceRecord:
+        """Samples u (N, r), y (N, p) that the structure is to explain."""
+        return StateSpaceRecord(self.model, u, y)
+
+    def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
+        """The nominal parameters, and the `given` ones."""
+        points = np.array([self.model.theta, *([] if given is None else [given])])
+        return Starts(points, np.zeros(len(points), dtype=np.int64), len(points))
+
+    def holding(self, known: NDArray[np.bool_]) -> StateSpaceKind:
+        """The same."""
+        return self
+
+    def simulated(
+        self, found: Search, y: Array, lengths: Sequence[int] | None
+    ) -> tuple[Array, Sequence[bool]]:
+        """What the inputs cause in the estimate, and what unknown starts explain."""
+        fitted = self.model.at(found.point.theta)
+        records, begun = found.records, found.point.near.begun
+        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+            caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
+        runs = bool(np.all(np.abs(fitted.poles) < 1.0 + _MARGIN))
+        return np.concatenate(caused) + y - records.y, (runs,) * self.outputs

@@ -1,0 +1,381 @@
+"""State-space models with an innovations form, sampled behind a hold or in discrete time.
+
+x(t + 1) = A x(t) + B u(t) + K e(t), y(t) = C x(t) + D u(t) + e(t) ([ljung-1999], Section 4.3). The predictor
+x^(t + 1) = (A - K C) x^ + (B - K D) u + K y has the gradient
+
+    dx^(t + 1) = (A - K C) dx^ + (dA - K dC) x^ + (dB - K dD) u + dK e ,   dy^ = C dx^ + dC x^ + dD u ,
+
+stable with A - K C, whatever A is. Matrices in continuous time are sampled by a matrix exponential, with the
+derivatives in its off-diagonal block ([van-loan-1978]); K is that of the samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.plant.frequencies import logarithmic_distance
+from inputdesign_cli.plant.held import whole_samples
+from inputdesign_cli.plant.loop import close_loop
+from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.plant.sampled_loop import SampledLoop
+from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix
+
+# This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.
+_BESIDE = 1e-8
+_INTEGRATES = 1e-7
+
+
+class Matrices(NamedTuple):
+    """A (n, n), B (n, r), C (p, n), D (p, r), K (n, p), and the dead time of the inputs."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    K: Array
+    delay: float
+
+
+class Slope(NamedTuple):
+    """The derivatives of A, of how u(t - d) and u(t - d - 1) enter the states, of C, D and K."""
+
+    A: Array
+    early: Array
+    late: Array
+    C: Array
+    D: Array
+    K: Array
+
+
+@dataclass(frozen=True)
+class StateSpaceModel(Parametrised):
+    """See above; e is white with a full covariance (p, p).
+
+    Attributes:
+        matrices: in continuous time, and behind a hold, where there is a `sample_time`; otherwise of samples.
+        entries: the free ones: letter, row and column; ("delay", 0, 0) for the dead time.
+    """
+
+    matrices: Matrices
+    entries: tuple[tuple[str, int, int], ...]
+    covariance: Array
+    sample_time: float | None = None
+
+    continuous = False
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return len(self.matrices.C)
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs r."""
+        return self.matrices.B.shape[1]
+
+    @property
+    def order(self) -> int:
+        """Number of states n."""
+        return len(self.matrices.A)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The free entries."""
+        found = []
+        for letter, i, j in self.entries:
+            value = self.matrices.delay if letter == DELAY else self._table[letter][i, j]
+            label = "" if letter == DELAY else f"[{i + 1},{j + 1}]"
+            found.append(Parameter(letter, 0, ((i, j),), label, float(value)))
+        return tuple(found)
+
+    @property
+    def _table(self) -> dict[str, Array]:
+        m = self.matrices
+        return {"A": m.A, "B": m.B, "C": m.C, "D": m.D, "K": m.K}
+
+    @cached_property
+    def in_plant(self) -> NDArray[np.bool_]:
+        """(k,): all but entries of K."""
+        return np.array([letter != "K" for letter, _, _ in self.entries], dtype=bool)
+
+    def at(self, theta: ArrayLike, covariance: Array | None = None) -> StateSpaceModel:
+        """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
+        table, delay = {letter: M.copy() for letter, M in self._table.items()}, self.matrices.delay
+        for (letter, i, j), value in zip(self.entries, np.asarray(theta, dtype=float), strict=True):
+            if letter == DELAY:
+                delay = float(value)
+            else:
+                table[letter][i, j] = value
+        return replace(
+            self,
+            matrices=Matrices(**table, delay=delay),
+            covariance=self.covariance if covariance is None else covariance,
+        )
+
+    @cached_property
+    def _split(self) -> tuple[int, float]:
+        """Whole samples of the dead time, and what is left of it."""
+        return (0, 0.0) if self.sample_time is None else whole_samples(self.matrices.delay, self.sample_time)
+
+    @property
+    def lag(self) -> int:
+        """d, the whole samples of the dead time."""
+        return self._split[0]
+
+    @property
+    def direct_lag(self) -> int:
+        """The samples by which what acts at once is late."""
+        return self.lag + (self._split[1] > 0.0)
+
+    @cached_property
+    def held(self) -> tuple[Array, Array, Array]:
+        """A of the samples, and how u(t - d) and u(t - d - 1) enter the states."""
+        whole, early, _ = self._exponentials(None)
+        return whole[0], early, whole[1] - early
+
+    def _exponentials(self, moved: Array | None) -> tuple[tuple[Array, Array], Array, Array]:
+        """Over a sample (A, B); B over what is left of it after the fraction; and A over that.
+
+        Args:
+            moved: (n, n + r), a direction of [A B]: the derivatives in that direction instead.
+        """
+        n, m = self.order, self.matrices
+        if self.sample_time is None:
+            A, B = (m.A, m.B) if moved is None else (moved[:, :n], moved[:, n:])
+            return (A, B), B, A
+        size = n + self.inputs
+        system = np.zeros((size, size))
+        system[:n] = np.concatenate([m.A, m.B], axis=1)
+        if moved is not None:
+            slope = np.zeros((size, size))
+            slope[:n] = moved
+            system = np.block([[system, slope], [np.zeros((size, size)), system]])
+        times = self.sample_time, self.sample_time - self._split[1]
+        whole, rest = (scipy.linalg.expm(system * t)[:n, -size:] for t in times)
+        return (whole[:, :n], whole[:, n:]), rest[:, n:], rest[:, :n]
+
+    @cached_property
+    def slopes(self) -> tuple[Slope, ...]:
+        """With respect to each parameter."""
+        return tuple(self._slope(*entry) for entry in self.entries)
+
+    def _slope(self, letter: str, i: int, j: int) -> Slope:
+        m, n = self.matrices, self.order
+        A, B = np.zeros((n, n)), np.zeros((n, self.inputs))
+        zero = {letter: np.zeros_like(M) for letter, M in self._table.items()}
+        if letter in ("C", "D", "K"):
+            zero[letter][i, j] = 1.0
+            return Slope(A, B, B, zero["C"], zero["D"], zero["K"])
+        if letter == DELAY:
+            _, _, rest = self._exponentials(None)
+            early = -rest @ m.B
+            return Slope(A, early, -early, zero["C"], zero["D"], zero["K"])
+        moved = np.zeros((n, n + self.inputs))
+        moved[i, j + (n if letter == "B" else 0)] = 1.0
+        (A, whole), early, _ = self._exponentials(moved)
+        return Slope(A, early, whole - early, zero["C"], zero["D"], zero["K"])
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles in z of G."""
+        return np.asarray(np.linalg.eigvals(self.held[0]), dtype=complex)
+
+    @cached_property
+    def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the predictor."""
+        m = self.matrices
+        return np.asarray(np.linalg.eigvals(self.held[0] - m.K @ m.C), dtype=complex)
+
+    @cached_property
+    def singularities(self) -> ComplexArray:
+        """Poles of G and of all gradients, as points of the frequency plane."""
+        near = logarithmic_distance(np.concatenate([self.poles, self.predictor_poles]))
+        return np.where(np.abs(near) < _INTEGRATES, 0.0, near)
+
+    def entry_singularities(self, output: int, input: int) -> ComplexArray:
+        """Poles and zeros of one entry of G, as points of the frequency plane."""
+        A, early, late = self.held
+        m = self.matrices
+        pencil = np.block([[A, (early + late)[:, [input]]], [m.C[[output]], m.D[[output]][:, [input]]]])
+        unit = np.diag(np.append(np.ones(self.order), 0.0))
+        zeros = np.asarray(scipy.linalg.eigvals(pencil, unit), dtype=complex)
+        finite = zeros[np.isfinite(zeros) & (np.abs(zeros) < 1e6)]
+        return np.concatenate([self.singularities, logarithmic_distance(finite)])
+
+    @property
+    def memory(self) -> float:
+        """The dead time, in samples."""
+        return float(self.direct_lag)
+
+    @property
+    def repeated_integrators(self) -> int:
+        """None: the states are those of the spec."""
+        return 0
+
+    def bends(self, output: int, input: int) -> NDArray[np.bool_]:
+        """(k,): all."""
+        return np.ones(len(self.entries), dtype=bool)
+
+    def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
+        """There is none."""
+        raise ValueError("an entry of a state-space model is no fraction that is affine in its parameters")
+
+    def _points(self, w: ArrayLike) -> ComplexArray:
+        """z (m,), beside one where the model integrates."""
+        given = np.atleast_1d(np.asarray(w))
+        if not np.iscomplexobj(given) and np.any(self.singularities == 0.0):
+            given = np.where(np.abs(given) < _BESIDE, _BESIDE, given)
+        return np.exp(1j * given).astype(complex)
+
+    def _resolvent(self, z: ComplexArray, A: Array) -> ComplexArray:
+        return np.linalg.inv(z[:, None, None] * np.eye(self.order) - A).astype(complex)
+
+    def _entering(self, z: ComplexArray, early: Array, late: Array) -> ComplexArray:
+        """(m, n, r): how u enters the states."""
+        delayed = z[:, None, None] ** -float(self.lag)
+        return np.asarray(delayed * (early + late / z[:, None, None]), dtype=complex)
+
+    def _direct(self, z: ComplexArray, D: Array) -> ComplexArray:
+        return np.asarray(z[:, None, None] ** -float(self.direct_lag) * D, dtype=complex)
+
+    def plant_at(self, w: ArrayLike) -> ComplexArray:
+        """G (n, p, r)."""
+        z, (A, early, late), m = self._points(w), self.held, self.matrices
+        return m.C @ self._resolvent(z, A) @ self._entering(z, early, late) + self._direct(z, m.D)
+
+    def predictor_at(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """H^-1 (n, p, p) and H^-1 G (n, p, r), as the predictor has them."""
+        z, (A, early, late), m = self._points(w), self.held, self.matrices
+        read = m.C @ self._resolvent(z, A - m.K @ m.C)
+        D = self._direct(z, m.D)
+        return np.eye(self.outputs) - read @ m.K, read @ (self._entering(z, early, late) - m.K @ D) + D
+
+    def plant_gradient(self, w: ArrayLike) -> ComplexArray:
+        """dG/dtheta (n, k, p, r)."""
+        z = self._points(w)
+        x = self._resolvent(z, self.held[0]) @ self._entering(z, *self.held[1:])
+        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (z.size, self.inputs, self.inputs))
+        return self._gradient(z, x, u, None, np.zeros_like(self.matrices.K))
+
+    def input_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dG/dtheta (n, k, p, r)."""
+        z = self._points(w)
+        x = self._resolvent(z, self.held[0]) @ self._entering(z, *self.held[1:])
+        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (z.size, self.inputs, self.inputs))
+        return self._gradient(z, x, u, None, self.matrices.K)
+
+    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
+        """H^-1 dH/dtheta (n, k, p, p)."""
+        z = self._points(w)
+        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (z.size, self.outputs, self.outputs))
+        x = self._resolvent(z, self.held[0]) @ self.matrices.K.astype(complex)
+        return self._gradient(z, x, None, e, self.matrices.K)
+
+    def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
+        """(n, k, p, m), see `Model`."""
+        z, (A, early, late), m = self._points(w), self.held, self.matrices
+        driven = (self._entering(z, early, late) - m.K @ self._direct(z, m.D)) @ u + m.K @ y
+        return self._gradient(z, self._resolvent(z, A - m.K @ m.C) @ driven, u, e, m.K)
+
+    def _gradient(
+        self, z: ComplexArray, x: ComplexArray, u: NDArray | None, e: NDArray | None, K: Array
+    ) -> ComplexArray:
+        """dy^ (n, k, p, m) from the states x (n, order, m), inputs and prediction errors of the predictor."""
+        read = self.matrices.C @ self._resolvent(z, self.held[0] - K @ self.matrices.C)
+        gradient = np.zeros((z.size, len(self.entries), self.outputs, x.shape[2]), dtype=complex)
+        for index, d in enumerate(self.slopes):
+            at_once = d.C @ x
+            driven = d.A @ x
+            if u is not None:
+                at_once = at_once + self._direct(z, d.D) @ u
+                driven = driven + self._entering(z, d.early, d.late) @ u
+            driven = driven - K @ at_once
+            if e is not None:
+                driven = driven + d.K @ e
+            gradient[:, index] = at_once + read @ driven
+        return gradient
+
+    @cached_property
+    def realisation(self) -> StateSpace:
+        """From inputs to outputs: the past of the inputs, then the states."""
+        (A, early, late), m, r = self.held, self.matrices, self.inputs
+        past = max(self.direct_lag, self.lag)
+        first = past * r
+        size = first + self.order
+        full = StateSpace(
+            np.zeros((size, size)),
+            np.zeros((size, r)),
+            np.concatenate([np.zeros((self.outputs, first)), m.C], axis=1),
+            np.zeros((self.outputs, r)),
+        )
+        full.A[first:, first:] = A
+        if past:
+            full.A[r:first, : first - r] = np.eye(first - r)
+            full.B[:r] = np.eye(r)
+        for lag, states, outputs in (
+            (self.lag, early, np.zeros_like(m.D)),
+            (self.lag + 1, late, np.zeros_like(m.D)),
+            (self.direct_lag, np.zeros_like(early), m.D),
+        ):
+            if not (np.any(states) or np.any(outputs)):
+                continue
+            column = slice((lag - 1) * r, lag * r)
+            (full.A if lag else full.B)[first:, column if lag else slice(None)] += states
+            (full.C if lag else full.D)[:, column if lag else slice(None)] += outputs
+        return full
+
+    def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
+        """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
+        A, B, C, D = self.realisation
+        noise = StateSpace(self.held[0], self.matrices.K, self.matrices.C, np.eye(self.outputs))
+        return recursion(StateSpace(A, B, C, D), u), recursion(noise, e)
+
+
+def recursion(system: StateSpace, v: Array) -> Array:
+    """(.., N, q): what samples v (.., N, m) cause, from rest."""
+    A, B, C, D = (M.T for M in system)
+    x = np.zeros((*v.shape[:-2], len(A)))
+    driven, found = v @ B, v @ D
+    for t in range(v.shape[-2]):
+        found[..., t, :] += x @ C
+        x = x @ A + driven[..., t, :]
+    return np.asarray(found)
+
+
+@dataclass(frozen=True)
+class StateSpaceLoop(SampledLoop):
+    """`Loop` with R = H^-1 and N = H^-1 G of the predictor, so that R H = I."""
+
+    model: StateSpaceModel
+
+    @property
+    def predictor_poles(self) -> ComplexArray:
+        """Poles in z of the filters that make the gradient of the prediction."""
+        return self.model.predictor_poles
+
+    @property
+    def noise_gain(self) -> Array:
+        """(states, p): K, behind the past of the inputs and before the controller."""
+        K = self.model.matrices.K
+        past = len(self.model.realisation.A) - len(K)
+        behind = len(self.controller.realisation.A)
+        return np.concatenate([np.zeros((past, K.shape[1])), K, np.zeros((behind, K.shape[1]))])
+
+    def left_at(self, w: ArrayLike) -> ComplexArray:
+        """(n, p + r, p + r): the matrix on the left of `Loop`."""
+        left, p = super().left_at(w), self.model.outputs
+        R, N = self.model.predictor_at(w)
+        left[:, :p, :p], left[:, :p, p:] = R, -N
+        return left
+
+
+@close_loop.register
+def _(model: StateSpaceModel, controller: TransferMatrix) -> StateSpaceLoop:
+    return StateSpaceLoop(model, controller)

@@ -1,0 +1,269 @@
+"""State-space models: against transfer functions, plain recursions, and differences in every entry."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.signal
+
+from inputdesign_cli.expressions import Expression
+from inputdesign_cli.identification import identify
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.information import Experiment, FiniteRecord
+from inputdesign_cli.plant import (
+    ContinuousModel,
+    Matrices,
+    Parametrisation,
+    Reparametrised,
+    SampledModel,
+    StateSpaceModel,
+    TransferMatrix,
+    close_loop,
+)
+from inputdesign_cli.spectrum import FirBasis
+from tests.support.loop_checks import check_information, check_signals
+from tests.support.plants import descending
+
+H = 0.3
+W = np.linspace(0.05, 3.1, 25)
+A = np.array([[-0.8, 0.5], [-0.3, -1.1]])
+B, C = np.array([[0.4, 0.0], [1.0, 0.7]]), np.array([[1.0, 0.2], [0.0, 0.8]])
+D = np.array([[0.0, 0.3], [0.0, 0.0]])
+K = np.array([[0.5, 0.1], [-0.2, 0.3]])
+COVARIANCE = np.array([[1.0, 0.3], [0.3, 0.5]])
+PLACES = [(letter, i, j) for letter in "ABCDK" for i in (0, 1) for j in (0, 1)]
+CONTROLLER = TransferMatrix.build(
+    [[[0, 0.9, -0.8], [0]], [[0], [0, 0.2, 0.1]]], [[[1, -1], [1]], [[1], [1, -0.5]]]
+)
+
+
+def model(*, delay=0.4, sample_time=H, gain=K, direct=D, places=(*PLACES, ("delay", 0, 0))):
+    matrices = Matrices(A, B, C, direct, gain, delay)
+    return StateSpaceModel(matrices, tuple(places), COVARIANCE, sample_time)
+
+
+def response(found, w):
+    """G and H by the textbook, without the code under test: samples by an exponential of small steps."""
+    m, n = found.matrices, found.order
+    z = np.exp(1j * w)[:, None, None]
+    if found.sample_time is None:
+        Ad, early, late, lag, direct = m.A, m.B, 0.0 * m.B, 0, 0
+    else:
+        lag, left = divmod(m.delay, H)
+
+        def driven(t):
+            s = np.linspace(0.0, t, 4001)
+            steps = np.array([scipy.linalg.expm(m.A * x) @ m.B for x in s[::100]])
+            return scipy.integrate.simpson(steps, x=s[::100], axis=0)
+
+        Ad, early = scipy.linalg.expm(m.A * H), driven(H - left)
+        late, direct = driven(H) - early, int(lag) + (left > 0)
+    R = np.linalg.inv(z * np.eye(n) - Ad)
+    G = m.C @ R @ (early * z**-lag + late * z ** -(lag + 1)) + m.D * z ** -float(direct)
+    return G, np.eye(2) + m.C @ R @ m.K
+
+
+def slopes(of, theta, step=1e-6):
+    return np.stack([(of(theta + d) - of(theta - d)) / (2 * step) for d in step * np.eye(theta.size)], axis=1)
+
+
+@pytest.mark.parametrize("sample_time", [H, None], ids=["held", "discrete"])
+def test_responses_and_gradients(sample_time):
+    """The direct term is late by whole samples, and what it tells of the dead time is not counted."""
+    scale = 1.0 if sample_time else 0.3
+    places = (*PLACES, *([("delay", 0, 0)] if sample_time else []))
+    found = model(sample_time=sample_time, delay=0.4 if sample_time else 0.0, places=places)
+    found = found.at(found.theta * scale if sample_time is None else found.theta)
+    G, _ = response(found, W)
+    np.testing.assert_allclose(found.plant_at(W), G, rtol=1e-7, atol=1e-7)
+    w, theta = W[::6], found.theta
+    expected = slopes(lambda x: response(found.at(x), w)[0], theta)
+    np.testing.assert_allclose(found.plant_gradient(w), expected, atol=2e-7)
+    _, noise = response(found, w)
+    in_noise = np.linalg.inv(noise)[:, None] @ slopes(lambda x: response(found.at(x), w)[1], theta)
+    np.testing.assert_allclose(found.noise_gradient(w), in_noise, atol=1e-7)
+    by_input = np.linalg.inv(noise)[:, None] @ expected
+    np.testing.assert_allclose(found.input_gradient(w), by_input, atol=5e-7)
+
+
+def test_gradients_by_complex_steps():
+    """Every entry of a discrete model, by steps along the imaginary axis of a plain resolvent."""
+    found = model(sample_time=None, delay=0.0, places=PLACES)
+    found = found.at(0.3 * found.theta)
+    w, step = W[:4], 1e-30
+
+    def entry(matrices, z):
+        real, imaginary = z.real, z.imag
+        n = len(matrices["A"])
+        # (z I - A)^-1 as a real system of twice the size, analytic in A
+        big = np.block(
+            [
+                [real * np.eye(n) - matrices["A"], -imaginary * np.eye(n)],
+                [imaginary * np.eye(n), real * np.eye(n) - matrices["A"]],
+            ]
+        )
+        x = np.linalg.solve(big, np.concatenate([matrices["B"], 0 * matrices["B"]]))
+        return matrices["C"] @ x[:n] + matrices["D"], matrices["C"] @ x[n:]
+
+    for index, (letter, i, j) in enumerate(PLACES[:16]):
+        for at, z in zip(found.plant_gradient(w)[:, index], np.exp(1j * w), strict=True):
+            moved = {k: v.astype(complex) for k, v in zip("ABCDK", found.matrices[:5], strict=True)}
+            moved[letter][i, j] += 1j * step
+            real, imaginary = entry(moved, z)
+            expected = real.imag / step + 1j * imaginary.imag / step
+            np.testing.assert_allclose(at, expected, rtol=1e-8, atol=1e-11)
+
+
+def simulated(found, r, e):
+    """y and u, sample by sample, from the equations; C of the loop has a delay."""
+    Ad, early, late = found.held
+    m, x = found.matrices, np.zeros(2)
+    y, u, c = np.zeros_like(e), np.zeros_like(r), np.zeros((len(r), 2))
+
+    def past(signal, t, lag):
+        return signal[t - lag] if t >= lag else np.zeros(2)
+
+    for t in range(len(r)):
+        c[t, 0] = past(c, t, 1)[0] + 0.9 * past(y, t, 1)[0] - 0.8 * past(y, t, 2)[0]
+        c[t, 1] = 0.5 * past(c, t, 1)[1] + 0.2 * past(y, t, 1)[1] + 0.1 * past(y, t, 2)[1]
+        u[t] = r[t] - c[t]
+        y[t] = m.C @ x + m.D @ past(u, t, found.direct_lag) + e[t]
+        x = Ad @ x + early @ past(u, t, found.lag) + late @ past(u, t, found.lag + 1) + m.K @ e[t]
+    return y, u
+
+
+def predicted(found, y, u):
+    """The one-step prediction, sample by sample."""
+    Ad, early, late = found.held
+    m, x, out = found.matrices, np.zeros(2), np.zeros_like(y)
+
+    def past(t, lag):
+        return u[t - lag] if t >= lag else np.zeros(2)
+
+    for t in range(len(y)):
+        out[t] = m.C @ x + m.D @ past(t, found.direct_lag)
+        x = Ad @ x + early @ past(t, found.lag) + late @ past(t, found.lag + 1) + m.K @ (y[t] - out[t])
+    return out
+
+
+@pytest.mark.parametrize("unstable", [False, True])
+def test_the_loop_is_that_of_the_equations(unstable):
+    """Information by impulses and differences of the predictor; with an unstable plant, too."""
+    found = model()
+    if unstable:
+        matrices = found.matrices._replace(A=A + np.array([[0.96, 0], [0, 0]]))
+        found = StateSpaceModel(matrices, found.entries, COVARIANCE, H)
+        assert np.abs(found.poles).max() > 1.0
+    loop = close_loop(found, CONTROLLER)
+    loop.check_stability()
+    check_signals(loop, simulated)
+    parts = []
+    for source in "re":
+        columns = []
+        for k in (0, 1):
+            r, e = np.zeros((2, 700, 2))
+            (r if source == "r" else e)[0, k] = 1.0
+            y, u = simulated(found, r, e)
+            assert np.abs(y[-5:]).max() < 1e-7
+            step = 1e-6
+            moved = [
+                (predicted(found.at(found.theta + d), y, u) - predicted(found.at(found.theta - d), y, u))
+                / (2 * step)
+                for d in step * np.eye(found.theta.size)
+            ]
+            columns.append(np.stack(moved, axis=1))
+        parts.append(np.stack(columns, axis=-1))
+    check_information(Experiment(found, 7, loop=loop), *parts)
+
+
+def test_records():
+    """psi by differences of the prediction errors, which at the truth are the noise; by frequency as well."""
+    found, rng = model(), np.random.default_rng(0)
+    u, e = rng.standard_normal((2, 150, 2))
+    y = sum(found.simulate(u, e, 1.0))
+    record = estimator(found, 1.0).kind.record(u, y)
+    errors, psi = record.errors_and_gradient(found.theta)
+    np.testing.assert_allclose(errors, e, atol=1e-10)
+    for k, step in enumerate(1e-6 * np.eye(found.theta.size)):
+        up, down = (record.errors_and_gradient(found.theta + s * step)[0] for s in (1, -1))
+        np.testing.assert_allclose(psi[k], (down - up) / 2e-6, atol=1e-6 * max(np.abs(psi[k]).max(), 1.0))
+    calm = estimator(found, 1.0).kind.record(u, found.simulate(u, 0 * e, 1.0)[0])
+    whitener = np.linalg.inv(np.linalg.cholesky(COVARIANCE))
+    by_frequency = FiniteRecord(Experiment(found, 150), 150).gradient(u)
+    in_time = np.moveaxis(calm.errors_and_gradient(found.theta)[1], 0, 1) @ whitener.T
+    np.testing.assert_allclose(by_frequency, in_time, atol=1e-8)
+
+
+MOTOR = {"J": 0.02, "R": 1.5, "K": 0.3}
+
+
+def motor(known=(), **words):
+    """Position and speed of a motor: theta' = w, w' = (K u - (b + K^2 / R) w R / R) / J."""
+    terms = [("A", 1, 1, "-(0.01 + K**2/R)/J"), ("B", 1, 0, "K/(R*J)")]
+    matrices = Matrices(
+        np.array([[0, 1], [0, -1.0]]),
+        np.array([[0], [1.0]]),
+        np.array([[1, 0]]),
+        np.zeros((1, 1)),
+        np.zeros((2, 1)),
+        0.0,
+    )
+    plain = StateSpaceModel(matrices, tuple(t[:3] for t in terms), 1e-4 * np.eye(1), 0.05)
+    free = np.array([name not in known for name in MOTOR])
+    return Reparametrised(
+        plain,
+        Parametrisation(
+            tuple(MOTOR),
+            tuple(MOTOR),
+            np.array(list(MOTOR.values())),
+            free,
+            tuple(Expression(t[3]) for t in terms),
+        ),
+    ).at(np.array(list(MOTOR.values()))[free])
+
+
+def test_a_motor_is_its_transfer_function():
+    """The same position by states and by k / (s (s + a)): one information, in J and K, in a loop."""
+    states = motor(known=("R",))
+    b, a = 0.3 / (1.5 * 0.02), (0.01 + 0.3**2 / 1.5) / 0.02
+    plant = ContinuousModel.monic(descending([[[b]]]), descending([[[1, a, 0]]]), 1e-4 * np.eye(1))
+    terms = (Expression("K/(1.5*J)"), Expression("0*J"), Expression("(0.01 + K**2/1.5)/J"))
+    transfer = Reparametrised(
+        SampledModel(plant, 0.05),
+        Parametrisation(("J", "K"), ("J", "K"), np.array([0.02, 0.3]), np.ones(2, bool), terms),
+    )
+    controller = TransferMatrix.build([[[8.0, -7.0]]], [[[1, -0.4]]])
+    found = []
+    for one in (states, transfer):
+        loop = close_loop(one, controller)
+        loop.check_stability()
+        e = Experiment(one, 10, loop=loop)
+        found.append((FirBasis(3).integrals(e.information_density, e.singularities), e.noise_information))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-9 * np.abs(one).max())
+
+
+def test_estimates_of_physical_parameters():
+    truth, rng = motor(known=("J",)), np.random.default_rng(4)
+    u = np.repeat(rng.choice([-1.0, 1.0], (150, 1)), 4, axis=0)
+    y = sum(truth.simulate(u, 0.01 * rng.standard_normal((600, 1)), 1.0))
+    found = identify(truth.at(1.4 * truth.theta), u, y)
+    assert found.names == ("R", "K")
+    assert found.converged
+    assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+
+
+def test_an_estimate_with_a_gain_is_as_good_as_its_covariance():
+    """Innovations form: the gain estimated along, from another start and about another level."""
+    places = [("A", 0, 0), ("A", 1, 1), ("B", 1, 0), ("K", 0, 0), ("K", 1, 1)]
+    plain, rng = model(delay=0.0, direct=0 * D, places=places), np.random.default_rng(6)
+    names = tuple("abcde")
+    truth = Reparametrised(
+        plain, Parametrisation(names, names, plain.theta, np.ones(5, bool), tuple(map(Expression, names)))
+    )
+    u = np.repeat(rng.choice([-1.0, 1.0], (300, 2)), 3, axis=0)
+    e = rng.standard_normal((900, 2)) @ np.linalg.cholesky(0.01 * COVARIANCE).T
+    y = sum(truth.simulate(u, e, 1.0))
+    found = identify(truth.at(0.7 * truth.theta), u, y + 3.0)
+    assert found.converged
+    assert np.all(np.abs(found.theta - truth.theta) < 4.0 * np.sqrt(np.diag(found.covariance)))
+    assert found.failed == ()
