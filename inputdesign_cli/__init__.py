@@ -14,25 +14,34 @@ from typing import TYPE_CHECKING
 from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:
-    from inputdesign_cli.specification import load_spec, parse_spec
+    from inputdesign_cli.figures.plots import figure
+    from inputdesign_cli.specification import Spec, from_control, load_spec, parse_spec
     from inputdesign_cli.sweep.running import sweep
-    from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, validate
+    from inputdesign_cli.tasks import analyse, assess, identify, simulate, solve, to_control, validate
 
 
 __all__ = [
+    "Spec",
     "__version__",
     "analyse",
     "assess",
+    "figure",
+    "from_control",
     "identify",
     "load_spec",
     "parse_spec",
     "simulate",
     "solve",
     "sweep",
+    "to_control",
     "validate",
 ]
 
 _HOME = {
+    "Spec": "inputdesign_cli.specification",
+    "figure": "inputdesign_cli.figures.plots",
+    "from_control": "inputdesign_cli.specification",
+    "to_control": "inputdesign_cli.tasks",
     "load_spec": "inputdesign_cli.specification",
     "parse_spec": "inputdesign_cli.specification",
     "solve": "inputdesign_cli.tasks",

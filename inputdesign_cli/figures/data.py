@@ -27,7 +27,7 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         (panel,) = curves.panels
         explained = "" if panel.fit is None else f" (fit {panel.fit:.1f} %)"
         handles = _plot(axes[0], time, panel, "y", f"simulated from u{explained}")
-        axes[0].set_ylabel("output")
+        axes[0].set_ylabel(panel.label or "output")
         axes[1].plot(time, (panel.y - panel.predicted)[:SHOWN], color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
         legend_above(axes[0], handles)
@@ -36,7 +36,8 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
     for panel, place in zip(curves.panels, axes, strict=True):
         longest = max(longest, _plot(place, time, panel, "recorded", "simulated from u"), key=len)
         explained = "" if panel.fit is None else f", fit {panel.fit:.1f} %"
-        place.set_title(f"y{panel.output + 1}{explained}", loc="left", color=GREY)
+        name = panel.label or f"y{panel.output + 1}"
+        place.set_title(f"{name}{explained}", loc="left", color=GREY)
     legend_over_all(page, longest)
 
 

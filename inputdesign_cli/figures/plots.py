@@ -15,7 +15,7 @@ from inputdesign_cli.figures.moments import draw_error, draw_moments
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
-from inputdesign_cli.figures.style import FileType, rendered
+from inputdesign_cli.figures.style import FileType, painted, rendered
 from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands, draw_loss
 from inputdesign_cli.runs import results as of
 from inputdesign_cli.runs.results import Curves, Results
@@ -43,6 +43,16 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
 def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> bytes:
     """The figure of `curves` as a file; frequencies are labelled rad per `time_unit`."""
     return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type)
+
+
+def figure(results: Results, name: str) -> Figure:
+    """A figure of a run, such as "bound", as an object of matplotlib to be shown or changed in a notebook.
+
+    Raises:
+        KeyError: the run has no such figure.
+    """
+    curves = results.curves[name]
+    return painted(lambda page: _DRAWN_BY[type(curves)](page, curves, results.time_unit))
 
 
 def draw_all(results: Results) -> dict[str, bytes]:

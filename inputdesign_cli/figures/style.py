@@ -72,14 +72,21 @@ def rendered(paint: Callable[[Figure], object], file_type: FileType = "png") -> 
     narrow = file_type == "svg"
     buffer = io.BytesIO()
     with mpl.rc_context(_RC):
-        canvas = FigureCanvasAgg(Figure(figsize=NARROW if narrow else SIZE, dpi=DPI, layout="constrained"))
-        paint(canvas.figure)
+        canvas = FigureCanvasAgg(painted(paint, NARROW if narrow else SIZE))
         if narrow:
             # Without a date and with ids that do not change, the same figure is the same file.
             canvas.print_figure(buffer, format="svg", metadata={"Date": None, "Creator": None})
         else:
             canvas.print_png(buffer)
     return buffer.getvalue()
+
+
+def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE) -> Figure:
+    """The figure that `paint` draws on an empty page."""
+    with mpl.rc_context(_RC):
+        page = Figure(figsize=size, dpi=DPI, layout="constrained")
+        paint(page)
+    return page
 
 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:

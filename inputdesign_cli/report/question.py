@@ -78,7 +78,12 @@ def _system(spec: Spec) -> str:
         kind = _structure(plant, spec.noise)
     clock = f", sampled every {spec.sample_time:g} {spec.time_unit}" if plant.sampled else ""
     article = "an" if kind[0] in "AEFIOaeio" else "a"
-    return f"The system is {article} {kind} system with {size}{clock}."
+    called = [
+        f"{name} is {one.name or 'measured'}{f' in {one.unit}' if one.unit else ''}"
+        for name, one in (spec.channels or {}).items()
+    ]
+    words = f" {'; '.join(called)}." if called else ""
+    return f"The system is {article} {kind} system with {size}{clock}.{words}"
 
 
 def _structure(plant: PolynomialPlant, noise: Noise) -> str:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from html import escape
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,6 +173,7 @@ class FitPanel:
     simulated: Array | None = None
     fit: float | None = None  # per cent
     output: int = 0  # from zero
+    label: str = ""  # its name and unit, where there are any
 
 
 @dataclass(frozen=True)
@@ -214,6 +216,7 @@ class SignalCurves(Curves):
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
+    labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
 
 
 @dataclass(frozen=True)
@@ -249,3 +252,65 @@ class Results:
     tables: Mapping[str, Table] = field(default_factory=dict)
     curves: Mapping[str, Curves] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)  # file name ("model.yaml") -> content
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """(k,): names of what is estimated."""
+        return tuple(self.result["information"]["parameters"])
+
+    @property
+    def information(self) -> Array:
+        """(k, k): the information matrix of the experiment."""
+        return np.array(self.result["information"]["matrix"], dtype=float)
+
+    @property
+    def covariance(self) -> Array:
+        """(k, k): its inverse."""
+        return np.array(self.result["information"]["covariance"], dtype=float)
+
+    @property
+    def signal(self) -> Array:
+        """(n, r): the record to be applied, as signal.csv has it."""
+        _, *channels = self.tables["signal"].columns.values()
+        return np.stack(channels, axis=1)
+
+    @property
+    def bound(self) -> Mapping[str, Array]:
+        """The columns of bound.csv: frequency_rad_per_s, r_u, r_adm, .."""
+        return self.tables["bound"].columns
+
+    def spectrum(self, w: Array) -> NDArray[np.complex128]:
+        """(n, r, r): the spectrum at frequencies `w` (n,), in rad per time unit.
+
+        A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
+        and zero between them.
+        """
+        found = cast(SpectrumCurves, self.curves["spectrum"])
+        at = np.asarray(w, dtype=float)
+        if found.lines:
+            nearest = np.abs(found.frequency - at[:, None]).argmin(axis=1)
+            on = np.isclose(found.frequency[nearest], at, rtol=1e-9, atol=0.0)
+            return np.where(on[:, None, None], found.spectrum[nearest], 0.0).astype(complex)
+        flat = found.spectrum.reshape(len(found.frequency), -1)
+        columns = [np.interp(at, found.frequency, column, left=0.0, right=0.0) for column in flat.T]
+        return np.stack(columns, axis=1).reshape(at.size, *found.spectrum.shape[1:]).astype(complex)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the head of the result."""
+        rows = [("status", self.result.get("status", "")), ("samples", self.result.get("samples", ""))]
+        objective = self.result.get("objective", {})
+        rows += [(str(objective.get("kind", "objective")), _digits(objective.get("value", "")))]
+        rows += [("proved bound", _digits(objective[key])) for key in _BOUNDS if key in objective]
+        deviations = self.result.get("information", {}).get("standard_deviation", {})
+        rows += [(f"standard deviation of {name}", _digits(value)) for name, value in deviations.items()]
+        cells = "".join(
+            f"<tr><th>{escape(name)}</th><td>{escape(str(value))}</td></tr>" for name, value in rows
+        )
+        return f"<b>{escape(str(self.result.get('title', '')))}</b><table>{cells}</table>"
+
+
+_BOUNDS = ("lower_bound", "upper_bound")
+
+
+def _digits(value: Json) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

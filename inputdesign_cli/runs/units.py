@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -10,7 +11,8 @@ class Units:
     """Time, frequency and channels of an experiment as its user counts and calls them.
 
     `sampled` tells discrete time, where the experiment counts in rad/sample, from continuous time, where it
-    counts in rad per `time_unit` as the user does. One input and one output carry no index in the names of
+    counts in rad per `time_unit` as the user does. `channels` are names and units of u1, .. and y1, .. where
+    the user gave them, empty where not. One input and one output carry no index in the names of
     curves and entries.
     """
 
@@ -20,6 +22,7 @@ class Units:
     closed_loop: bool
     inputs: int
     outputs: int
+    channels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     @property
     def frequency(self) -> float:
@@ -59,6 +62,19 @@ class Units:
     def excitations(self) -> tuple[str, ...]:
         """The columns of the record: u1, u2, .., in closed loop r1, r2, .."""
         return tuple(f"{self.excitation}{a + 1}" for a in range(self.inputs))
+
+    def label(self, channel: str) -> str:
+        """What the user calls a channel, with its unit: `valve (%)`; empty where nothing is stated.
+
+        An excitation r1 is added to u1 and has its unit.
+        """
+        drives = f"u{channel[1:]}"
+        name, unit = self.channels.get(channel, ("", self.channels.get(drives, ("", ""))[1]))
+        return f"{name} ({unit})".strip() if unit else name
+
+    def header(self, channel: str) -> str:
+        """The same as the header of a column, which begins with the channel."""
+        return f"{channel} {self.label(channel)}".strip()
 
     @property
     def single(self) -> bool:

@@ -9,6 +9,7 @@ from inputdesign_cli.specification.models.plant import PolynomialPlant
 from inputdesign_cli.specification.models.realisation import Simulation
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.models.sweep import Sweep
+from inputdesign_cli.specification.python_control import from_control
 from inputdesign_cli.specification.schema import json_schema
 from inputdesign_cli.specification.template import SpecTemplate, read_template, same_content
 
@@ -22,6 +23,7 @@ __all__ = [
     "Spec",
     "SpecTemplate",
     "Sweep",
+    "from_control",
     "json_schema",
     "load_estimate",
     "load_spec",

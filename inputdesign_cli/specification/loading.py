@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from inputdesign_cli.errors import Diagnostic, Location, SpecError
 from inputdesign_cli.specification.checks.everything import related, run_checks
+from inputdesign_cli.specification.durations import in_samples
 from inputdesign_cli.specification.models.experiment import Cost
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
@@ -86,8 +87,11 @@ def parse_spec(
     if diagnostics or spec is None:
         raise SpecError(_first(_sorted(diagnostics, tree.places)))
     spec = _with_defaults(spec)
-    spec._source = Source(tree.data, tree.places, folder)
+    spec._source, spec._design = Source(tree.data, tree.places, folder), design
     return spec
+
+
+Spec.reader = parse_spec
 
 
 def _first(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
@@ -142,6 +146,10 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
         told.append(PathDiagnostic("empty-value", "{key} has no value", hint, path, at_key=True))
         broken.add(path)
         _prune(data, path)
+    for one in in_samples(data):
+        told.append(one)
+        broken.add(one.path)
+        _prune(data, one.path)
     for attempt in range(_MOST_ROUNDS):
         try:
             spec = Spec.model_validate(data)

@@ -63,33 +63,38 @@ def _summed_products(table: NDArray, factor: Factor, rule: Quadrature) -> NDArra
     return 0.5 * (both + both.swapaxes(1, 2))
 
 
-def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
-    """At each frequency the direction v with the largest v^* value v / v^* price v.
+def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
+    """The stationary ratios of v^* value v to v^* price v at each frequency, and where they are reached.
 
     Args:
         price, value: densities, (n,) or Hermitian (n, r, r), `price` positive.
 
     Returns:
-        The ratios (n,) and unit directions (n, r).
+        The ratios (n, r), ascending, and for each a unit direction, (n, r, r): [n, a] belongs to ratio a.
     """
     if price.ndim == 1:
         with np.errstate(divide="ignore", invalid="ignore"):
             quotient = value / price
         # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
-        return np.where(price > 0, quotient, -np.inf), np.ones((price.size, 1), dtype=complex)
+        ratios = np.where(price > 0, quotient, -np.inf)
+        return ratios[:, None], np.ones((price.size, 1, 1), dtype=complex)
     size = np.einsum("naa->n", price).real
     free = size <= _NOTHING
     P = price + (_SINGULAR * size + free)[:, None, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))
     ratios, vectors = np.linalg.eigh(inverse @ value @ inverse.conj().swapaxes(1, 2))
-    directions = (inverse.conj().swapaxes(1, 2) @ vectors[..., -1:])[..., 0]
-    length = np.linalg.norm(directions, axis=1, keepdims=True)
-    return np.where(free, -np.inf, ratios[:, -1]), directions / length
+    directions = (inverse.conj().swapaxes(1, 2) @ vectors).swapaxes(1, 2)
+    length = np.linalg.norm(directions, axis=2, keepdims=True)
+    return np.where(free[:, None], -np.inf, ratios), directions / length
 
 
-def directed_scale(
-    price: Functional, value: Functional, grid: Array
-) -> tuple[float, Array, Array, ComplexArray]:
+def best_directions(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray]:
+    """The largest of these ratios at each frequency, (n,), and its direction (n, r)."""
+    ratios, directions = every_direction(price, value)
+    return ratios[:, -1], directions[:, -1]
+
+
+def directed_scale(price: Functional, value: Functional, grid: Array) -> tuple[float, Array]:
     """The largest s for which price(w) - s value(w) >= 0 as matrices at every frequency.
 
     Valid for every spectrum whatever on [grid[0], grid[-1]]: each is a mixture of sinusoids, each of
@@ -97,7 +102,7 @@ def directed_scale(
     left out; a value that does proves nothing (s = 0).
 
     Returns:
-        s, and at the local maxima of the largest generalised eigenvalue: frequencies, ratios, directions.
+        s, and the frequencies of the local maxima of the largest generalised eigenvalue.
     """
 
     def ratio(w: Array) -> Array:
@@ -108,11 +113,15 @@ def directed_scale(
     if over_grid[0] == -np.inf:
         # Near a frequency that costs nothing the ratio hardly changes, but the price loses its size.
         peaks = np.maximum(peaks, grid[1])
-    directions = best_directions(price.density(peaks), value.density(peaks))[1]
-    top = heights.max(initial=0.0)
     if value.concentrated:
-        return 0.0, peaks, heights, directions
-    return (np.inf if top <= 0 else 1.0 / top), peaks, heights, directions
+        return 0.0, peaks
+    return inverse_of(heights), peaks
+
+
+def inverse_of(heights: Array) -> float:
+    """One over the largest of some ratios, infinite where none is positive."""
+    top = float(heights.max(initial=0.0))
+    return np.inf if top <= 0 else 1.0 / top
 
 
 def first_directions(units: Array) -> ComplexArray:

@@ -15,10 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Face, Factor, Functional, Pricing
-from inputdesign_cli.spectrum.directions import best_directions, directed_scale, first_directions, matrices
+from inputdesign_cli.spectrum.directions import (
+    directed_scale,
+    every_direction,
+    first_directions,
+    inverse_of,
+    matrices,
+)
 
 _FIRST_LINES, _FEWEST_LINES, _FIRST_ATOMS = 24, 6, 800
-_MOST_NEW = 16
+# New atoms a round: for each input, and in all. The best few get company (see `_around`).
+_NEW_EACH, _MOST_NEW, _MOST_ACCOMPANIED = 16, 64, 16
 # From so many atoms on, so many of the most power stay.
 _MOST_ATOMS, _KEPT_ATOMS = 320, 200
 _ATOMS_AT_ONCE = 256
@@ -144,16 +151,17 @@ class LinesBasis:
         return Face(columns, "nonnegative", atoms.size, atoms)
 
     def price(self, price: Functional, value: Functional, grid: Array) -> Pricing:
-        """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction)."""
-        if self.free:
-            scale, where, heights, directions = directed_scale(price, value, grid)
-        else:
-            where = self.allowed
-            heights, directions = best_directions(price.density(where), value.density(where))
-            top = heights.max(initial=0.0)
-            scale = np.inf if top <= 0 else 1.0 / top
-        best = np.argsort(-heights)[:_MOST_NEW]
-        return Pricing(scale, np.column_stack([where[best], directions[best]]))
+        """The ratio over all allowed frequencies and directions; new atoms as rows (frequency, direction).
+
+        New atoms have all stationary directions of their frequency: the power matrix there may need them
+        together, and the best one a round would take as many rounds.
+        """
+        scale, where = directed_scale(price, value, grid) if self.free else (None, self.allowed)
+        ratios, directions = every_direction(price.density(where), value.density(where))
+        best = np.argsort(-ratios, axis=None, kind="stable")[: min(_NEW_EACH * self.inputs, _MOST_NEW)]
+        number, which = np.unravel_index(best, ratios.shape)
+        atoms = np.column_stack([where[number], directions[number, which]])
+        return Pricing(inverse_of(ratios) if scale is None else scale, atoms)
 
     def enlarge(self, face: Face, y: Array, directions: Array, price: Functional) -> tuple[LinesBasis, Face]:
         """The atoms so far and the new ones; x of the old basis is the head of x of the new.
@@ -163,7 +171,7 @@ class LinesBasis:
         number = face.generators
         power = np.zeros(self.size)
         power[number[: y.size]] = y
-        rows = [*directions, *self._around(power, directions)]
+        rows = [*directions, *self._around(power, directions[:_MOST_ACCOMPANIED])]
         known = [self._known(float(row[0].real), row[1:]) for row in rows]
         fresh = [row for row, at in zip(rows, known, strict=True) if at is None]
         back = np.setdiff1d([at for at in known if at is not None], number).astype(np.intp)

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import singledispatch
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
 from inputdesign_cli.tasks.build.exploration import model_to_judge
@@ -19,9 +23,14 @@ from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.system import build_model
 from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.control_systems import system_of
 from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
+
+if TYPE_CHECKING:
+    import control
 
 Files = str | Path | Sequence[str | Path]
 
@@ -135,6 +144,30 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
         return explore_log(_paths(data), prepared)
     with _placed(model):
         return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
+
+
+@singledispatch
+def to_control(model: Spec | Results) -> control.lti.LTI:
+    """G of a spec, or of what `identify` found, as a system of python-control; if sampled, in discrete time.
+
+    Raises:
+        SpecError: `not-supported` for dead times of a plant that is not sampled.
+    """
+    raise TypeError("to_control takes a spec, or the results of identify")
+
+
+@to_control.register(Spec)
+def _(model: Spec) -> control.lti.LTI:
+    with _placed(model):
+        return system_of(build_model(model), model.sample_time)
+
+
+@to_control.register(Results)
+def _(model: Results) -> control.lti.LTI:
+    spec = parse_spec(model.resolved_spec, design=False)
+    found = model.files.get("model.yaml")
+    blocks = {} if found is None else yaml.safe_load(found)
+    return to_control(spec.with_(**{key: blocks[key] for key in ("plant", "noise") if key in blocks}))
 
 
 def _paths(data: Files) -> list[Path]:

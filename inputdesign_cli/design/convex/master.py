@@ -19,7 +19,7 @@ from inputdesign_cli.design.convex.finite import FiniteProgram, solve_program
 from inputdesign_cli.design.convex.limits import DensityPlace
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Face, Functional, smat, svec
+from inputdesign_cli.spectrum import Face, Functional, smat, svec, svec_length
 
 # The conic program is solved this much tighter than the gap that is asked for.
 _SOLVER_MARGIN = 1e-2
@@ -98,9 +98,12 @@ def solve_master(
     def turned(information: Array) -> Array:
         return svec(congruence @ information @ congruence.T)
 
-    maps = problem.information_map
-    parts = [turned(maps[start : start + _AT_ONCE]) for start in range(0, len(maps), _AT_ONCE)]
-    gains = [worth * (np.concatenate(parts).T @ columns)]
+    # Of a basis that grows, most functions have left the face.
+    used = np.flatnonzero(columns.any(axis=1))
+    gains = [np.zeros((svec_length(len(congruence)), number))]
+    for start in range(0, used.size, _AT_ONCE):
+        part = used[start : start + _AT_ONCE]
+        gains[0] += worth * (turned(problem.information_map[part]).T @ columns[part])
     signs = np.eye(number)[inside:]
     cost = problem.price.vector @ columns
     if problem.scaled:

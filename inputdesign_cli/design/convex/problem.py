@@ -178,13 +178,16 @@ class Problem:
         if known is not None:
             return known
 
+        # Without this problem inside, which would keep the arrays of each that has grown beyond it.
+        experiment = self.experiment
+
         def density(w: Array) -> Array:
-            return self.experiment.power_density(kind, w, channel)
+            return experiment.power_density(kind, w, channel)
 
         if self.finer is not None:
             vector = self.finer.power(kind, channel).vector[: self.basis.size]
         else:
-            vector = self.basis.integrals(density, self.experiment.singularities)
+            vector = self.basis.integrals(density, experiment.singularities)
         self._powers[kind, channel] = Functional(vector, density)
         return self._powers[kind, channel]
 

@@ -24,6 +24,7 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (plant.weights_fit, ("plant.sample", "plant.continuous")),
     (loop.control_fits, ("plant", "accuracy.closed_loop_error")),
     (size.channels, ("plant",)),
+    (size.named_channels, ("plant", "channels")),
     (size.delays, ("plant", "sample_time", "experiment.samples")),
     (size.bands, ("plant.sample", "sample_time", "plant.continuous")),
     (size.frequencies, ("plant.sample", "sample_time", "limits.band")),

@@ -54,6 +54,17 @@ def channels(spec: Spec) -> Iterator[PathDiagnostic]:
         yield _wrong_size("spectrum.given.amplitudes", spec.given.rows, "input", spec.plant.inputs)
 
 
+def named_channels(spec: Spec) -> Iterator[PathDiagnostic]:
+    """Names and units are those of channels that the plant has."""
+    sizes = ("u", spec.plant.inputs), ("y", spec.plant.outputs)
+    there = [f"{letter}{i + 1}" for letter, count in sizes for i in range(count)]
+    for name in spec.channels or ():
+        if name not in there:
+            message = f"the plant has no channel {name}"
+            hint = f"it has {', '.join(there)}"
+            yield PathDiagnostic("unknown-name", message, hint, ("channels", name), at_key=True)
+
+
 def _wrong_size(key: str, value: tuple, noun: str, size: int) -> PathDiagnostic:
     return PathDiagnostic(
         "wrong-shape",

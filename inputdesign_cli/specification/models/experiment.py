@@ -168,6 +168,9 @@ class Experiment(Section):
     """How the data will be collected."""
 
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
+    duration: Positive | None = Field(
+        default=None, description="In place of samples: how long it lasts, in time_unit.", examples=[3600]
+    )
     controller: Controller | None = Field(
         default=None,
         description="C of the loop u = r - C y, in q^-1, as pid or in s; present: the experiment is in "

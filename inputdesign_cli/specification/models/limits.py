@@ -8,7 +8,15 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from inputdesign_cli.specification.models.fields import Band, Cap, Count, FileName, NonNegative, PerChannel
+from inputdesign_cli.specification.models.fields import (
+    Band,
+    Cap,
+    Count,
+    FileName,
+    NonNegative,
+    PerChannel,
+    Positive,
+)
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
@@ -98,6 +106,9 @@ class Limits(Section):
     )
     excitation_power: Power | None = Field(default=None, description="Power of r: number, list, {min, max}.")
     samples: Count | None = Field(default=None, description="Largest number of samples.")
+    duration: Positive | None = Field(
+        default=None, description="In place of samples: the longest experiment, in time_unit."
+    )
     amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = Field(
         default=None, description="Largest |u|: a number or one per input; or {input, output}."
     )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar, Literal, TypeVar
+from typing import ClassVar, Literal, Protocol, TypeVar
 
 from pydantic import Field, PrivateAttr
 
 from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.accuracy import Accuracy
+from inputdesign_cli.specification.models.channels import Channels
 from inputdesign_cli.specification.models.experiment import Cost, Estimated, Experiment, Noise
 from inputdesign_cli.specification.models.fields import Positive, Text
 from inputdesign_cli.specification.models.limits import Limits
@@ -20,11 +23,21 @@ from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.spectrum import Given, Spectrum
 from inputdesign_cli.specification.models.sweep import Sweep
 from inputdesign_cli.specification.yaml.places import Source, parse_key
+from inputdesign_cli.specification.yaml.plain import plain
 from inputdesign_cli.specification.yaml.writer import fingerprint, to_yaml
 
 Objective = Literal["least_cost", "best_accuracy", "shortest_experiment"]
 
 _Error = TypeVar("_Error", bound=IdesignError)
+
+
+class Reader(Protocol):
+    """What makes a spec of text; see `parse_spec`."""
+
+    def __call__(
+        self, text: str, file: str, overrides: Sequence[str], *, folder: Path | None, design: bool
+    ) -> Spec:
+        """A spec of YAML with overrides."""
 
 
 class Spec(Section):
@@ -45,6 +58,12 @@ class Spec(Section):
     )
     noise: Noise = Field(
         description="Noise on the output: variance, and polynomials C and D.", examples=[{"variance": 1.0}]
+    )
+    channels: Channels | None = Field(
+        default=None,
+        min_length=1,
+        description="What inputs u1, u2, .. and outputs y1, y2, .. are called, and their units.",
+        examples=[{"u1": {"name": "valve", "unit": "%"}, "y1": {"name": "temperature", "unit": "degC"}}],
     )
     experiment: Experiment = Field(
         default=Experiment(), description="Samples, controller, prior information."
@@ -74,6 +93,37 @@ class Spec(Section):
     phrase: ClassVar[str] = "a spec"
 
     _source: Source = PrivateAttr(default_factory=Source)
+    _design: bool = PrivateAttr(default=True)
+
+    # What reads text; `specification.loading` sets it, which itself needs this class.
+    reader: ClassVar[Reader]
+
+    @classmethod
+    def from_dict(
+        cls, data: Mapping[str, object], *, folder: Path | None = None, design: bool = True
+    ) -> Spec:
+        """The spec of plain data: mappings, lists, numbers and texts, as a file holds them.
+
+        Args:
+            data: arrays of numpy will do for lists.
+            folder: what the paths in the spec are relative to (default: the current folder).
+            design: whether it must ask for a design, or for an analysis, that can be answered.
+
+        Raises:
+            SpecError: everything that is wrong with it.
+        """
+        return cls.reader(to_yaml(plain(data)), "<dict>", (), folder=folder, design=design)
+
+    def with_(self, **changes: object) -> Spec:
+        """The spec with other values: `spec.with_(**{"experiment.samples": 600})`; None removes a key.
+
+        Raises:
+            SpecError: everything that is wrong with the new one.
+        """
+        overrides = [f"{key}={json.dumps(plain(value))}" for key, value in changes.items()]
+        return type(self).reader(
+            self.to_yaml(), "<spec>", overrides, folder=self._source.folder, design=self._design
+        )
 
     @property
     def goal(self) -> Objective:

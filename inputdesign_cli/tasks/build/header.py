@@ -15,6 +15,7 @@ def build_units(spec: Spec) -> Units:
         closed_loop=spec.closed_loop,
         inputs=spec.plant.inputs,
         outputs=spec.plant.outputs,
+        channels={name: (one.name or "", one.unit or "") for name, one in (spec.channels or {}).items()},
     )
 
 

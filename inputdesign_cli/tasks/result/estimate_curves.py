@@ -34,7 +34,7 @@ def data_curves(
         curve = None if fit is None else estimate.simulated[:, i]
         if curve is not None:
             columns[f"y{_number(units, i)}_simulated"] = curve
-        panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i))
+        panels.append(FitPanel(y[:, i], predicted[:, i], curve, fit, i, units.label(f"y{i + 1}")))
     columns |= _columns(units, "residual" if units.single else "residual_", estimate.errors)
     white, cross = estimate.whiteness, estimate.independence
     shared = min(white.lags.size, cross.lags.size)

@@ -80,7 +80,9 @@ def signal_curves(request: RecordRequest, units: Units, record: Record) -> tuple
         around = request.delivery.operating_points
         middle = np.zeros(most.size) if around is None else around
         limits = dict(zip(units.excitations, zip(middle - most, middle + most, strict=True), strict=True))
-    return Table({units.time_header: time, **channels}), SignalCurves(time, channels, limits)
+    columns = {units.header(name): values for name, values in channels.items()}
+    labels = {name: units.label(name) for name in channels}
+    return Table({units.time_header: time, **columns}), SignalCurves(time, channels, limits, labels)
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
@@ -109,7 +111,10 @@ def other_files(request: RecordRequest, units: Units, record: Record) -> dict[st
         import scipy.io
 
         table, _ = signal_curves(request, units, record)
-        content: dict[str, Json] = {name: values[:, None] for name, values in table.columns.items()}
+        # Variables of MATLAB have no units in their names.
+        content: dict[str, Json] = {
+            name.split()[0]: values[:, None] for name, values in table.columns.items()
+        }
         buffer = io.BytesIO()
         scipy.io.savemat(buffer, content | {"sample_time": units.sample_time})
         # The first 116 bytes are a text with the date, which would make equal runs differ.

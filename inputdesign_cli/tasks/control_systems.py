@@ -1,0 +1,103 @@
+"""Models as systems of python-control; a new kind of model registers its own."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant import (
+    Coloured,
+    ContinuousModel,
+    Model,
+    PolynomialModel,
+    Reparametrised,
+    SampledModel,
+    StateSpaceModel,
+)
+from inputdesign_cli.plant.polynomial import Array
+
+if TYPE_CHECKING:
+    import control
+
+Entries = list[list[list[float]]]
+
+
+@singledispatch
+def system_of(model: Model, sample_time: float) -> control.lti.LTI:
+    """G of a model; a sampled one in discrete time.
+
+    Raises:
+        SpecError: `not-supported` for dead times in s, which python-control does not have.
+    """
+    raise TypeError(f"{type(model).__name__} is no system of python-control")
+
+
+@system_of.register(PolynomialModel)
+def _(model: PolynomialModel, sample_time: float) -> control.lti.LTI:
+    places = [(model.A[0 if len(model.A) == 1 else i], i) for i in range(model.outputs)]
+    rows = [[(model.B[i][j], np.convolve(a, model.F[i][j])) for j in range(model.inputs)] for a, i in places]
+    return _discrete(rows, sample_time)
+
+
+@system_of.register(SampledModel)
+def _(model: SampledModel, sample_time: float) -> control.lti.LTI:
+    plant, nothing = model.continuous_plant, (np.zeros(1), np.ones(1))
+    rows = [[nothing for _ in range(model.inputs)] for _ in range(model.outputs)]
+    for i, j in plant.active:
+        rows[i][j] = plant.held(i, j, model.sample_time).sampled
+    return _discrete(rows, sample_time)
+
+
+@system_of.register(ContinuousModel)
+def _(model: ContinuousModel, sample_time: float) -> control.lti.LTI:
+    import control
+
+    if model.memory:
+        raise bad_spec(
+            "not-supported",
+            "python-control has no dead times in continuous time",
+            hint="write plant.sample: zoh: sampled, they are exact",
+            key="plant.continuous",
+        )
+    above, below = (
+        [[entry[::-1].tolist() for entry in row] for row in rows]
+        for rows in (model.numerator, model.denominator)
+    )
+    return control.TransferFunction(above, below)
+
+
+@system_of.register(StateSpaceModel)
+def _(model: StateSpaceModel, sample_time: float) -> control.lti.LTI:
+    import control
+
+    return control.StateSpace(*model.realisation, sample_time)
+
+
+@system_of.register(Coloured)
+def _(model: Coloured, sample_time: float) -> control.lti.LTI:
+    return system_of(model.plant, sample_time)
+
+
+@system_of.register(Reparametrised)
+def _(model: Reparametrised, sample_time: float) -> control.lti.LTI:
+    return system_of(model.coefficients, sample_time)
+
+
+def _discrete(rows: list[list[tuple[Array, Array]]], sample_time: float) -> control.lti.LTI:
+    """From entries in q^-1, ascending: in z both have the same length."""
+    import control
+
+    above: Entries = []
+    below: Entries = []
+    for row in rows:
+        lengths = [max(top.size, bottom.size) for top, bottom in row]
+        padded = [
+            [np.pad(p, (0, n - p.size)).tolist() for p in entry]
+            for entry, n in zip(row, lengths, strict=True)
+        ]
+        above.append([top for top, _ in padded])
+        below.append([bottom for _, bottom in padded])
+    return control.TransferFunction(above, below, sample_time)
