@@ -317,7 +317,8 @@ def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeRes
     if found.basis.has_density or problem.has_floors or not found.x.any():
         return found
     at = problem.on(found.basis)
-    told = found.x * np.linalg.norm(at.information_map, axis=(1, 2))
+    samples = found.s if problem.goal == "samples" else 1.0  # of the information that was found
+    told = samples * found.x * np.linalg.norm(at.information_map, axis=(1, 2))
     least = max(float(np.linalg.eigvalsh(found.information)[0]), 0.0)
     order = np.argsort(told)
     lost = np.cumsum(told[order])

@@ -154,9 +154,9 @@ class Simulation(Section):
         description="new: each run realises the spectrum anew (default); record: all runs apply the one "
         "record that is delivered.",
     )
-    compare: tuple[Literal["white", "prbs", "multisine", "binary"], ...] = Field(
-        default=(), description="Other inputs to compare with, at equal power."
-    )
+    compare: Annotated[
+        tuple[Literal["white", "prbs", "multisine", "binary"], ...], SIZES["simulation.compare"]
+    ] = Field(default=(), description="Other inputs to compare with, at equal power.")
 
 
 def _pair(value: object) -> object:
