@@ -17,6 +17,7 @@ from inputdesign_cli.identification.estimate import (
     information_of,
     noise_of,
 )
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
 from inputdesign_cli.identification.records import Record, Records, centred, longest, split
@@ -70,6 +71,13 @@ class Kind(Protocol):
     def holding(self, known: NDArray[np.bool_]) -> Self:
         """The same, with starts that keep the known (k,) of its parameters where they know how to."""
 
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """What the structure at theta (k,) would become by one parameter more.
+
+        Args:
+            feedback: whether u(t) answers y(t).
+        """
+
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
@@ -86,6 +94,7 @@ def identify_records(
     lengths: Sequence[int] | None,
     rest: bool | None,
     earlier: Earlier | None,
+    experiments: Sequence[int] | None = None,
     weights: Array | None = None,
 ) -> Estimate:
     """The maximum-likelihood estimate of a structure from one record, or jointly from several.
@@ -98,6 +107,7 @@ def identify_records(
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
         earlier: an estimate from other data, which counts along.
+        experiments: the samples of each experiment, of one or several records; None: all are of one.
         weights: W (p, p) of the errors if the covariance of the noise is known.
 
     Raises:
@@ -132,6 +142,8 @@ def identify_records(
         in_noise=int(np.sum(kind.whitening)),
         in_plant=int(np.sum(kind.explaining)),
         recent=kind.recent,
+        extensions=kind.extensions(best.point.theta, feedback=feedback),
+        experiments=experiments or (len(y),),
         feedback=feedback,
     )
 

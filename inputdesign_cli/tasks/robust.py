@@ -95,7 +95,7 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
         discard -= len(gone)
         if discard > 0:
             fewer = replace(question, others=[question.others[number] for number in kept])
-            design = solve_design(fewer, tolerance=_ROUGH, any_spectrum_tolerance=1.0)
+            design = solve_design(fewer, tolerance=_ROUGH, any_spectrum_tolerance=None)
     return kept
 
 
