@@ -74,10 +74,10 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
         yield "binding", ", ".join(bound) + more, ""
     if "fresh" in found:
         told = found["fresh"]
-        low, high = (f"{100 * share:.2g}" for share in told["limits"])
+        low, high = (f"{100 * share:.3g}" for share in told["limits"])
         yield (
             "fresh plants",
-            f"{told['missed']} of {told['draws']} drawn afresh are missed: {100 * told['share']:.2g} % "
+            f"{told['missed']} of {told['draws']} drawn afresh are missed: {100 * told['share']:.3g} % "
             f"({low} to {high})",
             "said of plants drawn as the spec says, not of the true plant",
         )

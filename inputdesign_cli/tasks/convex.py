@@ -177,7 +177,7 @@ class ConvexTask:
         A record distributes its information otherwise than the design, so that it may need a larger alpha.
         """
         design, experiment, alpha = done.design, done.experiment, done.confidence.alpha
-        made = fitting_record(self.record, self.question, design, experiment)
+        made = fitting_record(self.record, done.question, design, experiment)
         if self.calibration is None:
             return made
         for _ in range(_RECORDS):
@@ -190,7 +190,7 @@ class ConvexTask:
             alpha = needed
             stricter = tuple(with_alpha(design.problem.requirements, alpha))
             design = replace(design, problem=replace(design.problem, requirements=stricter))
-            made = fitting_record(self.record, self.question.at_alpha(alpha), design, experiment)
+            made = fitting_record(self.record, done.question.at_alpha(alpha), design, experiment)
         known = self._known(done, made.record)
         if made.record is None or known is None:
             return made
@@ -300,11 +300,9 @@ class ConvexTask:
             samples = max(int(np.ceil(samples * _LONGER)), 2)
             if samples > _TRIED:
                 return None
-            stated = replace(self.question.experiment, samples=samples)
+            stated = self.question.of_length(samples)
             try:
-                design = solve_design(
-                    replace(self.question, experiment=stated), tolerance=_ROUGH, any_spectrum_tolerance=_ANY
-                )
+                design = solve_design(stated, tolerance=_ROUGH, any_spectrum_tolerance=_ANY)
                 request = replace(self.record, samples=None)
                 record = make_record(request, design, design.problem.experiment, longer=False)
             except (OutOfTimeError, UnreachableError):

@@ -260,6 +260,7 @@ def test_what_contradicts_itself_is_said(stated, code):
         ["accuracy={criterion: D}", "limits={input_power: 1}",
          "spectrum={type: polynomial, order: 4, band: [0, 3], factor_columns: 1}"],
         ["accuracy={model_error: {relative: 0.1, region: ellipsoid}}", "uncertainty.r_adm=fixed"],
+        ["accuracy={model_error: {relative: 0.1, confidence: {exact: 0.95}}}"],
     ],
 )  # fmt: skip
 def test_what_is_not_made_robust_is_said(overrides):

@@ -82,19 +82,14 @@ class Question:
         return [Alternative(self.experiment, self.requirements, self.side), *self.others]
 
     def at_alpha(self, alpha: float) -> Question:
-        """The same question with another confidence factor of the model errors."""
+        """The same question with another confidence factor of the model errors of the nominal plant."""
 
-        def changed(makers: Sequence[RequirementFactory]) -> list[RequirementFactory]:
-            return [at(make) for make in makers]
-
-        def at(make: RequirementFactory) -> RequirementFactory:
+        def changed(make: RequirementFactory) -> RequirementFactory:
             return lambda experiment: with_alpha([make(experiment)], alpha)[0]
 
-        others = [
-            replace(one, requirements=changed(one.requirements), side=changed(one.side))
-            for one in self.others
-        ]
-        return replace(self, requirements=changed(self.requirements), side=changed(self.side), others=others)
+        return replace(
+            self, requirements=list(map(changed, self.requirements)), side=list(map(changed, self.side))
+        )
 
     def of_length(self, samples: int) -> Question:
         """The same question of experiments with so many samples."""

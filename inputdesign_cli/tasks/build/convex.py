@@ -121,6 +121,8 @@ def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
         what, hint = "write a robust design as the papers' program", "use method: exchange"
     elif error is not None and error.region == "ellipsoid" and uncertainty.r_adm == "fixed":
         what, hint = "take a fixed r_adm over the whole ellipsoid", "use r_adm: own, or region: first_order"
+    elif error is not None and error.calibrated is not None:
+        what, hint = "calibrate an exact confidence at several plants", "write confidence: 0.95"
     else:
         return
     raise spec.complain("not-supported", f"this version does not {what}", hint=hint, key="uncertainty")
