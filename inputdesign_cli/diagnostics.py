@@ -72,13 +72,14 @@ def _is_override(place: Location) -> bool:
 
 def _excerpt(text: str, column: int) -> tuple[str, int]:
     """The line, clipped around the column if it is long, and the number of cells before the caret."""
-    line = _clean(text.replace("\t", " ")).rstrip()
+    line = text.replace("\t", " ").rstrip()
     at = min(max(column - 1, 0), len(line))
     if len(line) > _WIDTH:
         start = max(0, min(at - _WIDTH // 2, len(line) - _WIDTH))
         before, after = "..." if start else "", "..." if start + _WIDTH < len(line) else ""
         line = before + line[start : start + _WIDTH] + after
         at += len(before) - start
+    line = _clean(line)
     return line, sum(_cells(character) for character in line[:at])
 
 

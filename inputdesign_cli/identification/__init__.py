@@ -1,9 +1,11 @@
 """From samples to models: prediction-error estimates with their covariance, and tests of the residuals."""
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
+from inputdesign_cli.identification.directed import Directed as Directed
 from inputdesign_cli.identification.earlier import Earlier as Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
 from inputdesign_cli.identification.estimators import fit_batch as fit_batch, identify as identify
+from inputdesign_cli.identification.extensions import Extension as Extension
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
     frequency_response as frequency_response,

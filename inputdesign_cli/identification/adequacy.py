@@ -2,7 +2,8 @@
 
 Each test regresses the residuals on signals that the model does without: past inputs, past residuals, slow
 trends. What the parameters and unknown starts can explain is taken off these signals first, so that the
-statistic is chi-squared whatever was estimated. Few signals find a fault of a known shape, many one of any.
+statistic is chi-squared whatever was estimated. Few signals find a fault of a known shape, many one of any;
+`directed.py` has the fewest, one parameter more.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records, shifted
 from inputdesign_cli.plant.polynomial import Array
 
-# A right model fails some test with at most this probability.
-LEVEL = 0.02
+# A right model fails some test of many signals, and some of one parameter, with at most these probabilities.
+LEVEL, DIRECTED_LEVEL = 0.005, 0.015
 _LAGS = 25
 _FEW = 4
 _GROWTH = 1.35
@@ -62,6 +63,34 @@ class _Signals:
     lags: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True)
+class White:
+    """An estimate in units of the covariance of its residuals, outputs interleaved.
+
+    Attributes:
+        root: R (p, p), which makes residuals white.
+        residuals: (N p,).
+        explained: (N p, m + k), what m unknown starts and the k parameters explain; `basis`, orthonormal.
+    """
+
+    root: Array
+    residuals: Array
+    explained: Array
+    basis: Array
+
+    @classmethod
+    def of(cls, point: Point) -> White:
+        """That of a point of the search."""
+        root = np.linalg.inv(np.linalg.cholesky(point.errors.T @ point.errors / len(point.errors)))
+        psi = (point.psi @ root.T).reshape(len(point.psi), -1).T
+        explained = np.column_stack([point.near.directions, psi])
+        return cls(root, (point.errors @ root.T).ravel(), explained, _orthonormal(_scaled(explained)))
+
+    def unexplained(self, columns: Array) -> Array:
+        """What the estimate leaves of columns (N p, m)."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+
 def score_tests(
     records: Records, point: Point, *, recent: int, feedback: bool = False
 ) -> tuple[ScoreTest, ...]:
@@ -72,17 +101,15 @@ def score_tests(
         feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
     """
     n, p = point.errors.shape
-    root = np.linalg.inv(np.linalg.cholesky(point.errors.T @ point.errors / n))
-    residuals = (point.errors @ root.T).ravel()
-    psi = (point.psi @ root.T).reshape(len(point.psi), -1).T
-    taken = _orthonormal(_scaled(np.column_stack([point.near.directions, psi])))
+    white = White.of(point)
     tests = []
     for signals in _tried(records, point, recent, int(feedback)):
-        regressors = _scaled(np.einsum("pnm,qp->nqpm", signals.columns, root).reshape(n * p, -1))
-        regressors = regressors - taken @ (taken.T @ regressors)
-        scores = regressors.T @ residuals / np.maximum(np.linalg.norm(regressors, axis=0), _DEPENDENT)
+        columns = np.einsum("pnm,qp->nqpm", signals.columns, white.root).reshape(n * p, -1)
+        regressors = white.unexplained(_scaled(columns))
+        scores = regressors.T @ white.residuals
+        scores = scores / np.maximum(np.linalg.norm(regressors, axis=0), _DEPENDENT)
         directions = _orthonormal(regressors)
-        statistic, freedom = float(np.sum((directions.T @ residuals) ** 2)), directions.shape[1]
+        statistic, freedom = float(np.sum((directions.T @ white.residuals) ** 2)), directions.shape[1]
         if not freedom:
             continue
         largest = int(np.argmax(np.abs(scores))) % signals.columns.shape[2]
@@ -92,9 +119,10 @@ def score_tests(
     return tuple(tests)
 
 
-def failed(tests: Sequence[ScoreTest]) -> tuple[ScoreTest, ...]:
-    """Those that refute the model, each at its share of the level (Bonferroni)."""
-    return tuple(test for test in tests if test.probability * len(tests) < LEVEL)
+def failed(tests: Sequence[ScoreTest], directed: Sequence[ScoreTest] = ()) -> tuple[ScoreTest, ...]:
+    """Those that refute the model, each at its share of the level of its group (Bonferroni)."""
+    groups = ((directed, DIRECTED_LEVEL), (tests, LEVEL))
+    return tuple(test for group, level in groups for test in group if test.probability * len(group) < level)
 
 
 def _tried(records: Records, point: Point, recent: int, first: int) -> list[_Signals]:

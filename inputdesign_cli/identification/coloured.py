@@ -7,13 +7,14 @@ what the plant leaves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.search import Search
@@ -220,6 +221,16 @@ class ColouredKind:
         """The same; the plant keeps what it knows."""
         return replace(self, plant=self.plant.holding(known[: len(self.model.plant.parameters)]))
 
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """Those of the plant; the tests of many signals look at C and D."""
+        here = self.model.at(theta)
+        of_plant = theta[: len(self.model.plant.parameters)]
+        return tuple(
+            replace(extension, model=larger, record=partial(_coloured, extension.record, larger))
+            for extension in self.plant.extensions(of_plant, feedback=feedback)
+            for larger in [replace(here, plant=extension.model)]
+        )
+
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
@@ -235,6 +246,10 @@ class ColouredKind:
         near = replace(found.point.near, errors=errors, begun=begun)
         point = replace(found.point, theta=theta, near=near)
         return self.plant.simulated(replace(found, records=records, point=point), y, lengths)
+
+
+def _coloured(record: Callable[[Array, Array], Record], model: Coloured, u: Array, y: Array) -> Record:
+    return ColouredRecord(record(u, y), model)
 
 
 def _of_plant(records: Records, plant: Kind) -> tuple[Record, ...]:

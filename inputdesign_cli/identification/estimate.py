@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
+from inputdesign_cli.identification.directed import Directed, directed_tests
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
 from inputdesign_cli.identification.records import Records
@@ -43,7 +45,7 @@ class Estimate:
         lengths: the samples of each of the records, which follow each other.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
-        tests: of the structure; `failed` tells which of them refute it.
+        tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
     """
 
     names: tuple[str, ...]
@@ -63,6 +65,7 @@ class Estimate:
     whiteness: ResidualTest
     independence: ResidualTest
     tests: tuple[ScoreTest, ...]
+    directed: tuple[Directed, ...]
 
     @cached_property
     def information(self) -> Array:
@@ -76,9 +79,14 @@ class Estimate:
         return np.asarray(half.T @ half)
 
     @property
+    def all_tests(self) -> tuple[ScoreTest, ...]:
+        """Those of many signals, then those of one parameter more."""
+        return (*self.tests, *(one.test for one in self.directed))
+
+    @property
     def failed(self) -> tuple[ScoreTest, ...]:
         """The tests that refute the structure."""
-        return failed(self.tests)
+        return failed(self.tests, tuple(one.test for one in self.directed))
 
 
 @dataclass(frozen=True)
@@ -111,6 +119,7 @@ def concluded(
     in_noise: int,
     in_plant: int,
     recent: int,
+    extensions: Sequence[Extension],
     feedback: bool,
 ) -> Estimate:
     """The estimate with its covariance and the tests of its residuals.
@@ -124,6 +133,7 @@ def concluded(
         in_noise: number of parameters that make residuals look whiter: those of A, C and D.
         in_plant: number of parameters that take directions of past inputs away: those of B and F.
         recent: the lag up to which the structure looks at the inputs.
+        extensions: the parameters that might be missing.
         feedback: whether u(t) answers y(t).
 
     Raises:
@@ -160,6 +170,7 @@ def concluded(
             point.errors, records.u, fitted=in_plant, feedback=feedback, lengths=lengths
         ),
         tests=score_tests(records, point, recent=recent, feedback=feedback),
+        directed=directed_tests(records, point, extensions),
     )
 
 

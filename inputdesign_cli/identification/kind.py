@@ -17,6 +17,7 @@ from inputdesign_cli.identification.estimate import (
     information_of,
     noise_of,
 )
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
 from inputdesign_cli.identification.records import Record, Records, centred, longest, split
@@ -69,6 +70,13 @@ class Kind(Protocol):
 
     def holding(self, known: NDArray[np.bool_]) -> Self:
         """The same, with starts that keep the known (k,) of its parameters where they know how to."""
+
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """What the structure at theta (k,) would become by one parameter more.
+
+        Args:
+            feedback: whether u(t) answers y(t).
+        """
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
@@ -132,6 +140,7 @@ def identify_records(
         in_noise=int(np.sum(kind.whitening)),
         in_plant=int(np.sum(kind.explaining)),
         recent=kind.recent,
+        extensions=kind.extensions(best.point.theta, feedback=feedback),
         feedback=feedback,
     )
 

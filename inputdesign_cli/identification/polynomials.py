@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
+from inputdesign_cli.identification.extensions import Extension, larger_polynomials, new_name
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
 from inputdesign_cli.identification.kind import Part, Starts, identify_records
 from inputdesign_cli.identification.orders import OutputOrders
@@ -82,6 +84,15 @@ class PolynomialKind:
     def holding(self, known: NDArray[np.bool_]) -> PolynomialKind:
         """The same: starts come from regressions on all coefficients."""
         return self
+
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """One more coefficient in any of the polynomials."""
+        return tuple(
+            Extension(
+                larger, new_name(larger, self.model), what, partial(PolynomialRecord, Structure.of(larger))
+            )
+            for larger, what in larger_polynomials(self.model.at(theta), feedback=feedback)
+        )
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.record_problem import Point, evaluate
 from inputdesign_cli.identification.records import Record, Records
@@ -187,6 +188,12 @@ class ReparametrisedKind:
     def holding(self, known: NDArray[np.bool_]) -> ReparametrisedKind:
         """The same."""
         return self
+
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """Those of the coefficients."""
+        coefficients = self.model.parametrisation.at(theta).coefficients
+        found = self.coefficients.extensions(coefficients, feedback=feedback)
+        return tuple(replace(extension, nested=False) for extension in found)
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Part, Starts
 from inputdesign_cli.identification.records import shifted, split
 from inputdesign_cli.identification.search import Search
@@ -169,6 +170,10 @@ class StateSpaceKind:
     def holding(self, known: NDArray[np.bool_]) -> StateSpaceKind:
         """The same."""
         return self
+
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """None: whether the entries that are not free are right is left to the tests of many signals."""
+        return ()
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None

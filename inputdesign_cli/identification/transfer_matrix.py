@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
+from inputdesign_cli.identification.extensions import Extension, larger_transfer_matrices, new_name
 from inputdesign_cli.identification.kind import Part, Starts, fit_records, identify_records
 from inputdesign_cli.identification.record_problem import evaluate
 from inputdesign_cli.identification.records import Records
@@ -17,7 +19,7 @@ from inputdesign_cli.identification.refined_iv import refine
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
-from inputdesign_cli.plant import ContinuousModel, Intersample
+from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 
@@ -97,6 +99,19 @@ class TransferKind:
             if fixed and parameter.letter == DELAY
         }
         return replace(self, held=held)
+
+    def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
+        """One more zero or a dead time."""
+        hold, step = self.between.hold, self.between.sample_time
+        return tuple(
+            Extension(
+                SampledModel(larger, step) if hold else larger,
+                new_name(larger, self.model),
+                what,
+                partial(TransferRecord, larger, intersample=self.between),
+            )
+            for larger, what in larger_transfer_matrices(self.model.at(theta), feedback=feedback)
+        )
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None

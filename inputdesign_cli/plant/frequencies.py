@@ -64,7 +64,8 @@ def local_maxima(
     bracket is narrowed by repeated sampling, all at once. Only continuity is asked for (tables have
     kinks). Maxima with values <= `above` are left out.
 
-    A maximum that only rounding tells from the value at an end of the grid is at that end.
+    Where only rounding tells maxima apart the function is flat, and the highest stands for all. A maximum
+    that only rounding tells from the value at an end of the grid is at that end.
 
     Returns:
         Frequencies and values of the maxima, both (number of maxima,), in ascending frequency.
@@ -101,7 +102,28 @@ def local_maxima(
 
 def _peaks(values: Array, above: float) -> NDArray[np.intp]:
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    return np.flatnonzero((values >= padded[:-2]) & (values > padded[2:]) & (values > above))
+    found = np.flatnonzero((values >= padded[:-2]) & (values > padded[2:]) & (values > above))
+    return _distinct(values, found) if found.size > 1 else found
+
+
+def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The peaks of these between which the values fall by more than rounding; of others the highest."""
+    dips, heights = np.minimum.reduceat(values, index)[:-1], values[index]
+    lower = np.minimum(heights[:-1], heights[1:])
+    if np.all(lower - dips > _FLAT * np.abs(lower)):
+        return index
+    kept, least = [0], np.inf
+    for after, dip in enumerate(dips.tolist(), start=1):
+        least = min(least, dip)
+        last, height = heights[kept[-1]], heights[after]
+        if min(last, height) - least > _FLAT * abs(min(last, height)):
+            kept.append(after)
+        elif height > last:
+            kept[-1] = after
+        else:
+            continue  # the fall since the last one counts on
+        least = np.inf
+    return index[kept]
 
 
 def _fractions(number: int) -> Array:

@@ -24,7 +24,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         )
     if kind != "least_cost" and "cost" in result:
         yield cost, shown(result["cost"]), ""
-    powers = ", ".join(f"{name} {listed(power)}" for name, power in result.get("power", {}).items())
+    power = result.get("power", {})
+    powers = ", ".join(f"{name} {listed(power[name])}" for name in power)
     if powers:
         yield "power", powers, ""
     binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
@@ -50,7 +51,7 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         yield "error", f"{error['value']:.6g} = {parts}", ""
     deviations = result.get("information", {}).get("standard_deviation")
     if deviations and result.get("status") in GIVEN and "identification" not in result:
-        yield "std", ", ".join(f"{name} {value:.4g}" for name, value in deviations.items()), ""
+        yield "std", ", ".join(f"{name} {deviations[name]:.4g}" for name in deviations), ""
     if "samples" in result.get("signal", {}):
         yield "signal", ", ".join(_signal(result)), ""
     if "improvement" in result.get("simulation", {}):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.runs.record import RESULT, unreadable
@@ -34,7 +35,7 @@ def report_text(directory: Path) -> str:
 
 
 def _filled(
-    template: str, directory: Path, record: str, content_of: Callable[[Path], dict[str, Json]]
+    template: str, directory: Path, record: str, content_of: Callable[[Path, Trail], dict[str, Json]]
 ) -> str:
     """A template with its content; whatever text comes from a spec or a result is escaped.
 
@@ -49,11 +50,12 @@ def _filled(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(template)
+    page, trail = environment.get_template(template), Trail()
     try:
         digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
-        content = content_of(directory)
+        content = content_of(directory, trail)
         source = directory.name or directory.resolve().name
         return page.render(version=__version__, source=source, record=record, digest=digest, **content)
     except _BROKEN as error:
-        raise unreadable(directory / record, "its entries are not what idesign writes") from error
+        what = f'"{trail.last}" is' if trail.last else "its entries are"
+        raise unreadable(directory / record, f"{what} not what idesign writes") from error

@@ -17,6 +17,7 @@ from inputdesign_cli.report.evidence import (
     simulation_table,
 )
 from inputdesign_cli.report.facts import facts, proofs, white
+from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance, shown
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
@@ -62,9 +63,9 @@ _FIELDS = {
 }
 
 
-def run_page(run: Path) -> dict[str, Json]:
+def run_page(run: Path, trail: Trail) -> dict[str, Json]:
     """The content of the template for a run. Raises `DataError` as `read_run` does."""
-    result = read_run(run)
+    result = trail.follow(read_run(run))
     _check_fields(run, result)
     verb = _verb(result)
     text = read_regular(run / "spec.yaml").decode()
@@ -158,7 +159,7 @@ def _command(verb: str, result: Result) -> str:
 
 def _answer(result: Result) -> str:
     found = result.get("objective", {})
-    value, kind = found.get("value"), found.get("kind", "")
+    kind, value = found.get("kind", ""), found.get("value")
     if value is None:
         ratio = result.get("model_error", {}).get("worst_ratio")
         if ratio is None:

@@ -13,6 +13,7 @@ from inputdesign_cli.figures.sweep_figures import QUANTITIES, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, svg_uri
+from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
 from inputdesign_cli.report.sources import citations
@@ -30,10 +31,10 @@ _SHOWN = (
 )
 
 
-def sweep_page(root: Path) -> dict[str, Json]:
+def sweep_page(root: Path, trail: Trail) -> dict[str, Json]:
     """The content of the template for a sweep. Raises `DataError` as `read_sweep` does."""
     table = read_sweep(root)
-    summary = table.summary
+    summary = trail.follow(table.summary)
     columns = [(name, title) for name, title in _columns(table) if any(table.columns.get(name, []))]
     names = [*table.axes, *(name for name, _ in columns)]
     rows = [[_cell(table.columns[name][i]) for name in names] for i in range(min(table.rows, MOST_ROWS))]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.plant.polynomial import Array
 
 LinearMap = Callable[[Array], Array]
@@ -84,12 +85,16 @@ def restrained(values: Array, constraints: tuple[SignalConstraint, ...]) -> Arra
 
     Least squares, each input in its own root mean square, with the excess penalised ever more (a
     quasi-Newton method), scaled down at the end so that the bounds hold exactly.
+
+    Raises:
+        OutOfTimeError: see `seconds_left`.
     """
     record = values
     if peak_ratio(record, constraints) > 1.0:
         rms = np.sqrt(np.mean(values**2, axis=0))
         scale = np.where(rms > 0.0, rms, 1.0)
         for penalty in _PENALTIES:
+            seconds_left()
             found = scipy.optimize.minimize(
                 _penalised,
                 (record / scale).ravel(),

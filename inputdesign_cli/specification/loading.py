@@ -28,6 +28,7 @@ from inputdesign_cli.specification.yaml.reader import Tree, read
 _STAND_IN: dict[str, dict[str, Plain]] = {"plant": {"B": [0, 1]}, "noise": {"variance": 1}}
 
 _MOST_ROUNDS = 50
+_MOST_TOLD = 100
 
 
 def load_spec(
@@ -84,13 +85,22 @@ def parse_spec(
     spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:
-        raise SpecError(_sorted(diagnostics, tree.places))
+        raise SpecError(_first(_sorted(diagnostics, tree.places)))
     spec = _with_defaults(spec)
     spec._source, spec._design = Source(tree.data, tree.places, folder), design
     return spec
 
 
 Spec.reader = parse_spec
+
+
+def _first(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
+    """As many as somebody reads; the last one says how many more there are."""
+    left = len(diagnostics) - _MOST_TOLD
+    if left <= 0:
+        return diagnostics
+    more = Diagnostic("more-errors", f"{left} more errors are not shown", "mend these first")
+    return [*diagnostics[:_MOST_TOLD], more]
 
 
 def read_tree(
@@ -151,6 +161,8 @@ def _validate(tree: Tree, *, design: bool) -> tuple[Spec | None, list[PathDiagno
             for one in found:
                 broken.add(one.path)
                 _prune(data, one.path)
+            if len(told) > _MOST_TOLD:
+                return None, told
             continue
         checked = [shorten(one, tree.data) for one in run_checks(spec, broken, design=design)]
         return spec, told + [one for one in checked if not related(one.path, broken)]

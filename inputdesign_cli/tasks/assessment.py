@@ -32,6 +32,7 @@ from inputdesign_cli.tasks.identification import (
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
+from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
 from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
@@ -83,6 +84,9 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     if found.question is not None:
         units, information = task.header.units, found.question.information
         listed = [requirement_entry(units, r, information) for r in found.question.requirements]
+    without: list[Neglected] = []
+    if found.question is not None:
+        without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
     reasons = [
         *unsettled(found.estimate),
         *refutations(found.model, found.estimate),
@@ -90,13 +94,19 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     ]
     reasons += [found.unasked] if found.unasked else []
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
+    notes = objections(task.header.units, without) if met else []
+    reasons += notes
     verdict: Verdict = "undecided" if reasons else "met" if met else "missed"
     assessment: dict[str, Json] = {"met": verdict == "met", "requirements": listed}
     if reasons:
         assessment["undecided"] = reasons
-    notes: list[str] = []
+    if without:
+        assessment["neglected"] = [one.entry(task.header.units) for one in without]
     if found.question is not None:
-        assessment["nominal"], notes = _from_nominal(task, found, found.question)
+        assessment["nominal"], told_apart = _from_nominal(task, found, found.question)
+        notes += told_apart
+    if verdict == "met":
+        notes += unseen(task.header.units, without)
     judged = _with_notes(_judged(identification, verdict, assessment), notes)
     if verdict == "undecided":
         judged = _without_model(judged, task.header.units, found)

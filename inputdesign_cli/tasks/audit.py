@@ -33,6 +33,8 @@ _NODES_AT_ONCE = 1024
 # spectrum itself varies faster.
 _STEPS = 4
 _FAST = 200
+# The highest peaks on the grid are looked at more closely, so many points at a time.
+_PEAKS, _ZOOMS, _INSIDE = 8, 3, 17
 _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 
@@ -106,7 +108,7 @@ class _Audit:
             yield f"the spectrum reaches {found:.10g}, not {value:.10g}"
 
     def _worst(self, requirement: Requirement) -> float:
-        """The largest ratio over the band, with its ends, and between the points of its grid."""
+        """The largest ratio over the band, with its ends, also between the points of its grid."""
         try:
             np.linalg.cholesky(self._information)
         except np.linalg.LinAlgError:
@@ -116,7 +118,21 @@ class _Audit:
         grid, poles = requirement.grid, requirement.poles_on_the_circle[:, None]
         beside = np.any((grid[:-1] < poles) & (poles < grid[1:]), axis=0)
         between = (0.5 * (grid[1:] + grid[:-1]))[~beside]
-        return float(np.max(requirement.ratios(self._information, np.concatenate([grid, between]))))
+        w = np.sort(np.concatenate([grid, between]))
+        ratios = requirement.ratios(self._information, w)
+        # A resonance may stand higher between two points than at both, by more than the ways may differ.
+        padded = np.concatenate([[-np.inf], ratios, [-np.inf]])
+        peaks = np.flatnonzero((ratios >= padded[:-2]) & (ratios >= padded[2:]))
+        highest, found = peaks[np.argsort(-ratios[peaks])][:_PEAKS], float(np.max(ratios))
+        left, right = w[np.maximum(highest - 1, 0)], w[np.minimum(highest + 1, w.size - 1)]
+        for _ in range(_ZOOMS):
+            inside = np.linspace(left, right, _INSIDE)
+            ratios = requirement.ratios(self._information, inside.ravel()).reshape(inside.shape)
+            top, rows = np.argmax(ratios, axis=0), np.arange(highest.size)
+            found = max(found, float(np.max(ratios)))
+            left = inside[np.maximum(top - 1, 0), rows]
+            right = inside[np.minimum(top + 1, _INSIDE - 1), rows]
+        return found
 
     @cached_property
     def _experiment(self) -> Experiment:

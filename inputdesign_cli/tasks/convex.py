@@ -39,6 +39,7 @@ from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.record import (
     RecordRequest,
     designed_spectrum,
+    make_record,
     record_notes,
     redrawn,
     shortfall,
@@ -52,12 +53,14 @@ from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.tasks.result.status import proof_status
-from inputdesign_cli.tasks.result.unfinished import no_record_in_time, unfinished_notes
+from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_in_time, unfinished_notes
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
 # A record that needs a larger alpha is made anew, this often at the most.
 _RECORDS = 4
+# Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
+_LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ class ConvexTask:
     alpha: float
     calibration: Calibration | None
     tolerance: float
-    any_spectrum_tolerance: float
+    any_spectrum_tolerance: float | None
     most_samples: int | None
     ellipses: Pairs | None
     grid: GridMethod | None
@@ -126,7 +129,10 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        notes = unfinished_notes(result) if "ended_by" in how else []
+        if "ended_by" in how:
+            notes = unfinished_notes(result)
+        else:
+            notes = [] if done.design.any_spectrum else [no_other_spectra()]
         try:
             made = self._recorded(done)
         except OutOfTimeError:
@@ -244,7 +250,13 @@ class ConvexTask:
                 self.question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
             )
         except UnreachableError as unreachable:
-            raise explain(self.header.units, self.question, unreachable, self.stated) from unreachable
+            raise explain(
+                self.header.units,
+                self.question,
+                unreachable,
+                self.stated,
+                samples_of_record=self._samples_of_record,
+            ) from unreachable
         except UnfinishedDesignError as unfinished:
             if self.calibration is not None:  # it need not keep the confidence that alpha is sought for
                 raise
@@ -270,9 +282,33 @@ class ConvexTask:
             how["any_spectrum_gap"] = design.any_spectrum.gap
         return design, how | ended
 
+    def _samples_of_record(self, samples: int) -> int | None:
+        """The samples of a record that is found to meet the accuracy where a spectrum takes so many."""
+        for _ in range(_LENGTHS):
+            samples = max(int(np.ceil(samples * _LONGER)), 2)
+            if samples > _TRIED:
+                return None
+            stated = replace(self.question.experiment, samples=samples)
+            try:
+                design = solve_design(
+                    replace(self.question, experiment=stated), tolerance=_ROUGH, any_spectrum_tolerance=_ANY
+                )
+                request = replace(self.record, samples=None)
+                record = make_record(request, design, design.problem.experiment, longer=False)
+            except (OutOfTimeError, UnreachableError):
+                return None
+            if record is None or record.met:
+                return samples if record is not None else None
+            if not np.isfinite(record.worst_ratio):
+                return None
+            samples = int(np.ceil(samples * record.worst_ratio**2))
+        return None
+
     def _by_grid(self, method: GridMethod) -> tuple[Design, dict[str, Json]]:
         white = replace(self.question, basis=flat_basis(self.experiment))
-        baseline = solve_design(white, tolerance=self.tolerance)
+        baseline = solve_design(
+            white, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+        )
         basis = self.question.basis
         problem = replace(baseline.problem, basis=basis)
         stated = [r for r in problem.requirements if isinstance(r, ModelError)]

@@ -1,6 +1,7 @@
-"""`make fuzz`: mutated specs for FUZZ_SECONDS (default 60), each in a process of its own; exit 1 on a fault.
+"""`make fuzz`: specs for FUZZ_SECONDS (default 60), each in a process of its own; exit 1 on a fault.
 
-FUZZ_SEED (default 0) is that of the first spec; each spec has its own, which repeats it alone.
+Every second one is a mutation of a shipped one, the others are made from nothing. FUZZ_SEED (default 0) is
+that of the first spec; each spec has its own, which repeats it alone.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ use_one_thread()
 import cvxpy  # noqa: E402, F401 (once, before the processes divide)
 import yaml  # noqa: E402
 
+from tests.fuzzing.generation import generated  # noqa: E402
 from tests.fuzzing.judge import judged  # noqa: E402
 from tests.fuzzing.mutations import ROOT, mutated  # noqa: E402
 
@@ -32,7 +34,8 @@ _CONTEXT = multiprocessing.get_context("fork")
 
 
 def text_of(seed: int) -> str:
-    return yaml.safe_dump(mutated(random.Random(seed)), default_flow_style=None, sort_keys=False)
+    spec = generated(seed // 2) if seed % 2 else mutated(random.Random(seed // 2))
+    return yaml.safe_dump(spec, default_flow_style=None, sort_keys=False)
 
 
 def _work(seed: int, answers: Connection) -> None:

@@ -1,4 +1,4 @@
-"""A few mutated specs in this process, and what the judge must see; `make fuzz` runs many."""
+"""A few specs of `make fuzz` in this process, and what the judge must see."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ import random
 import pytest
 import yaml
 
-from inputdesign_cli import load_spec, parse_spec, solve
-from inputdesign_cli.runs.run_directory import finished_result
-from tests.fuzzing.judge import independent_ratio, judged, nonsense
+from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli.errors import IdesignError
+from tests.fuzzing.generation import generated
+from tests.fuzzing.judge import judged, nonsense, written
 from tests.fuzzing.mutations import ROOT, mutated
+from tests.fuzzing.textbook import findings, worst_ratio
 
 # Seeds whose specs end within moments, one way or another.
 SEEDS = (1, 2, 3, 5, 8, 13, 21)
@@ -24,6 +26,28 @@ def test_mutated_specs_end_well(seed):
     assert wrong == ""
 
 
+@pytest.mark.parametrize("number", [3, 7, 11])
+def test_specs_made_from_nothing_end_well(number):
+    text = yaml.safe_dump(generated(number), default_flow_style=None, sort_keys=False)
+    _, wrong = judged(text, ROOT / "specs")
+    assert wrong == ""
+
+
+def test_most_specs_made_from_nothing_are_well_posed():
+    """Else nothing is tried; and the same number is the same spec."""
+    assert generated(5) == generated(5)
+    ends = []
+    for number in range(24):
+        text = yaml.safe_dump(generated(number))
+        try:
+            validate(parse_spec(text))
+        except IdesignError:
+            ends.append(False)
+        else:
+            ends.append(True)
+    assert sum(ends) >= 10
+
+
 LOOP = """
 plant: {A: [1, -0.5], B: [0, 1.0, 0.3]}
 noise: {C: [1, 0.4], variance: 0.2}
@@ -32,23 +56,53 @@ accuracy: {model_error: {absolute: 0.1, alpha: 2, band: [0.1, 2]}}
 """
 
 
-@pytest.mark.parametrize("spectrum", ["{type: white}", "{type: fir, order: 4}", "{type: free}"])
+def scaled(value, factor):
+    """Numbers, complex ones and lists of them, times a factor."""
+    if isinstance(value, list):
+        return [scaled(part, factor) for part in value]
+    if isinstance(value, dict):
+        return {key: scaled(part, factor) for key, part in value.items()}
+    return factor * value
+
+
+TEXTS = {
+    "loop": LOOP,
+    **{name: (ROOT / "specs" / f"{name}.yaml").read_text() for name in ("first_order", "two_by_two_loop")},
+}
+
+
 @pytest.mark.parametrize(
-    "text", [LOOP, (ROOT / "specs" / "first_order.yaml").read_text()], ids=["loop", "open"]
+    ("name", "spectrum"),
+    [
+        *(("loop", spectrum) for spectrum in ("{type: white}", "{type: fir, order: 4}", "{type: free}")),
+        ("first_order", "{type: free}"),
+        ("two_by_two_loop", "{type: fir, order: 4}"),
+    ],
 )
-def test_the_independent_ratio_of_a_design_is_one(text, spectrum):
-    spec = parse_spec(text, overrides=[f"spectrum={spectrum}"])
-    assert independent_ratio(spec, solve(spec).result) == pytest.approx(1.0, abs=1e-6)
+def test_the_textbook_agrees_and_sees_a_weaker_spectrum(name, spectrum):
+    spec = parse_spec(
+        TEXTS[name],
+        overrides=[f"spectrum={spectrum}", "signal.samples=64", "solver.any_spectrum_tolerance=0.009"],
+    )
+    result = written(solve(spec))
+    content = dict(spec.content)
+    assert worst_ratio(content, result) == pytest.approx(1.0, abs=1e-6)
+    assert findings(content, result) == []
+    for key in ("coefficients", "powers", "power"):
+        if key in result["spectrum"]:
+            result["spectrum"][key] = scaled(result["spectrum"][key], 0.999)
+    assert worst_ratio(content, result) == pytest.approx(0.999**-0.5, abs=1e-4)
+    assert any("times what is admitted" in told for told in findings(content, result))
 
 
 def test_the_judge_sees_nonsense():
     spec = load_spec(ROOT / "specs" / "first_order.yaml")
-    result = finished_result(solve(spec))
-    assert nonsense(spec, result) == ""
+    result, content = written(solve(spec)), dict(spec.content)
+    assert nonsense(content, result) == ""
     weaker = {**result["spectrum"], "coefficients": [0.99 * c for c in result["spectrum"]["coefficients"]]}
-    assert "ratio" in nonsense(spec, {**result, "spectrum": weaker})
+    assert "admitted" in nonsense(content, {**result, "spectrum": weaker})
     beyond = {**result["objective"], "lower_bound": 2.0 * result["objective"]["value"]}
-    assert "bound" in nonsense(spec, {**result, "objective": beyond})
+    assert "bound" in nonsense(content, {**result, "objective": beyond})
 
 
 def test_the_judge_sees_exceptions_and_warnings(monkeypatch):

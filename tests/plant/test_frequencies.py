@@ -54,3 +54,31 @@ def test_a_maximum_at_an_end_is_told_as_that_end(end):
     at, value = local_maxima(function, grid, function(grid))
     assert at.tolist() == [end]
     assert value.tolist() == [2.0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-15, 2e-13])
+def test_a_function_that_is_flat_but_for_rounding_has_one_maximum(noise):
+    rng = np.random.default_rng(1)
+    calls = []
+
+    def function(w):
+        calls.append(w.size)
+        return 2.0 * (1.0 + noise * rng.uniform(-1.0, 1.0, w.size))
+
+    grid = np.linspace(0.0, np.pi, 4000)
+    w, values = local_maxima(function, grid, function(grid))
+    assert len(w) == 1
+    assert values[0] == pytest.approx(2.0, rel=1e-12)
+    assert sum(calls[1:]) < 200
+
+
+def test_maxima_between_which_a_function_falls_little_are_kept():
+    """Ripples of 1e-9 are no rounding: all of them are found, whatever stands beside them."""
+
+    def function(w):
+        return 1.0 + 1e-9 * np.cos(20.0 * w) + np.where(w > 2.0, w - 2.0, 0.0)
+
+    grid = np.linspace(0.0, 2.5, 3001)
+    w, _ = local_maxima(function, grid, function(grid))
+    exact = [*(np.pi / 10 * k for k in range(7)), 2.5]
+    np.testing.assert_allclose(w, exact, atol=1e-4)

@@ -1,12 +1,14 @@
 """The page about a run or a sweep: strict HTML that needs nothing, says what it must, and escapes text."""
 
 import base64
+import copy
 import hashlib
 import json
 import os
 import re
 import shutil
 from contextlib import suppress
+from functools import reduce
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -120,6 +122,42 @@ def test_a_field_that_is_not_of_its_kind_is_named(runs, tmp_path, field):
     with pytest.raises(DataError, match=f'result.json cannot be read .*"{field}" is not') as caught:
         report_text(tmp_path / "run")
     assert caught.value.diagnostics[0].code == "run-unreadable"
+
+
+def paths(value, path=()):
+    """Of every entry below a value; of lists the first."""
+    if path:
+        yield path
+    first = enumerate(value[:1]) if isinstance(value, list) else ()
+    for key, item in value.items() if isinstance(value, dict) else first:
+        yield from paths(item, (*path, key))
+
+
+@pytest.mark.parametrize("broken", ["x", {}, [[1]]])
+def test_an_entry_that_is_not_of_its_kind_is_named_wherever_it_stands(runs, tmp_path, monkeypatch, broken):
+    monkeypatch.setattr("inputdesign_cli.report.run_page.run_charts", lambda *_, **__: {})
+    shutil.copytree(runs / "open", tmp_path / "run")
+    file = tmp_path / "run" / "result.json"
+    whole = json.loads(file.read_text())
+    named = 0
+    for path in paths(whole):
+        if path[0] in ("files", "format"):
+            continue
+        changed = copy.deepcopy(whole)
+        holder = reduce(lambda held, key: held[key], path[:-1], changed)
+        if type(holder[path[-1]]) is type(broken):
+            continue
+        holder[path[-1]] = broken
+        file.write_text(json.dumps(changed))
+        try:
+            report_text(tmp_path / "run")
+        except DataError as error:
+            (told,) = re.findall('of a run: "([^"]*)" is', str(error))
+            name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)[1:]
+            # What was put there may be read one step further.
+            assert told.startswith(name) or name.startswith(told)
+            named += 1
+    assert named > 5
 
 
 @pytest.mark.parametrize("name", ["spec.yaml", "bound.csv", "result.json"])

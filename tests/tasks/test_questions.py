@@ -234,7 +234,7 @@ def test_infeasible_limits_are_explained():
     assert diagnostic.location is not None
     needed = float(diagnostic.message.split(">= ")[1].split(",")[0])
     assert least <= needed <= least * (1 + 1e-4)
-    factor = float(diagnostic.hint.split("than ")[1].split(" times")[0])
+    factor = float(diagnostic.hint.split("errors ")[1].split(" times")[0])
     assert factor == pytest.approx(np.sqrt(least / 0.2), rel=1e-3)
     assert "type: free" in diagnostic.hint  # 0.1925 is enough for one sinusoid
     # What the message promises is true.

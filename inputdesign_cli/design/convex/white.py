@@ -8,6 +8,7 @@ import numpy as np
 import scipy.optimize
 
 from inputdesign_cli.accuracy import worst
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.problem import Problem, RequirementFactory
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.information import Experiment
@@ -27,6 +28,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
 
     Raises:
         InfeasibleError: no power is enough, since the requirement is on what noise alone tells.
+        OutOfTimeError: see `seconds_left`.
     """
     power = 1.0
     for _ in range(_POLISH):
@@ -35,6 +37,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         problem = Problem(coordinates, flat_basis(coordinates), {"excitation": 1.0}, requirements)
 
         def excess(log_power: float, problem: Problem = problem) -> float:
+            seconds_left()
             information = problem.information(np.array([np.exp(log_power)]))
             return np.log(max(problem.worst_ratio(information).ratio, 1e-300))
 

@@ -78,7 +78,7 @@ Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0), QUANTITY]
 NonNegative = Annotated[float, Strict(), AllowInfNan(False), Field(ge=0), QUANTITY]
 Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
-Fraction = Annotated[Number, Field(gt=0, lt=1)]
+Fraction = Annotated[Number, Field(ge=1e-9, lt=1)]  # a smaller probability is no requirement
 Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]
 Count = Annotated[int, Strict(), Field(ge=1, le=2**53), _WHOLE]
 Index = Annotated[int, Strict(), Field(ge=0, le=2**53), _WHOLE]

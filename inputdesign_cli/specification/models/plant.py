@@ -64,7 +64,7 @@ class NamedPlant(Section):
 
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ()
 
-    parameters: Mapping[str, Number] | None = Field(
+    parameters: Annotated[Mapping[str, Number], SIZES["plant.parameters"]] | None = Field(
         default=None,
         min_length=1,
         description="Named parameters and their values. Coefficients may then be expressions in them, and "
@@ -86,6 +86,8 @@ class NamedPlant(Section):
         numbers = dict(data)
         if isinstance(data.get("parameters"), dict):
             values = values_of(data["parameters"])
+            if len(values) > SIZES["plant.parameters"].most:
+                return handler(numbers)
             found = list(check_names(values))
             stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
             numbers |= {key: worth(data[key], values, (key,), found) for key in stated}

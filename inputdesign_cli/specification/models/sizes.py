@@ -29,7 +29,7 @@ class Size:
         Raises:
             PydanticCustomError: `too-large`.
         """
-        listed = isinstance(value, list | tuple)
+        listed = isinstance(value, list | tuple | dict)
         size = len(value) if listed else value
         if isinstance(size, int | float) and not isinstance(size, bool) and self.most < size < 2**1024:
             held = f"has {size} entries" if listed else f"is {show(size)}"
@@ -46,7 +46,8 @@ class Size:
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Plain]:
         inner = handler(schema)
-        limit = {"array": "maxItems", "integer": "maximum"}.get(str(inner.get("type")))
+        limits = {"array": "maxItems", "integer": "maximum", "object": "maxProperties"}
+        limit = limits.get(str(inner.get("type")))
         return {**inner, limit: self.most} if limit else inner
 
 
@@ -83,11 +84,13 @@ SIZES = {
     "signal.candidates": Size(1000, "every candidate takes as long as one record"),
     "signal.order": Size(100, "the filter is fitted by a search over its states"),
     "simulation.runs": Size(1_000_000, "every run is an experiment and an estimate"),
+    "simulation.compare": Size(10, "every input is tried as often as there are runs"),
     "coefficients of a numerator": Size(1001, "a longer delay calls for slower sampling"),
     "coefficients of a denominator": Size(301, "roots of higher orders mean nothing in double precision"),
     "controller.delay": Size(1000, "a longer delay calls for slower sampling"),
     "states": Size(100, "responses at every frequency take the cube of their number"),
     "inputs or outputs": Size(20, "a model has parameters for each pair of them"),
+    "plant.parameters": Size(200, "every coefficient has a derivative with respect to each"),
     "plant.regression": Size(200, "a design has an unknown for each pair of regressors"),
     "report.ellipses": Size(100, "every pair is a panel of the figure"),
 }

@@ -27,7 +27,7 @@ def identification_entry(estimate: Estimate) -> dict[str, Json]:
         "starts": estimate.starts,
         "whiteness": _test(estimate.whiteness),
         "independence": _test(estimate.independence),
-        "tests": {test.name: _test(test) | _lag(test) for test in estimate.tests},
+        "tests": {test.name: _test(test) | _lag(test) for test in estimate.all_tests},
         "failed": [test.name for test in estimate.failed],
         "free_start": estimate.free,
     }

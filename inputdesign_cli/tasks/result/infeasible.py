@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,15 +18,22 @@ from inputdesign_cli.tasks.result.needed_power import needed_power
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound, named, rounded_up
 
 _TOLERANCE = 1e-5
+_ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare
 
 
 def explain(
-    units: Units, question: Question, unreachable: UnreachableError, stated: Sequence[StatedBound] = ()
+    units: Units,
+    question: Question,
+    unreachable: UnreachableError,
+    stated: Sequence[StatedBound] = (),
+    *,
+    samples_of_record: Callable[[int], int | None] = lambda _: None,
 ) -> InfeasibleError:
     """The proof that came with the failure, in the words of the spec.
 
     Args:
         stated: the numbers of the spec that can be loosened.
+        samples_of_record: how many samples a record takes where a spectrum takes so many; None: not known.
     """
     problem, nearest = unreachable.problem, unreachable.nearest
     bought = Bought(units, stated, question.limits, problem, nearest)
@@ -42,13 +49,16 @@ def explain(
         parts = []
     message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
     hint = (
-        f"raise the limit, or loosen the accuracy: within the limits the error can be made no smaller than "
-        f"{bought.proved:.4g} times what is asked"
+        "raise the limit, or loosen the accuracy: a spectrum can keep errors "
+        f"{rounded_up(bought.factor * _ROOM, 4)} times as large as asked, a record somewhat larger ones"
     )
     if question.goal == "cost" and question.experiment.prior is None and np.isfinite(nearest.objective):
         # Within the same limits information grows in proportion to the length.
         longer = int(np.ceil(question.experiment.samples * nearest.objective))
         hint += f"; with {longer} samples a spectrum can"
+        enough = samples_of_record(longer)
+        if enough is not None:
+            hint += f"; with experiment.samples: {enough} (and signal.samples, if stated) a record can"
     if _within_reach_of_any(question):
         hint += "; spectrum: {type: free} can meet it"
     if problem.densities and question.limits:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.identification import Estimate, ScoreTest
+from collections.abc import Sequence
+
+from inputdesign_cli.identification import Estimate, Extension, ScoreTest
 from inputdesign_cli.plant import Model
 
 _FOUND = {
@@ -13,6 +15,7 @@ _FOUND = {
     "drift": "the residuals drift slowly (probability {p:.1e}): remove the trend from the record, use a part "
     "of it without drift, or {remedy}",
 }
+_MISSING = "one parameter is missing (probability {p:.1e} without it): one more {what} ({name})"
 _IN_Q = {
     "plant": "raise the orders of B and F (or A), or change the delay",
     "noise": "raise the orders of C and D (or A)",
@@ -49,13 +52,29 @@ def contradictions(estimate: Estimate) -> list[str]:
 
 
 def refutations(model: Model, estimate: Estimate) -> list[str]:
-    """For every kind of fault that tests found: what the strongest of them says, and what to do."""
+    """What the strongest test of every kind of fault says, and which single parameters are missing."""
     strongest: dict[str, ScoreTest] = {}
+    directed = {one.test: one.extensions for one in estimate.directed}
     for test in estimate.failed:
+        if test in directed:
+            continue
         if test.fault not in strongest or test.probability < strongest[test.fault].probability:
             strongest[test.fault] = test
     remedies = _IN_S if model.continuous else _IN_Q
-    return [
+    of_many = [
         _FOUND[fault].format(p=test.probability, lag=test.lag, remedy=remedies[fault])
         for fault, test in strongest.items()
     ]
+    of_one = [
+        _MISSING.format(p=test.probability, what=directed[test][0].what, name=directed[test][0].name)
+        + _or_else(directed[test][1:])
+        for test in sorted(directed, key=lambda test: test.probability)
+        if test in estimate.failed
+    ]
+    return of_many + of_one
+
+
+def _or_else(others: Sequence[Extension]) -> str:
+    """What these data hardly tell from it."""
+    listed = ", ".join(f"one more {other.what} ({other.name})" for other in others)
+    return f"; nearly the same on these data: {listed}" if others else ""

@@ -1,0 +1,126 @@
+"""Models with one parameter more than the one that was estimated: what a directed test holds against it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.gauss_newton import minimise
+from inputdesign_cli.identification.record_problem import RecordProblem
+from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
+from inputdesign_cli.plant.model import Listed
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial_model import Rows
+
+# A first coefficient of B that is zero would not count as free: this share of the largest is rounding.
+_NEARLY_ZERO = 1e-13
+
+
+@dataclass(frozen=True)
+class Extension:
+    """One more parameter, against records.
+
+    Attributes:
+        model: the larger model, whose new parameter is zero; of a model in other parameters than its
+            coefficients, that of the coefficients.
+        name: of the new parameter; `what` it is.
+        record: makes the record of samples u (N, r), y (N, p) that the larger structure is to explain.
+        nested: whether that structure has no further freedom than the one parameter.
+    """
+
+    model: Listed
+    name: str
+    what: str
+    record: Callable[[Array, Array], Record]
+    nested: bool = True
+
+    @property
+    def index(self) -> int:
+        """Where the new parameter stands in theta of the larger model."""
+        return self.model.names.index(self.name)
+
+    @property
+    def in_plant(self) -> bool:
+        """Whether G depends on it."""
+        return bool(self.model.in_plant[self.index])
+
+    def column(self, records: Records) -> NDArray[np.float64]:
+        """(N, p): minus the derivative of the prediction errors with respect to the new parameter."""
+        theta = self.model.theta
+        gradients = [part.errors_and_gradient(theta)[1] for part in self.records(records).parts]
+        return np.concatenate([gradient[self.index] for gradient in gradients])
+
+    def estimated(self, records: Records) -> tuple[Array, float]:
+        """The larger structure's theta where a search ends that begins here, and its cost."""
+        found = minimise(RecordProblem((self.records(records),)), self.model.theta[None])
+        return found.theta[0], float(found.cost[0])
+
+    def records(self, records: Records) -> Records:
+        """The same samples against the larger structure."""
+        parts = tuple(self.record(part.u, part.y) for part in records.parts)
+        return Records(parts, free=records.free, weights=records.weights)
+
+
+def new_name(larger: Model, model: Model) -> str:
+    """Of the one parameter that only the larger has."""
+    (name,) = set(larger.names) - set(model.names)
+    return name
+
+
+def larger_polynomials(model: PolynomialModel, *, feedback: bool) -> Iterator[tuple[PolynomialModel, str]]:
+    """One more coefficient in B, F (or A), C and D each, or a delay of one sample less; and which it is.
+
+    Args:
+        feedback: whether u(t) answers y(t), so that it cannot act at once.
+    """
+    for i, j in model.active:
+        B, F = model.B[i][j], model.F[i][j]
+        yield replace(model, B=_with(model.B, i, j, np.append(B, 0.0))), "coefficient in B"
+        if model.A[0 if len(model.A) == 1 else i].size == 1 or F.size > 1:
+            yield replace(model, F=_with(model.F, i, j, np.append(F, 0.0))), "pole in F"
+        first = int(np.flatnonzero(B)[0])
+        if first > int(feedback):
+            earlier = np.where(np.arange(B.size) == first - 1, _NEARLY_ZERO * np.max(np.abs(B)), B)
+            yield replace(model, B=_with(model.B, i, j, earlier)), "coefficient in B before the others"
+    for i, A in enumerate(model.A):
+        if A.size > 1:
+            yield replace(model, A=_longer(model.A, i)), "pole in A"
+    for i in range(len(model.C)):
+        yield replace(model, C=_longer(model.C, i)), "coefficient in C"
+    for i in range(len(model.D)):
+        yield replace(model, D=_longer(model.D, i)), "coefficient in D"
+
+
+def larger_transfer_matrices(
+    model: ContinuousModel, *, feedback: bool
+) -> Iterator[tuple[ContinuousModel, str]]:
+    """One more zero in each entry where it stays proper, or a dead time where there is none; and which it is.
+
+    Args:
+        feedback: whether u(t) answers y(t), so that it cannot act at once.
+    """
+    none = tuple((np.zeros(0),) * model.inputs for _ in range(model.outputs))
+    model = replace(model, delay=model.delay or none)
+    for i, j in model.active:
+        above = model.numerator[i][j]
+        if above.size + int(feedback) < model.denominator[i][j].size:
+            more = _with(model.numerator, i, j, np.append(above, 0.0))
+            yield replace(model, numerator=more), "coefficient in the numerator"
+        shared = model.active if model.common_delay else [(i, j)]
+        if not any(model.delay[o][n].size for o, n in shared):
+            yield replace(model, delay=_with(model.delay, i, j, np.zeros(1))), "dead time or fast pole"
+
+
+def _with(rows: Rows, i: int, j: int, entry: Array) -> Rows:
+    """The same table with another entry."""
+    return tuple(
+        tuple(entry if (o, n) == (i, j) else p for n, p in enumerate(row)) for o, row in enumerate(rows)
+    )
+
+
+def _longer(rows: tuple[Array, ...], i: int) -> tuple[Array, ...]:
+    return tuple(np.append(p, 0.0) if o == i else p for o, p in enumerate(rows))
