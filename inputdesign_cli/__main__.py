@@ -19,9 +19,12 @@ def main() -> None:
     """The `idesign` command."""
     sys.unraisablehook = _send_again
     try:
-        from inputdesign_cli.cli import main as run
+        from inputdesign_cli.compute.interruptions import bare_interruptions
 
-        run()
+        with bare_interruptions():
+            from inputdesign_cli.cli import main as run
+
+            run()
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         sys.exit(INTERRUPTED)

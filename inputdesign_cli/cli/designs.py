@@ -10,6 +10,7 @@ import typer
 
 from inputdesign_cli.cli.options import (
     Confine,
+    Fast,
     Figures,
     Json,
     KeepPartial,
@@ -44,6 +45,7 @@ def solve(
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
     keep_partial: KeepPartial = False,
+    fast: Fast = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -54,6 +56,8 @@ def solve(
     proof of optimality; prints a summary.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    if fast:
+        overrides = [*(overrides or []), "solver.any_spectrum=false"]
     if not keep_partial:
         results = _results("solve", spec, overrides, confine, quiet)
         keep(results, place, figures=figures, json_output=json_output, quiet=quiet)

@@ -153,6 +153,14 @@ KeepPartial = Annotated[
         "ends at once.",
     ),
 ]
+Fast = Annotated[
+    bool,
+    typer.Option(
+        "--fast",
+        help="Leave out the bound over every spectrum, which takes about half of the time "
+        "(solver.any_spectrum: false).",
+    ),
+]
 Figures = Annotated[
     bool, typer.Option("--figures/--no-figures", help="Draw the figures of the run, or leave them out.")
 ]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
+from inputdesign_cli.compute.interruptions import bare_interruptions
 from inputdesign_cli.errors import EXIT_INTERRUPTED, Diagnostic, IdesignError, OutputError
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     @wraps(command)
     def run(*args: Any, **kwargs: Any) -> None:
         try:
-            command(*args, **kwargs)
+            with bare_interruptions():
+                command(*args, **kwargs)
         except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
         except IdesignError as error:

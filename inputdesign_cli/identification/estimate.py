@@ -14,6 +14,7 @@ from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tes
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Directed, directed_tests
 from inputdesign_cli.identification.extensions import Extension
+from inputdesign_cli.identification.one_system import of_one_system
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
 from inputdesign_cli.identification.records import Records
@@ -43,6 +44,7 @@ class Estimate:
         agreement: the probability that an earlier estimate differs as much as the one that counts along; None
             where there is none.
         lengths: the samples of each of the records, which follow each other.
+        alike: of several experiments, the probability that each differs as much from the others.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
         tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
@@ -66,6 +68,7 @@ class Estimate:
     independence: ResidualTest
     tests: tuple[ScoreTest, ...]
     directed: tuple[Directed, ...]
+    alike: tuple[float, ...]
 
     @cached_property
     def information(self) -> Array:
@@ -120,6 +123,7 @@ def concluded(
     in_plant: int,
     recent: int,
     extensions: Sequence[Extension],
+    experiments: Sequence[int],
     feedback: bool,
 ) -> Estimate:
     """The estimate with its covariance and the tests of its residuals.
@@ -134,6 +138,7 @@ def concluded(
         in_plant: number of parameters that take directions of past inputs away: those of B and F.
         recent: the lag up to which the structure looks at the inputs.
         extensions: the parameters that might be missing.
+        experiments: the samples of each experiment.
         feedback: whether u(t) answers y(t).
 
     Raises:
@@ -171,6 +176,7 @@ def concluded(
         ),
         tests=score_tests(records, point, recent=recent, feedback=feedback),
         directed=directed_tests(records, point, extensions),
+        alike=of_one_system(point, noise, experiments),
     )
 
 

@@ -120,6 +120,7 @@ def identify(
     lengths: Lengths = None,
     rest: bool | None = None,
     earlier: Earlier | None = None,
+    experiments: Lengths = None,
 ) -> Estimate:
     """The structure of `model` estimated from one record, or jointly from several.
 
@@ -134,6 +135,7 @@ def identify(
         rest: whether each begins at rest about zero; otherwise its start and its level are unknown and
             estimated along. None: as the data say.
         earlier: an estimate from other data, which counts along.
+        experiments: the samples of each experiment, of one or several records; None: all are of one.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -148,6 +150,7 @@ def identify(
         lengths=lengths,
         rest=rest,
         earlier=earlier,
+        experiments=experiments,
     )
 
 

@@ -94,6 +94,7 @@ def identify_records(
     lengths: Sequence[int] | None,
     rest: bool | None,
     earlier: Earlier | None,
+    experiments: Sequence[int] | None = None,
     weights: Array | None = None,
 ) -> Estimate:
     """The maximum-likelihood estimate of a structure from one record, or jointly from several.
@@ -106,6 +107,7 @@ def identify_records(
         lengths: of the records that follow each other in u and y; None for one.
         rest: whether each begins at rest about zero; None: as the data say.
         earlier: an estimate from other data, which counts along.
+        experiments: the samples of each experiment, of one or several records; None: all are of one.
         weights: W (p, p) of the errors if the covariance of the noise is known.
 
     Raises:
@@ -141,6 +143,7 @@ def identify_records(
         in_plant=int(np.sum(kind.explaining)),
         recent=kind.recent,
         extensions=kind.extensions(best.point.theta, feedback=feedback),
+        experiments=experiments or (len(y),),
         feedback=feedback,
     )
 

@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from inputdesign_cli.compute.interruptions import bare_interruptions
 from inputdesign_cli.errors import (
     EXIT_BAD_INPUT,
     EXIT_INACCURATE,
@@ -92,7 +93,8 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
     started = time.perf_counter()
     try:
         spec = job.draft.spec(job.overrides)
-        results = run_verb(job.verb, spec)
+        with bare_interruptions():
+            results = run_verb(job.verb, spec)
         seconds = time.perf_counter() - started
         timing = {**results.result.get("timing_s", {}), "point": seconds}
         results = replace(results, result={**results.result, "timing_s": timing})

@@ -34,7 +34,7 @@ from inputdesign_cli.tasks.identification import (
 from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
-from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
+from inputdesign_cli.tasks.result.refutations import contradictions, differences, refutations, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 
 _ROUNDING = 1e-9
@@ -89,6 +89,7 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
         without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
     reasons = [
         *unsettled(found.estimate),
+        *differences(found.estimate, [name for name, _ in found.data.files]),
         *refutations(found.model, found.estimate),
         *contradictions(found.estimate),
     ]

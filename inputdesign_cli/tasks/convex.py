@@ -53,7 +53,7 @@ from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
 from inputdesign_cli.tasks.result.status import proof_status
-from inputdesign_cli.tasks.result.unfinished import no_record_in_time, unfinished_notes
+from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_in_time, unfinished_notes
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 
@@ -88,7 +88,7 @@ class ConvexTask:
     alpha: float
     calibration: Calibration | None
     tolerance: float
-    any_spectrum_tolerance: float
+    any_spectrum_tolerance: float | None
     most_samples: int | None
     ellipses: Pairs | None
     grid: GridMethod | None
@@ -129,7 +129,10 @@ class ConvexTask:
         solved = time.perf_counter()
         audit(done, result, on_grid=self.grid is not None)
         checked = time.perf_counter()
-        notes = unfinished_notes(result) if "ended_by" in how else []
+        if "ended_by" in how:
+            notes = unfinished_notes(result)
+        else:
+            notes = [] if done.design.any_spectrum else [no_other_spectra()]
         try:
             made = self._recorded(done)
         except OutOfTimeError:
@@ -303,7 +306,9 @@ class ConvexTask:
 
     def _by_grid(self, method: GridMethod) -> tuple[Design, dict[str, Json]]:
         white = replace(self.question, basis=flat_basis(self.experiment))
-        baseline = solve_design(white, tolerance=self.tolerance)
+        baseline = solve_design(
+            white, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+        )
         basis = self.question.basis
         problem = replace(baseline.problem, basis=basis)
         stated = [r for r in problem.requirements if isinstance(r, ModelError)]

@@ -68,7 +68,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     heard = exploration_notes(log, found, loops, order_of_excitation(log.parts))
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
-        task, Identified(found.estimate, found.model, Data(u, y, None, lengths, notes), preparation, None)
+        task, Identified(found.estimate, found.model, Data(u, y, None, lengths, (), notes), preparation, None)
     )
     results = identification_results(task, identified, started)
     result = {

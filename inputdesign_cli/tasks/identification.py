@@ -27,6 +27,7 @@ from inputdesign_cli.tasks.result.estimates import (
     model_text,
     prior_notes,
 )
+from inputdesign_cli.tasks.result.refutations import differences
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,7 @@ def identified(task: Identification, paths: Sequence[Path], preparation: Prepara
             feedback=units.closed_loop,
             lengths=data.lengths,
             earlier=task.earlier,
+            experiments=[samples for _, samples in data.files],
         )
     model = nominal.at(estimate.theta, estimate.noise)
     try:
@@ -137,6 +139,7 @@ def identification_results(task: Identification, found: Identified, started: flo
         result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
+    notes += differences(estimate, [name for name, _ in found.data.files])
     notes += prior_notes(estimate, stated=task.has_prior)
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")

@@ -119,6 +119,38 @@ def test_a_signal_that_comes_while_something_is_finalised_is_not_lost(number, co
     assert (done.returncode, "Traceback" in done.stderr) == (code, False)
 
 
+WRAPPED = """
+import signal, sys
+import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
+from inputdesign_cli.cli.terminal import guarded
+
+_, number, where = sys.argv
+sys.argv = sys.argv[:1]
+
+class Attribute:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(int(number))
+
+def work():
+    type("Made", (), {"attribute": Attribute()})
+
+def run():
+    cli.streams.prepare_signals()
+    cli.typer.run(guarded(work)) if where == "guarded" else work()
+
+cli.main = run
+command.main()
+"""
+
+
+@pytest.mark.parametrize("where", ["guarded", "outside"])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_that_comes_while_a_class_is_made_is_not_a_fault(number, code, where):
+    command = [sys.executable, "-c", WRAPPED, str(int(number)), where]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, "Traceback" in done.stderr, "internal" in done.stderr) == (code, False, False)
+
+
 def test_names_that_are_no_text_end_in_no_fault(tmp_path):
     """A file name need not be UTF-8: what is written tells it with escapes."""
     name = os.fsdecode(b"\xff\xfe.yaml")

@@ -93,6 +93,18 @@ def test_grid_method_reports_itself_honestly():
     assert outcome.result["cost"] == pytest.approx(solve(spec_of(SMALL)).result["cost"], rel=1e-5)
 
 
+@pytest.mark.parametrize("kind", ["fir, order: 3", "free"])
+def test_the_bound_over_every_spectrum_can_be_left_out(kind):
+    whole, fast = (
+        solve(spec_of(SMALL, spectrum=f"{{type: {kind}}}", solver__any_spectrum=asked)).result
+        for asked in ("true", "false")
+    )
+    assert fast["objective"]["value"] == whole["objective"]["value"]
+    free = kind == "free"  # itself every spectrum
+    assert ("any_spectrum_bound" in fast["objective"]) is free
+    assert any("--fast" in note for note in fast.get("notes", [])) is not free
+
+
 def test_prior_that_suffices():
     prior = "{information: [[1.0e+9, 0, 0], [0, 1.0e+9, 0], [0, 0, 1.0e+9]]}"
     outcome = solve(spec_of(SMALL, experiment__prior=prior))

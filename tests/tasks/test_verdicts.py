@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.summary import summary
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import DataError, SpecError
 
 STRUCTURE = """
 sample_time: 5
@@ -81,6 +81,39 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, record):
     assert "raise the orders of B and F" in " ".join(result["notes"])
     assert "signal" not in found.results.tables
     assert "undecided, neither met nor missed" in said(found.results)
+
+
+def test_records_of_two_plants_are_named(record, tmp_path):
+    spec = parse_spec(HEATER)
+    first, second = record("a.csv", 400, 1), record("b.csv", 400, 2)
+    assert assess(spec, [first, second]).verdict == "met"
+    rows = np.genfromtxt(second, delimiter=",", names=True)
+    other = tmp_path / "other.csv"
+    table = np.column_stack([rows["time_s"], rows["u"], -rows["y"]])
+    np.savetxt(other, table, delimiter=",", header="time_s,u,y", comments="")
+    found = assess(spec, [first, other])
+    assert found.verdict == "undecided"
+    (said,) = [r for r in found.results.result["assessment"]["undecided"] if "one system" in r]
+    assert {"a.csv", "other.csv"} < set(said.split())
+    assert said in found.results.result["notes"]
+
+
+@pytest.mark.parametrize("rows", [720, 500])
+def test_a_record_counts_once(rows, record, tmp_path):
+    """A file given twice, and a file that holds the beginning of another."""
+    first, again = record("a.csv", 720, 1), tmp_path / "again.csv"
+    again.write_text("".join(first.read_text().splitlines(keepends=True)[: rows + 1]))
+    with pytest.raises(DataError, match="hold the same samples") as raised:
+        assess(parse_spec(HEATER), [first, again])
+    assert raised.value.diagnostics[0].code == "data-repeated"
+
+
+def test_channels_that_the_plant_does_not_have_are_not_passed_over_in_silence(record):
+    path = record("a.csv", 720, 1)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([f"{lines[0]},u2", *(f"{line},0.5" for line in lines[1:])]))
+    notes = assess(parse_spec(HEATER), path).results.result["notes"]
+    assert any("u2 is not used" in note for note in notes)
 
 
 NARROW = """

@@ -78,7 +78,7 @@ class Design:
     over the inputs and meets the same requirements (or exhausts the same limits); `white_power` is its power,
     `white_within` tells whether it keeps to the limits. `any_spectrum` is the same problem over all
     spectra; its certificate bounds every excitation whatever (limits on the density left out). None where
-    there was no time for it.
+    it was not asked for, or there was no time for it.
     """
 
     problem: Problem
@@ -103,9 +103,12 @@ class UnfinishedDesignError(OutOfTimeError):
 
 
 def solve_design(
-    question: Question, *, tolerance: float, any_spectrum_tolerance: float = _ANY_SPECTRUM_TOLERANCE
+    question: Question, *, tolerance: float, any_spectrum_tolerance: float | None = _ANY_SPECTRUM_TOLERANCE
 ) -> Design:
     """Solve a design problem with its baseline and its bound over every spectrum, each to its relative gap.
+
+    Args:
+        any_spectrum_tolerance: None leaves out the bound over every spectrum.
 
     Raises:
         SpecError: `not-identifiable` when no excitation can tell some parameters apart;
@@ -138,6 +141,8 @@ def solve_design(
         raise UnfinishedDesignError.of(found) from None
     if question.basis.free:
         return replace(design, result=result, any_spectrum=result)
+    if any_spectrum_tolerance is None:
+        return replace(design, result=result)
     loose = max(tolerance, any_spectrum_tolerance)
     try:
         anything = _solve(anywhere, anywhere.basis.spread(powers), loose, known=result.active)

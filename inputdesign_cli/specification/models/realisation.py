@@ -11,6 +11,7 @@ from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.experiment import SimulationNoise
 from inputdesign_cli.specification.models.fields import (
     Count,
+    Flag,
     Harmonics,
     Index,
     Name,
@@ -122,6 +123,10 @@ class Solver(Section):
         description="exchange: every frequency, with a proof; lmi: the papers' program, on a grid.",
     )
     tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
+    any_spectrum: Flag = Field(
+        default=True,
+        description="Whether to bound what other spectra reach (default true; half of the time).",
+    )
     any_spectrum_tolerance: Tolerance = Field(
         default=1e-4,
         description="Relative gap of the bound over every spectrum (default 1e-4; no less than tolerance).",

@@ -63,7 +63,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         alpha=model_error_alpha(spec, experiment.model),
         calibration=build_calibration(spec),
         tolerance=spec.solver.tolerance,
-        any_spectrum_tolerance=spec.solver.any_spectrum_tolerance,
+        any_spectrum_tolerance=spec.solver.any_spectrum_tolerance if spec.solver.any_spectrum else None,
         most_samples=spec.limits.samples,
         ellipses=spec.report.ellipses,
         grid=grid,

@@ -33,6 +33,7 @@ TIME_UNITS = tuple(_SECONDS)
 _UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
     unit: unit for unit in TIME_UNITS
 }
+_CHANNEL = re.compile(r"([uy])(\d+)(?![a-z0-9]).*")
 _TIME = re.compile(r"(sampling[ _]|elapsed[ _])?(time|t|timestamp)(?![a-z0-9]).*")
 
 
@@ -43,6 +44,7 @@ class Data:
     Attributes:
         r: (samples, r), the reference of a loop; None where some file does not have it.
         lengths: the samples of each stretch without gaps.
+        files: the name of each file and its samples.
         notes: what was done to the record and what was seen in it.
     """
 
@@ -50,6 +52,7 @@ class Data:
     y: Array
     r: Array | None
     lengths: tuple[int, ...]
+    files: tuple[tuple[str, int], ...]
     notes: tuple[str, ...]
 
 
@@ -76,12 +79,14 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
                     hint=f"its channels are {', '.join(channels)}: write {option}",
                 )
     parts = [_read(path, units, preparation, named=len(paths) > 1) for path in paths]
+    _check_different(paths, parts)
     references = [part.r for part in parts if part.r is not None]
     return Data(
         np.concatenate([part.u for part in parts]),
         np.concatenate([part.y for part in parts]),
         np.concatenate(references) if len(references) == len(parts) else None,
         tuple(length for part in parts for length in part.lengths),
+        tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
     )
 
@@ -249,14 +254,54 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         signals = replace(signals, time=signals.time / _SECONDS[units.time_unit])
     _check_steps(signals, units, preparation)
     segments, told = prepared(signals, units.sample_time, units.time_unit, preparation)
+    told += _unused(sheet, units, preparation)
     inputs = np.concatenate([part.u for part in segments])
     return Data(
         inputs[:, : units.inputs],
         np.concatenate([part.y for part in segments]),
         inputs[:, units.inputs :] if references else None,
         tuple(len(part.y) for part in segments),
+        ((path.name, len(inputs)),),
         tuple(f"{path.name}: {note}" if named else note for note in told),
     )
+
+
+def _check_different(paths: Sequence[Path], parts: Sequence[Data]) -> None:
+    """No file holds the samples of another: information counts once.
+
+    Raises:
+        DataError: `data-repeated`.
+    """
+    whole = [np.column_stack([part.u, part.y]).tobytes() for part in parts]
+    for later in range(1, len(parts)):
+        for first in range(later):
+            if whole[later] in whole[first] or whole[first] in whole[later]:
+                raise DataError.because(
+                    "data-repeated",
+                    f"{paths[later].name} and {paths[first].name} hold the same samples: counted twice, "
+                    "they would make the estimate look surer than it is",
+                    "give each record once",
+                    "",
+                    Location(str(paths[later]), 1, 1, ""),
+                )
+
+
+def _unused(sheet: Sheet, units: Units, preparation: Preparation) -> list[str]:
+    """Columns that are called as channels are, of which the plant has fewer."""
+    counts = {"u": units.inputs, "y": units.outputs}
+    found = [(name, _CHANNEL.fullmatch(name)) for name in sheet.header]
+    extra = [
+        name
+        for name, match in found
+        if match and int(match[2]) > counts[match[1]] and name not in preparation.columns.values()
+    ]
+    if not extra:
+        return []
+    verb = "is" if len(extra) == 1 else "are"
+    return [
+        f"{', '.join(extra)} {verb} not used: the plant of the spec has {units.inputs} inputs and "
+        f"{units.outputs} outputs; what such an input causes counts as noise here"
+    ]
 
 
 def _references(units: Units, header: Sequence[str]) -> Sequence[str]:

@@ -51,6 +51,24 @@ def contradictions(estimate: Estimate) -> list[str]:
     ]
 
 
+def differences(estimate: Estimate, files: Sequence[str]) -> list[str]:
+    """What to say where the experiments are not of one system; the level is shared by all (Bonferroni)."""
+    found = [
+        (probability, name)
+        for probability, name in zip(estimate.alike, files, strict=False)
+        if probability * len(estimate.alike) < _ONE_SYSTEM
+    ]
+    if not found:
+        return []
+    probability, name = min(found)
+    others = [other for other in files if other != name]
+    against = others[0] if len(others) == 1 else "the other records"
+    return [
+        f"{name} and {against} are not of one system (probability {probability:.1e} that their parameters "
+        "differ as much by chance): assess each alone, and look for what has changed between them"
+    ]
+
+
 def refutations(model: Model, estimate: Estimate) -> list[str]:
     """What the strongest test of every kind of fault says, and which single parameters are missing."""
     strongest: dict[str, ScoreTest] = {}

@@ -1,4 +1,4 @@
-"""What is told of a design that was delivered although its time was over."""
+"""What is told of a design that was delivered without all that is computed by default."""
 
 from __future__ import annotations
 
@@ -33,6 +33,14 @@ def _how_far(found: Json) -> str:
     if "upper_bound" in found:
         return f"no other gets above {found['upper_bound']:.6g}"
     return f"no other gets below {found['lower_bound']:.6g}, {100 * gap:.2g} % less"
+
+
+def no_other_spectra() -> str:
+    """That the bound over every spectrum was left out."""
+    return (
+        "the design is the best of its spectrum type; what other spectra reach was not computed "
+        "(solver.any_spectrum: false, or --fast)"
+    )
 
 
 def no_record_in_time() -> str:
