@@ -92,7 +92,8 @@ def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE)
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
     """A logarithmic axis over the positive ones of `frequencies`, in rad per time unit."""
     positive = frequencies[frequencies > 0]
-    log_axes(axes, "x")
+    if positive.size:
+        log_axes(axes, "x")
     if positive.size > 1:
         axes.set_xlim(positive.min(), positive.max())
     axes.set_xlabel(f"frequency ω (rad/{time_unit})")

@@ -180,7 +180,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
         """One entry of G as numerator over denominator, gradients (n, k); the numerator has the dead time."""
-        s = 1j * np.asarray(w, dtype=float)
+        s = 1j * np.atleast_1d(np.asarray(w))
         above = np.zeros((s.size, len(self.parameters)), dtype=complex)
         below = np.zeros_like(above)
         late = self._late(s, output, input)
@@ -193,7 +193,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
-        s = 1j * np.asarray(w, dtype=float)
+        s = 1j * np.atleast_1d(np.asarray(w))
         G = np.zeros((s.size, self.outputs, self.inputs), dtype=complex)
         for i, j in self.active:
             above = self._late(s, i, j) * ascending.polyval(s, self.numerator[i][j])
@@ -202,7 +202,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
-        s = 1j * np.asarray(w, dtype=float)
+        s = 1j * np.atleast_1d(np.asarray(w))
         gradient = np.zeros((s.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
         for index, parameter in enumerate(self.parameters):
             for i, j in parameter.places:

@@ -224,3 +224,9 @@ def test_no_curve_lies_under_a_legend(name, page):
         if legend:
             assert legend.get_window_extent().y0 >= axes.get_window_extent().y1
             assert legend.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_a_spectrum_of_no_lines_is_an_empty_page():
+    """What a design is that needs no excitation."""
+    nothing = SpectrumCurves(np.zeros(0), np.zeros((0, 1, 1)), lines=True, band=(0.0, 1.0))
+    assert draw(nothing).startswith(b"\x89PNG")

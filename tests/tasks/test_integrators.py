@@ -170,6 +170,38 @@ def test_a_free_pole_that_white_noise_drives_has_no_finite_information():
     assert "known: [a0]" in found.hint
 
 
+def test_a_plant_in_continuous_time_that_integrates():
+    """Lines off zero; the record's own information is that of its samples, by the closed form of a sum."""
+    text = """
+sample_time: 0.5
+plant: {parameters: {k: 0.05}, continuous: {numerator: [k], denominator: [1, 0]}}
+noise: {variance: 0.04}
+experiment: {samples: 600}
+accuracy: {standard_deviation: {k: 0.001}}
+limits: {band: [0, 2]}
+spectrum: {type: multisine, frequencies: [0.0837758, 0.335103]}
+signal: {type: multisine, samples: 600, seed: 1}
+"""
+    found = solve(parse_spec(text)).result
+    # N / sigma^2 sum |1 / jw|^2 p: the lower line tells more
+    assert found["cost"] == pytest.approx(0.04 / 600 / 0.001**2 * 0.0837758**2, rel=1e-6)
+    assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
+
+
+def test_drift_that_one_output_has_and_no_controller_takes_away():
+    text = """
+plant: {B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1], [1, -0.8]]]}
+noise: {drift: [true, false], variance: 0.1}
+experiment: {samples: 300, controller: {numerator: [[[0.3], [0]], [[0], [0.2]]], denominator: [1]}}
+accuracy: {standard_deviation: {"b1[1,1]": 0.01}}
+"""
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(text))
+    (found,) = caught.value.diagnostics
+    assert found.code == "infinite-information"
+    assert "let every output drift" in found.hint
+
+
 def test_a_criterion_of_the_loop_error_refuses_integrators():
     text = """
 plant: {B: [0, 0.2], F: [1, -1]}

@@ -38,11 +38,16 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     if not experiment.model.continuous:
         endless = _growing(experiment, source.noise_gradient)
         if endless:
+            known = f"list it in plant.known: [{endless.split(', ')[0]}]"
+            hint = (
+                f"{known}; in q^-1 it may be free as a root of A, where the noise passes through it as well"
+            )
+            if any(spec.noise.drifts) and not all(spec.noise.drifts):
+                hint = "let the controller integrate where outputs drift, or let every output drift"
             raise spec.complain(
                 "infinite-information",
-                f"the noise alone, integrated by the plant, tells without end of {endless}",
-                hint=f"list it in plant.known: [{endless.split(', ')[0]}]; in q^-1 it may be free as "
-                "a root of A, where the noise passes through it as well",
+                f"the noise alone, which is integrated and fed back, tells without end of {endless}",
+                hint=hint,
                 key="plant",
             )
     lo, hi = experiment.band
