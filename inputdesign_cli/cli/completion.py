@@ -15,24 +15,36 @@ def error_codes(incomplete: str) -> list[tuple[str, str]]:
 
 
 def spec_keys(incomplete: str) -> list[str]:
-    """The keys of a spec as `--set` takes them, up to the equals sign."""
-    if "=" in incomplete:
-        return []
+    """The keys of a spec as `--set` takes them, and behind the equals sign the words that a key takes."""
     from inputdesign_cli.specification import json_schema
 
     schema = json_schema()
-    keys = dict.fromkeys(_keys(schema, schema, ""))
-    return [f"{key}=" for key in keys if key.startswith(incomplete)]
+    found = list(_entries(schema, schema, ""))
+    key, equals, _ = incomplete.partition("=")
+    if not equals:
+        return [f"{name}=" for name in dict.fromkeys(name for name, _ in found) if name.startswith(key)]
+    words = dict.fromkeys(f"{key}={word}" for name, node in found if name == key for word in _words(node))
+    return [word for word in words if word.startswith(incomplete)]
 
 
-def _keys(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[str]:
+def _entries(node: dict[str, Any], root: dict[str, Any], path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """The paths of all keys that hold values: through references and alternatives, not into lists."""
     if "$ref" in node:
-        yield from _keys(root["$defs"][node["$ref"].rpartition("/")[2]], root, path)
+        yield from _entries(root["$defs"][node["$ref"].rpartition("/")[2]], root, path)
     for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
-        yield from _keys(alternative, root, path)
+        yield from _entries(alternative, root, path)
     for key, below in node.get("properties", {}).items():
         name = f"{path}.{key}" if path else key
         if name != "sweep":
-            yield name
-            yield from _keys(below, root, name)
+            yield name, below
+            yield from _entries(below, root, name)
+
+
+def _words(node: dict[str, Any]) -> Iterator[str]:
+    """The texts that a value may be, where it is one of a few."""
+    listed = [*node.get("enum", ()), *([node["const"]] if "const" in node else ())]
+    yield from (word for word in listed if isinstance(word, str))
+    if node.get("type") == "boolean":
+        yield from ("true", "false")
+    for alternative in (*node.get("anyOf", ()), *node.get("oneOf", ())):
+        yield from _words(alternative)

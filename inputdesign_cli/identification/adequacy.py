@@ -43,6 +43,7 @@ class ScoreTest:
         fault: what is wrong where it fails.
         probability: of a statistic as large, with so many degrees of freedom, if the model is right.
         lag: of past inputs or residuals, where they explain most; of trends None.
+        output: of which residuals are explained most; `source`, by which input or other residual.
     """
 
     name: str
@@ -51,6 +52,8 @@ class ScoreTest:
     freedom: int
     probability: float
     lag: int | None
+    output: int = 0
+    source: int = 0
 
 
 @dataclass(frozen=True)
@@ -112,10 +115,13 @@ def score_tests(
         statistic, freedom = float(np.sum((directions.T @ white.residuals) ** 2)), directions.shape[1]
         if not freedom:
             continue
-        largest = int(np.argmax(np.abs(scores))) % signals.columns.shape[2]
+        output, largest = divmod(int(np.argmax(np.abs(scores))), signals.columns.shape[2])
         lag = signals.lags[largest] if signals.lags else None
+        # Lag by lag all inputs, or all residuals.
+        source = largest % signals.lags.count(signals.lags[0]) if signals.lags else 0
         probability = float(scipy.special.chdtrc(freedom, statistic))
-        tests.append(ScoreTest(signals.name, signals.fault, statistic, freedom, probability, lag))
+        found = (signals.name, signals.fault, statistic, freedom, probability, lag, output, source)
+        tests.append(ScoreTest(*found))
     return tuple(tests)
 
 

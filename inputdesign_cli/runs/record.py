@@ -40,7 +40,7 @@ def load_result(directory: Path) -> dict[str, Json]:
     if not isinstance(result, dict) or result.get("format") != 1:
         raise unreadable(directory / RESULT, 'it has no "format": 1')
     files = result.get("files", [])
-    if not isinstance(files, list) or not all(map(_is_plain, files)):
+    if not isinstance(files, list) or not all(map(is_plain, files)):
         raise unreadable(directory / RESULT, '"files" is no list of names of files')
     return result
 
@@ -84,6 +84,6 @@ def _finite(text: str) -> float:
     return value
 
 
-def _is_plain(name: Json) -> bool:
+def is_plain(name: Json) -> bool:
     """Whether it names a file in the directory itself, and none elsewhere."""
     return isinstance(name, str) and name not in ("", os.curdir, os.pardir) and not set(name) & {"/", "\0"}

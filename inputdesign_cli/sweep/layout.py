@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from inputdesign_cli.errors import OutputError
+from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.record import PAGE, RESULT, is_page, unreadable
+from inputdesign_cli.runs.record import PAGE, RESULT, is_page, is_plain, unreadable
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import output_errors, replace_text
 
@@ -80,7 +80,17 @@ class Layout:
         replace_text(path, text)
 
     def adopt(self, key: str, files: dict[str, bytes]) -> None:
-        """Put the run of a point, computed elsewhere, in its place in one step."""
+        """Put the run of a point, computed elsewhere, in its place in one step.
+
+        Raises:
+            DataError: `worker-answer`: these are not the files of a run, or have names with a folder in them.
+        """
+        strange = [name for name, content in files.items() if not (is_plain(name) and type(content) is bytes)]
+        if strange or RESULT not in files:
+            what = f"the file {strange[0]!r}" if strange else f"no {RESULT}"
+            message = f"a worker answered with {what}: that is no run of a point"
+            hint = "look at who may reach the cluster (docs/security.md)"
+            raise DataError.because("worker-answer", message, hint)
         target = self.run(key)
         partial = target.parent / f".{key}.partial-{os.getpid()}"
         with output_errors(target):

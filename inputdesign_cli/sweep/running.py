@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import (
+    DataError,
     Diagnostic,
     IdesignError,
     InaccurateError,
@@ -226,7 +227,10 @@ class _Run:
             code, status = ("worker-lost", LOST) if lost else ("internal-error", BROKEN)
             end = failed(status, Diagnostic(code, str(finished.error)), 0.0)
         if end.files is not None:
-            self.layout.adopt(job.key, end.files)
+            try:
+                self.layout.adopt(job.key, end.files)
+            except DataError as strange:
+                end = failed(BROKEN, strange.diagnostics[0], 0.0)
         if end.status == LOST:
             # Not the fault of the point: the next call tries it again.
             self.lost[job.key] = json.loads(end.failure)

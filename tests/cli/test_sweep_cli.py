@@ -127,4 +127,6 @@ def test_completion_knows_codes_and_keys():
     assert spec_keys("experiment.sa") == ["experiment.samples="]
     assert "accuracy.model_error.relative=" in spec_keys("accuracy.")
     assert spec_keys("spectrum.order=") == []
+    assert spec_keys("spectrum.type=f") == ["spectrum.type=fir", "spectrum.type=free"]
+    assert spec_keys("accuracy.criterion=") == [f"accuracy.criterion={letter}" for letter in "DAET"]
     assert len(spec_keys("spectrum.order")) == 1

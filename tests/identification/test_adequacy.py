@@ -10,7 +10,7 @@ import scipy.stats
 
 from inputdesign_cli.identification import identify
 from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, failed
-from inputdesign_cli.plant import Intersample, SampledModel
+from inputdesign_cli.plant import Intersample, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx, two_by_two
 from tests.support.records import shifted, simulated
@@ -87,6 +87,22 @@ def test_the_lag_is_where_the_missing_coefficient_stands():
     y = scipy.signal.lfilter([0, 1.0, 0, 0, 0.3], [1.0], u, axis=0) + rng.standard_normal((800, 1))
     found = identify(one_channel([0, 1.0]), u, y)
     assert by_name(found)["recent_inputs"].lag == 4
+
+
+def test_of_several_channels_it_names_those_that_fail():
+    rng = np.random.default_rng(4)
+    u, e = rng.standard_normal((600, 2)), rng.standard_normal((600, 2))
+    one, gain = np.ones(1), np.array([0, 1.0])
+    model = PolynomialModel(
+        ((gain, gain),) * 2, (one,) * 2, ((one, one),) * 2, (one,) * 2, (one,) * 2, np.eye(2)
+    )
+    y = np.concatenate([np.zeros((1, 2)), u[:-1] @ np.array([[1.0, 0.5], [0.7, 1.0]])]) + e
+    y[3:, 1] += 0.4 * u[:-3, 0]
+    test = by_name(identify(model, u, y))["recent_inputs"]
+    assert (test.output, test.source, test.lag) == (1, 0, 3)
+    y[1:, 0] += 0.6 * e[:-1, 1]
+    test = by_name(identify(model, u, y))["recent_residuals"]
+    assert (test.output, test.source, test.lag) == (0, 1, 1)
 
 
 def test_a_drift_is_found():

@@ -4,11 +4,12 @@ import json
 import multiprocessing
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from inputdesign_cli.compute.processes import Processes
-from inputdesign_cli.errors import InfeasibleError, OutputError, SpecError
+from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.sweep.layout import Layout
 from inputdesign_cli.sweep.running import list_points, sweep
 from inputdesign_cli.sweep.table import scalars
@@ -235,6 +236,26 @@ def test_a_full_disc_ends_the_sweep(spec, stub, tmp_path, monkeypatch):
     with pytest.raises(OutputError):
         sweep(spec, ["experiment.samples=10,20"], directory=tmp_path / "out")
     assert [row["status"] for row in rows(tmp_path / "out")] == ["pending", "pending"]
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"../../stray": b"x", "result.json": b"{}"},
+        {"/tmp/stray-of-a-worker": b"x", "result.json": b"{}"},
+        {"..": b"x", "result.json": b"{}"},
+        {"result.json": "text"},
+        {"spec.yaml": b""},
+        {3: b"", "result.json": b"{}"},
+    ],
+)
+def test_a_worker_writes_nothing_but_the_files_of_a_run(tmp_path, files):
+    layout = Layout(tmp_path / "out")
+    with pytest.raises(DataError) as refused:
+        layout.adopt("k", files)
+    assert refused.value.diagnostics[0].code == "worker-answer"
+    assert list(tmp_path.iterdir()) == []
+    assert not Path("/tmp/stray-of-a-worker").exists()
 
 
 def test_a_layout_reads_results_before_failures(tmp_path):

@@ -18,6 +18,7 @@ from inputdesign_cli.design.loop_error import (
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
+from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
@@ -113,7 +114,8 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             key=key,
         )
     made = MatrixPlant.of(polynomial_model(plant, noise, noise.covariance(plant.outputs)))
-    if np.any(np.abs(made.singularities) < _INTEGRATES):
+    poles = join_roots(roots_in_z(part) for part in (*made.A, *(f for row in made.F for f in row)))
+    if np.any(np.abs(poles - 1.0) < _INTEGRATES):
         raise bad_spec(
             "not-supported",
             "this version designs for the closed-loop error of plants that do not integrate",

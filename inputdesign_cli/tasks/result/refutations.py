@@ -8,12 +8,13 @@ from inputdesign_cli.identification import Estimate, Extension, ScoreTest
 from inputdesign_cli.plant import Model
 
 _FOUND = {
-    "plant": "past inputs explain residuals (probability {p:.1e}), most at lag {lag}: the plant has more "
-    "structure than the model; {remedy}, or compare with an FIR model (B: [0, 1, 1, ..]) that is long enough",
-    "noise": "the residuals are not white (probability {p:.1e}), most at lag {lag}: the noise has more "
-    "structure than the model, and the covariance is not to be trusted; {remedy}",
-    "drift": "the residuals drift slowly (probability {p:.1e}): remove the trend from the record, use a part "
-    "of it without drift, or {remedy}",
+    "plant": "past inputs explain residuals{where} (probability {p:.1e}), most at lag {lag}: the plant has "
+    "more structure than the model; {remedy}, or compare with an FIR model (B: [0, 1, 1, ..]) that is long "
+    "enough",
+    "noise": "the residuals are not white{where} (probability {p:.1e}), most at lag {lag}: the noise has "
+    "more structure than the model, and the covariance is not to be trusted; {remedy}",
+    "drift": "the residuals drift slowly{where} (probability {p:.1e}): remove the trend from the record, "
+    "use a part of it without drift, or {remedy}",
 }
 _MISSING = "one parameter is missing (probability {p:.1e} without it): one more {what} ({name})"
 _IN_Q = {
@@ -80,7 +81,9 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
             strongest[test.fault] = test
     remedies = _IN_S if model.continuous else _IN_Q
     of_many = [
-        _FOUND[fault].format(p=test.probability, lag=test.lag, remedy=remedies[fault])
+        _FOUND[fault].format(
+            p=test.probability, lag=test.lag, remedy=remedies[fault], where=_where(model, test)
+        )
         for fault, test in strongest.items()
     ]
     of_one = [
@@ -90,6 +93,17 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
         if test in estimate.failed
     ]
     return of_many + of_one
+
+
+def _where(model: Model, test: ScoreTest) -> str:
+    """Which of several channels, as u2 acts on y1."""
+    if model.outputs == model.inputs == 1:
+        return ""
+    output, source = f"y{test.output + 1}", test.source + 1
+    if test.fault == "plant":
+        return f", those of {output} by u{source} most"
+    own = test.fault == "drift" or test.output == test.source
+    return f", those of {output} most" if own else f", those of {output} after those of y{source} most"
 
 
 def _or_else(others: Sequence[Extension]) -> str:
