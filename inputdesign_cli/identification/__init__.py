@@ -16,3 +16,4 @@ from inputdesign_cli.identification.residual_tests import (
     cross_correlations as cross_correlations,
     whiteness as whiteness,
 )
+from inputdesign_cli.identification.rivals import Rival as Rival

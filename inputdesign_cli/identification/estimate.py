@@ -19,6 +19,7 @@ from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
+from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.plant.polynomial import Array
 
@@ -44,6 +45,7 @@ class Estimate:
         agreement: the probability that an earlier estimate differs as much as the one that counts along; None
             where there is none.
         lengths: the samples of each of the records, which follow each other.
+        rivals: other minima that explain the data nearly as well.
         alike: of several experiments, the probability that each differs as much from the others.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
@@ -69,6 +71,7 @@ class Estimate:
     tests: tuple[ScoreTest, ...]
     directed: tuple[Directed, ...]
     alike: tuple[float, ...]
+    rivals: tuple[Rival, ...]
 
     @cached_property
     def information(self) -> Array:
@@ -177,6 +180,7 @@ def concluded(
         tests=score_tests(records, point, recent=recent, feedback=feedback),
         directed=directed_tests(records, point, extensions),
         alike=of_one_system(point, noise, experiments),
+        rivals=found.rivals,
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.rivals import Rival, rivals
 from inputdesign_cli.plant.polynomial import Array
 
 # A record that begins at rest is taken for one that does not with this probability.
@@ -30,6 +31,7 @@ class Search:
 
     Attributes:
         first: (parts, p), the first residuals if each record began at rest about zero.
+        rivals: other minima that explain the records nearly as well.
     """
 
     records: Records
@@ -38,6 +40,7 @@ class Search:
     steps: int
     starts: int
     first: Array
+    rivals: tuple[Rival, ...]
 
 
 def search(records: Records, points: Array, *, starts: int, before: Array | int = 0) -> Search:
@@ -55,7 +58,7 @@ def search(records: Records, points: Array, *, starts: int, before: Array | int 
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
     first = point.errors[np.cumsum((0, *records.lengths[:-1]))]
-    return Search(records, point, converged, steps, starts, first)
+    return Search(records, point, converged, steps, starts, first, rivals(records, point, found))
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:

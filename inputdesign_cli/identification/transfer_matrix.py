@@ -16,6 +16,7 @@ from inputdesign_cli.identification.kind import Part, Starts, fit_records, ident
 from inputdesign_cli.identification.record_problem import evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.refined_iv import refine
+from inputdesign_cli.identification.rivals import spread_out
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.transfer_record import TransferRecord
 from inputdesign_cli.identification.transfer_starts import starting_points
@@ -23,7 +24,8 @@ from inputdesign_cli.plant import ContinuousModel, Intersample, SampledModel
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 
-# Of the starts made from the data, as many are followed to the end: the likeliest after the instruments.
+# Of the starts made from the data, as many are followed to the end: the likeliest after the instruments that
+# are not beside each other.
 _FOLLOWED = 3
 
 
@@ -81,7 +83,7 @@ class TransferKind:
             for single in singles
             for theta in starting_points(single, self.held)
         ]
-        refined = sorted(made, key=lambda end: end[0].cost)[:_FOLLOWED]
+        refined = [made[number] for number in spread_out(about, [point for point, _ in made], _FOLLOWED)]
         if given is not None:
             refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))
         return Starts(

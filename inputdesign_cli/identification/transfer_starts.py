@@ -27,7 +27,7 @@ _ITERATIONS = 8
 _MOST_FREQUENCIES = 1000
 # Dead times are tried sample by sample up to so many, then each so much longer than the last.
 _FINE, _GROWTH = 20, 1.2
-_SWEEPS, _MINIMA = 2, 3
+_SWEEPS, _MINIMA = 2, 6
 
 Place = tuple[int, int]
 

@@ -36,6 +36,7 @@ from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objecti
 from inputdesign_cli.tasks.result.nominal import from_nominal
 from inputdesign_cli.tasks.result.refutations import contradictions, differences, refutations, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
+from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -94,6 +95,8 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
         *contradictions(found.estimate),
     ]
     reasons += [found.unasked] if found.unasked else []
+    if found.question is not None:
+        reasons += _rivals(task.header.units, found, found.question)
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
     notes = objections(task.header.units, without) if met else []
     reasons += notes
@@ -120,6 +123,14 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
         return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))
     needed = partial(_experiments, found.question)
     return Assessment(verdict, _topped_up(judged, topped, needed))
+
+
+def _rivals(units: Units, found: Identified, question: ModelQuestion) -> list[str]:
+    """The other explanations of the data that the verdict would not hold for."""
+    errors = model_errors(question.requirements)
+    if errors:
+        return beyond_admissible(units, found.model, found.estimate, errors)
+    return beyond_errors(units, found.model, found.estimate, question.entries, question.information)
 
 
 def _about(topped: Results, levels: Mapping[str, float]) -> Results:

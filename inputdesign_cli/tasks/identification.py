@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, Requirement
+from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Earlier, Estimate, identify as estimate_model
 from inputdesign_cli.information import Experiment
@@ -28,6 +28,7 @@ from inputdesign_cli.tasks.result.estimates import (
     prior_notes,
 )
 from inputdesign_cli.tasks.result.refutations import differences
+from inputdesign_cli.tasks.result.rivals import beyond_errors
 
 
 @dataclass(frozen=True)
@@ -144,6 +145,8 @@ def identification_results(task: Identification, found: Identified, started: flo
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
     else:
+        errors = model_errors(question.requirements) or question.entries
+        notes += beyond_errors(header.units, found.model, estimate, errors, question.information)
         tables["bound"], curves["bound"], worst = bound_of_data(
             header.units, question.requirements, question.entries, question.information
         )

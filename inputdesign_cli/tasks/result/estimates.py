@@ -13,6 +13,7 @@ from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
+from inputdesign_cli.tasks.result.rivals import rival_entries
 
 
 def identification_entry(estimate: Estimate) -> dict[str, Json]:
@@ -31,6 +32,8 @@ def identification_entry(estimate: Estimate) -> dict[str, Json]:
         "failed": [test.name for test in estimate.failed],
         "free_start": estimate.free,
     }
+    if estimate.rivals:
+        entry["rivals"] = rival_entries(estimate)
     if estimate.agreement is not None:
         entry["prior"] = {"probability": estimate.agreement}
     if len(estimate.lengths) > 1:

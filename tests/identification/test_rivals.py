@@ -1,0 +1,63 @@
+"""Minima that explain the data nearly as well as the best one are found where the record leaves them."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.signal
+
+from inputdesign_cli.identification import identify
+from inputdesign_cli.plant import ContinuousModel, SampledModel
+
+SAMPLES, VARIANCE = 2000, 0.1
+GAIN, TIME_CONSTANT, DEAD_TIME = 1.0, 4.0, 3.0
+T = np.arange(SAMPLES)
+# The fast sine is the same after 2 pi / 0.9 = 7 samples, and the slow one hardly tells a delay of 7.
+TWO_SINES = 0.1 * np.sin(0.01 * T) + np.sin(0.9 * T)
+BINARY = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], SAMPLES // 5), 5)
+
+
+def plainly(theta, u):
+    """K e^(-Ls) / (T s + 1) on held inputs: the step response between the samples."""
+    gain, time_constant, dead_time = theta
+    whole, part = divmod(dead_time, 1.0)
+    a = np.exp(-1.0 / time_constant)
+    first = gain * (1.0 - np.exp(-(1.0 - part) / time_constant))
+    taps = np.concatenate([np.zeros(int(whole) + 1), [first, gain * (1.0 - a) - first]])
+    return scipy.signal.lfilter(taps, [1.0, -a], u)
+
+
+def estimated(u, seed):
+    y = plainly((GAIN, TIME_CONSTANT, DEAD_TIME), u)
+    y = y + np.sqrt(VARIANCE) * np.random.default_rng(seed).normal(size=SAMPLES)
+    entries = [((np.array(p),),) for p in ([GAIN], [1.0, TIME_CONSTANT])]
+    model = ContinuousModel.monic(*entries, np.array([[VARIANCE]]), delay=((np.array([DEAD_TIME]),),))
+    found = identify(SampledModel(model, 1.0), u[:, None], y[:, None], 1.0, start=model.theta, rest=True)
+    return found, y
+
+
+def of_s(theta):
+    """(K, T, L) of K / T over s + 1 / T, late by L."""
+    b, a, dead_time = theta
+    return b / a, 1.0 / a, dead_time
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
+    found, y = estimated(TWO_SINES, seed)
+    assert found.rivals
+    left = [
+        scipy.optimize.least_squares(
+            lambda theta: y - plainly(theta, TWO_SINES), of_s(theta), x_scale=(0.1, 0.5, 0.1)
+        )
+        for theta in (found.theta, found.rivals[0].theta)
+    ]
+    periods = abs(left[1].x[2] - left[0].x[2]) / (2.0 * np.pi / 0.9)
+    assert round(periods) >= 1
+    assert periods == pytest.approx(round(periods), abs=0.1)
+    # Both are minima of the plain sum of squares, and so far apart in -2 log likelihood.
+    assert found.rivals[0].excess == pytest.approx(SAMPLES * np.log(left[1].cost / left[0].cost), abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rich_record_leaves_no_rival(seed):
+    assert estimated(BINARY, seed)[0].rivals == ()
