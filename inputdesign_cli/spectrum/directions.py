@@ -16,6 +16,7 @@ _SINGULAR = 1e-13
 # A price below this is none: its inverse would leave the range of double precision.
 _NOTHING = 1e-140
 _ROUNDING = 1e-15
+_LEVEL = 1e-10  # ratios this near to each other, relative, are the same
 
 
 def matrices(density: NDArray) -> NDArray:
@@ -111,8 +112,10 @@ def directed_scale(price: Functional, value: Functional, grid: Array) -> tuple[f
     over_grid = ratio(grid)
     peaks, heights = local_maxima(ratio, grid, over_grid)
     if over_grid[0] == -np.inf:
-        # Near a frequency that costs nothing the ratio hardly changes, but the price loses its size.
-        peaks = np.maximum(peaks, grid[1])
+        # Near a frequency that costs nothing the ratio hardly changes, but the price loses its size: as far
+        # off as the ratio is the same.
+        changed = np.abs(over_grid[1:] - over_grid[1]) > _LEVEL * np.abs(over_grid[1])
+        peaks = np.maximum(peaks, grid[max(int(np.argmax(changed)), 1)])
     if value.concentrated:
         return 0.0, peaks
     return inverse_of(heights), peaks
