@@ -42,6 +42,7 @@ _FIRST_CUTS = 0.3
 _MORE_CUTS = 6
 _HALVINGS = 6
 _BINDS = 1e-5
+_IDLE = 3
 _PROGRESS = 1e-5
 _STAGE_TOLERANCE = 1e-2
 _STAGE_ROUNDS = 10
@@ -183,6 +184,7 @@ class _State:
     best: Candidate
     interior: Candidate | None
     keys: list[Place]
+    idle: list[int]  # rounds since each cut last bound
     cuts: list[Cut]
     rows: list[Row]
     certificate: Certificate
@@ -254,9 +256,14 @@ class _State:
         return found, problem.density_breaches(z, s, above=1.0)
 
     def _prune(self, proof: Proof) -> None:
-        """Drop the cuts that do not bind; each costs the solver a k x k cone, and can come back."""
+        """Drop the cuts that have not bound for some rounds; each costs the solver a k x k cone.
+
+        Those that do not bind in one round often do in the next.
+        """
         weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
-        kept = np.flatnonzero(weights > _BINDS * weights.sum())
+        idle = np.where(weights > _BINDS * weights.sum(), 0, np.array(self.idle, dtype=int) + 1)
+        kept = np.flatnonzero(idle < _IDLE)
+        self.idle = idle[kept].tolist()
         self.keys = [self.keys[i] for i in kept]
         self.cuts = [self.cuts[i] for i in kept]
         self.proof = Proof(tuple(proof.cuts[i] for i in kept), proof.rows)
@@ -313,6 +320,7 @@ class _State:
 
     def _add(self, keys: list[Place]) -> None:
         self.keys += keys
+        self.idle += [0] * len(keys)
         self.cuts += [self.problem.requirement(i).cut(w) for i, w in keys]
 
     def _add_rows(self, breaches: list[DensityBreach]) -> None:
@@ -336,6 +344,7 @@ def _first_state(problem: Problem, start: Array, interior: Array | None, known: 
         best=best,
         interior=inner,
         keys=[],
+        idle=[],
         cuts=[],
         rows=power_rows(problem),
         certificate=Certificate(
