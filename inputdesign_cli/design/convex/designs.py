@@ -393,7 +393,9 @@ def _without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeRes
     told = samples * found.x * np.max(np.linalg.norm(at.information_maps, axis=(2, 3)) / least, axis=1)
     order = np.argsort(told)
     lost = np.cumsum(told[order])
-    faint = lost <= (_ROUNDING if problem.scaled else _FAINT)
+    # Beside limits there is no room to make up for more than rounding.
+    tight = problem.scaled or problem.limits or problem.densities
+    faint = lost <= (_ROUNDING if tight else _FAINT)
     if not np.any(faint):
         return found
     x = found.x.copy()

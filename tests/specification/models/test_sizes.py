@@ -18,7 +18,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "sizes.md"
 BASE = "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {variance: 1}\naccuracy: {model_error: {relative: 0.01}}\n"
 
 # They scale information, bound a length that is found, or start random numbers: nothing grows with them.
-UNLIMITED = {"Experiment.samples", "Limits.samples", "Signal.seed", "Simulation.seed"}
+UNLIMITED = {"Experiment.samples", "Limits.samples", "Signal.seed", "Simulation.seed", "Uncertainty.seed"}
 
 
 def test_the_page_lists_every_limit():
@@ -64,6 +64,7 @@ CHECKED = {
         r"|accuracy\.(information(\.matrix|\.parameters)?|application\.(parameters|hessian))(\[\])*"
         r"|accuracy\.mean_squared_error\.(estimated|neglected)|plant\.parameters|(plant|noise)\.known"
         r"|accuracy\.standard_deviation|estimate\.parameters|prior\.parameters"
+        r"|uncertainty\.((covariance|information)(\[\])?|parameters|intervals(\[\])?|scenarios\[\])"
     ),
     "factors, whose product has a limit": re.compile(r".*denominator"),
     "harmonics of a period, which has a limit": re.compile(r"signal\.lines"),
