@@ -12,8 +12,8 @@ class Units:
 
     `sampled` tells discrete time, where the experiment counts in rad/sample, from continuous time, where it
     counts in rad per `time_unit` as the user does. `channels` are names and units of u1, .. and y1, .. where
-    the user gave them, empty where not. One input and one output carry no index in the names of
-    curves and entries.
+    the user gave them, empty where not. `by_duration` tells that the user states lengths in `time_unit`, not
+    in samples. One input and one output carry no index in the names of curves and entries.
     """
 
     time_unit: str
@@ -23,6 +23,7 @@ class Units:
     inputs: int
     outputs: int
     channels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    by_duration: bool = False
 
     @property
     def frequency(self) -> float:
@@ -38,6 +39,12 @@ class Units:
     def per_time(self) -> str:
         """The unit of frequencies, for sentences: rad/s."""
         return f"rad/{self.time_unit}"
+
+    def length(self, samples: int, section: str = "experiment") -> str:
+        """The key that states or limits such a length, with its value: experiment.samples: 600."""
+        if self.by_duration:
+            return f"{section}.duration: {samples * self.sample_time:.10g}"
+        return f"{section}.samples: {samples}"
 
     def named(self, w: float) -> str:
         """A frequency of an experiment for a sentence, in the user's unit: 0.15 rad/s."""

@@ -343,22 +343,24 @@ class ConvexTask:
         most = self.most_samples
         if self.question.goal != "samples" or most is None or result["samples"] <= most:
             return
-        least = int(np.ceil(result["objective"]["lower_bound"]))
+        least, units = int(np.ceil(result["objective"]["lower_bound"])), self.header.units
+        enough = units.length(result["samples"], "limits")
+        limit = enough.split(":")[0]
         if least <= most and "ended_by" in result["solver"]:
             raise out_of_time(
-                f"the best design so far takes {result['samples']} samples, and limits.samples is {most}"
+                f"the best design so far takes {result['samples']} samples, more than {limit} leaves"
             )
         longest = replace(self.question.of_length(most), goal="factor")
         best = solve_design(longest, tolerance=self.tolerance)
         problem = best.problem.on(best.result.basis)
-        bought = Bought(self.header.units, self.stated, self.question.limits, problem, best.result)
+        bought = Bought(units, self.stated, self.question.limits, problem, best.result)
         raise InfeasibleError(
             Diagnostic(
                 "too-long",
                 f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
-                f"no fewer than {least}), but limits.samples is {most}; with these {bought.sentence}",
-                "allow more samples or more power, or ask for less accuracy",
-                "limits.samples",
+                f"no fewer than {least}), but {limit} allows {most}; with these {bought.sentence}",
+                f"write {enough}, allow more power, or ask for less accuracy",
+                limit,
                 details=bought.details,
             )
         )

@@ -14,6 +14,7 @@ from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import FEW, Weight, weights_of
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import (
     Bounds,
     DesignedSpectrum,
@@ -71,11 +72,13 @@ class RecordRequest:
         limit_keys: of the spec, for what limits single samples.
         stated_method: whether the spec states the kind of signal.
         others: kinds of signals that may stand in for one that does not fit.
+        units: in which lengths are told.
     """
 
     settings: SignalSettings
     bounds: Bounds
     cost: Mapping[PowerKind, Weight]
+    units: Units
     band: tuple[float, float] = (0.0, np.pi)
     step: float = 1.0
     samples: int | None = None
@@ -172,7 +175,9 @@ def make_record(
     if record.met or not (request.searched and longer):
         return record
     allowed = request.most_samples if problem.goal == "samples" and request.samples is None else 0
-    return shortest_record(record, settings.block, made, allowed, request.longest, request.limit_keys)
+    return shortest_record(
+        record, settings.block, made, allowed, request.longest, request.limit_keys, request.units
+    )
 
 
 def _binding(design: Design) -> list[int]:

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import Record
 
 _LONGEST = 64  # times the length that was asked for
@@ -30,6 +31,7 @@ def shortest_record(
     most_samples: int | None,
     longest: int,
     limit_keys: Sequence[str],
+    units: Units,
 ) -> Record:
     """The longer record that does what `missed` does not, or the error that says how long it would be.
 
@@ -40,6 +42,7 @@ def shortest_record(
         most_samples: the longest that may be delivered; None for any, 0 when no other length is wanted.
         longest: samples of the longest record that is computed at all.
         limit_keys: of the spec, for what limits single samples.
+        units: in which lengths are told.
 
     Raises:
         InfeasibleError: `limits-too-tight`.
@@ -47,7 +50,7 @@ def shortest_record(
     found = _search(missed, block, made, min(_LONGEST * len(missed.samples), longest))
     if found is not None and (most_samples is None or len(found.samples) <= most_samples):
         return found
-    raise _too_tight(missed, found, most_samples, limit_keys)
+    raise _too_tight(missed, found, most_samples, limit_keys, units)
 
 
 def _search(missed: Record, block: int, made: MakeRecord, longest: int) -> Record | None:
@@ -94,7 +97,7 @@ def _rounded(length: float, block: int) -> int:
 
 
 def _too_tight(
-    missed: Record, found: Record | None, most_samples: int | None, limit_keys: Sequence[str]
+    missed: Record, found: Record | None, most_samples: int | None, limit_keys: Sequence[str], units: Units
 ) -> InfeasibleError:
     names = " and ".join(limit_keys)
     size = len(missed.samples)
@@ -111,10 +114,10 @@ def _too_tight(
             else f"raise the limits: {_LONGEST} times as many samples were not enough either"
         )
     else:
+        samples = len(found.samples)
+        set_to = units.length(samples, "limits") if most_samples else units.length(samples)
         hint = (
-            f"{len(found.samples)} samples can (power {found.power:.4g}): set "
-            f"experiment.samples and signal.samples, raise the limits, or loosen the accuracy"
+            f"{samples} samples can (power {found.power:.4g}): set {set_to} (and signal.samples, if stated), "
+            "raise the limits, or loosen the accuracy"
         )
-        if most_samples:
-            hint += f"; limits.samples is {most_samples}"
     return InfeasibleError.because("limits-too-tight", message, hint, limit_keys[0])

@@ -1,10 +1,12 @@
 """Durations in place of samples, and what channels are called."""
 
+import re
+
 import numpy as np
 import pytest
 
 from inputdesign_cli import identify, parse_spec, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import figure
 from inputdesign_cli.runs.units import Units
 
@@ -71,3 +73,18 @@ def test_an_excitation_has_the_unit_of_its_input():
     units = Units("s", 1.0, True, True, 2, 1, {"u1": ("valve", "%"), "u2": ("", "V"), "y1": ("level", "")})
     assert [units.label(name) for name in ("r1", "u1", "r2", "y1")] == ["(%)", "valve (%)", "(V)", "level"]
     assert units.header("r2") == "r2 (V)"
+
+
+@pytest.mark.parametrize("lengths", [("duration", 0.5), ("samples", 1)], ids=["in seconds", "in samples"])
+def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
+    """The hint can be copied into the spec, and then suffices."""
+    word, unit = lengths
+    text = (
+        "sample_time: 0.5\nplant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {variance: 1}\n"
+        f"experiment: {{{word}: {{}}}}\naccuracy: {{model_error: {{relative: 0.05}}}}\n"
+        "limits: {amplitude: 0.25}\nspectrum: {type: fir, order: 8}\n"
+    ).replace("{}", "%s")
+    with pytest.raises(InfeasibleError) as caught:
+        solve(parse_spec(text % (400 * unit)))
+    (needed,) = re.findall(rf"experiment\.{word}: ([0-9.]+)", caught.value.diagnostics[0].hint)
+    assert solve(parse_spec(text % needed)).result["signal"]["worst_ratio"] <= 1.0 + 1e-9

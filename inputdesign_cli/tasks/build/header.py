@@ -16,6 +16,7 @@ def build_units(spec: Spec) -> Units:
         inputs=spec.plant.inputs,
         outputs=spec.plant.outputs,
         channels={name: (one.name or "", one.unit or "") for name, one in (spec.channels or {}).items()},
+        by_duration=spec.experiment.duration is not None or spec.limits.duration is not None,
     )
 
 

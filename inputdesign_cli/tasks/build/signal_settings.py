@@ -40,6 +40,7 @@ def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
         settings=build_signal_settings(spec),
         bounds=build_bounds(spec),
         cost=build_cost(spec) or {"excitation": 1.0},
+        units=build_units(spec),
         band=(lo * step, hi * step),
         step=step,
         samples=signal.samples,

@@ -58,7 +58,7 @@ def explain(
         hint += f"; with {longer} samples a spectrum can"
         enough = samples_of_record(longer)
         if enough is not None:
-            hint += f"; with experiment.samples: {enough} (and signal.samples, if stated) a record can"
+            hint += f"; with {units.length(enough)} (and signal.samples, if stated) a record can"
     if _within_reach_of_any(question):
         hint += "; spectrum: {type: free} can meet it"
     if problem.densities and question.limits:
