@@ -328,3 +328,15 @@ def test_what_is_said_is_said_under_the_prior():
     assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
     assert "true plant" in assumptions(question, found.result)[0]
     assert sum("Campi" in source for source in citations(question, found.result)) == 2
+
+
+@pytest.mark.parametrize("listed", ["scenarios: [{dead_time: 900}]", "intervals: {dead_time: [1, 5000]}"])
+def test_a_dead_time_beyond_the_record_is_refused_at_every_plant(listed):
+    text = (
+        "sample_time: 1\nplant: {continuous: {gain: 2, time_constant: 10, dead_time: 2}, sample: zoh}\n"
+        "noise: {variance: 0.04}\nexperiment: {samples: 500}\naccuracy: {model_error: {relative: 0.1}}\n"
+        f"spectrum: {{type: fir, order: 6}}\nuncertainty: {{{listed}}}\n"
+    )
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(text))
+    assert caught.value.diagnostics[0].code == "delay-beyond-record"

@@ -145,6 +145,7 @@ class _Scenarios:
                 return None
         if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
             return None
+        self._check_seen(theta, model)
         experiment = replace(self.experiment, model=model, loop=loop)
         try:
             return Alternative(experiment, *build_asked(self.spec, experiment, self._nominal))
@@ -156,6 +157,20 @@ class _Scenarios:
                 hint=found.hint,
                 key=_KEY,
             ) from error
+
+    def _check_seen(self, theta: Array, model: Model) -> None:
+        """Raise `delay-beyond-record` where a dead time outlasts the experiment, as at the nominal plant."""
+        spec = self.spec
+        if "samples" not in spec.experiment.model_fields_set:
+            return
+        longest = spec.experiment.samples * (1.0 if spec.plant.sampled else spec.sample_time)
+        if longest <= model.memory > self._nominal.memory:
+            raise spec.complain(
+                "delay-beyond-record",
+                f"at the scenario {self._named(theta)} a dead time outlasts the experiment",
+                hint="take more samples, or state the uncertainty more tightly",
+                key=_KEY,
+            )
 
     def _named(self, theta: Array) -> str:
         return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self._nominal.names, theta, strict=True))
