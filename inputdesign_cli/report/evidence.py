@@ -115,6 +115,8 @@ def simulation_table(result: Result) -> Rows | None:
         "mean squared error": _squared_error,
         "theory": lambda entry: _theory(entry.get("theory", {})),
         "mean estimate": lambda entry: listed(entry.get("mean_estimate", [])) if "mse" in entry else "",
+        "deviations over theory": lambda entry: _range(entry.get("deviation_ratio"), entry.get("chance")),
+        "worst over admitted": lambda entry: shown(entry["worst_ratio"]) if "worst_ratio" in entry else "",
         "within r_adm": lambda entry: _share(entry, "within_r_adm"),
         "were the design model true": lambda entry: _share(entry.get("on_design_model", {}), "within_r_adm"),
         "within r_u": lambda entry: _share(entry, "within_r_u"),
@@ -142,6 +144,13 @@ def _share(entry: Result, key: str) -> str:
         return ""
     low, high = (100 * limit for limit in entry[f"{key}_limits"])
     return f"{100 * entry[key]:.1f} %{BREAK}95 % limits {low:.1f} to {high:.1f}"
+
+
+def _range(found: Result | None, chance: Json) -> str:
+    if found is None:
+        return ""
+    low, high = chance
+    return f"{found['least']:.4g} to {found['largest']:.4g}{BREAK}chance {low:.3g} to {high:.3g}"
 
 
 def _mean(entry: Result | None) -> str:

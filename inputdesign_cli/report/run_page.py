@@ -28,7 +28,7 @@ from inputdesign_cli.runs.run_directory import read_run
 
 # Headings and the charts that belong under them; those of data and of simulated runs have their own.
 _SECTIONS = (
-    ("Accuracy", ("bound", "fan")),
+    ("Accuracy", ("bound", "deviations", "fan")),
     ("Spectrum", ("spectrum",)),
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),

@@ -106,6 +106,26 @@ class ResponseCurves(Curves):
 
 
 @dataclass(frozen=True)
+class DeviationPanel:
+    """Standard deviations of an entry of a frequency response, and what is admitted, at lines; all (n,)."""
+
+    frequency: Array
+    G_abs: Array
+    r_adm: Array
+    deviation: Array
+    found: Array | None = None  # of data, or of simulated experiments
+    label: str = ""  # what gave them
+    entry: tuple[int, int] | None = None  # as of `BoundPanel`
+
+
+@dataclass(frozen=True)
+class DeviationCurves(Curves):
+    """Standard deviations of a frequency response, entry by entry."""
+
+    panels: tuple[DeviationPanel, ...]
+
+
+@dataclass(frozen=True)
 class OptimalityCurves(Curves):
     """The equivalence-theorem ratio over frequency: at most one everywhere, one on the support."""
 

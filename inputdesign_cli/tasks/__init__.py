@@ -19,12 +19,11 @@ from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
 from inputdesign_cli.tasks.build.exploration import model_to_judge
-from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.system import build_model
-from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.control_systems import system_of
 from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
@@ -54,7 +53,7 @@ def analyse(spec: Spec) -> Results:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
     with _placed(spec), time_limit(spec.solver.time_limit):
-        return finite(build_given(spec).solve(), most_extreme(spec.content))
+        return finite(build_analysis(spec).solve(), most_extreme(spec.content))
 
 
 def validate(spec: Spec) -> None:

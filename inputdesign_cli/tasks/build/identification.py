@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.accuracy.calibration import with_alpha
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
@@ -37,6 +37,12 @@ def build_identification(spec: Spec) -> Identification:
             "a regression is no model of a plant that could be estimated from u and y",
             hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
             key="plant",
+        )
+    if spec.accuracy.frequency_response is not None:
+        raise refuse(
+            "accuracy.frequency_response",
+            what="estimate a parametric model for a frequency response",
+            hint="remove it, or ask for a model_error",
         )
     nominal = build_model(spec)
     stated = stated_prior(spec)
