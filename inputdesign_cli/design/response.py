@@ -9,7 +9,7 @@ limits on powers the best design has every line in proportion to that; with them
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -38,11 +38,21 @@ class UnreachableError(IdesignError):
 
 @dataclass(frozen=True)
 class ResponseLines:
-    """What is measured at L lines: G (L, p, r), the noise Phi_v (L, p), and r_adm (L, p, r)."""
+    """What is measured at L lines: G (L, p, r), the noise Phi_v (L, p), and r_adm (L, p, r).
+
+    `share`: r_adm is this much of |G|; None where it does not depend on G.
+    """
 
     G: ComplexArray
     noise: Array
     admitted: NDArray[np.float64]
+    share: float | None = None
+
+    def at(self, G: ComplexArray) -> ResponseLines:
+        """The same lines with another G (L, p, r); what is not bounded is not bounded there."""
+        if self.share is None:
+            return replace(self, G=G)
+        return replace(self, G=G, admitted=np.where(np.isinf(self.admitted), np.inf, self.share * np.abs(G)))
 
     def needed(self, samples: int) -> NDArray[np.float64]:
         """(L, r): the least powers with which deviations over so many samples are those admitted."""

@@ -89,13 +89,21 @@ def response_at(U: ComplexArray, Y: ComplexArray) -> ComplexArray:
 
 
 def periodic_response(
-    u: Array, y: Array, periods: Periods, harmonics: NDArray[np.int_]
+    u: Array, y: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
 ) -> PeriodicResponse | None:
-    """From one record (N, r) and (N, p) with as many blocks as inputs; None where lines cannot be told apart.
+    """From a record (N, r) and (N, p) with as many blocks as inputs; None where lines cannot be told apart.
 
     Two periods or more count.
+
+    Args:
+        repeats: how many records of equal length with the same input follow each other.
     """
-    U, Y = (periods.transforms(signal)[:, :, harmonics] for signal in (u, y))
+    U, Y = (
+        np.concatenate(
+            [periods.transforms(one)[:, :, harmonics] for one in np.split(signal, repeats)], axis=1
+        )
+        for signal in (u, y)
+    )
     kept = U.shape[1]
     inputs, outputs = (np.moveaxis(part.mean(axis=1), 0, -1) for part in (U, Y))
     if not harmonics.size or np.any(np.linalg.cond(inputs) > 1.0 / _EXCITED):

@@ -13,7 +13,7 @@ _SPREAD = "{:.4g} ± {:.2g}"
 def estimate_table(result: Result) -> Rows | None:
     """The estimated parameters with their standard deviations."""
     found = result.get("identification")
-    if found is None:
+    if found is None or "theta" not in found:
         return None
     deviations = found["standard_deviation"]
     rows = tuple((name, f"{v:.6g}", f"{deviations[name]:.2g}") for name, v in found["theta"].items())
@@ -55,6 +55,9 @@ def _per_cent(fit: Json) -> str:
 def estimate_answer(result: Result) -> str:
     """What the data amount to."""
     assessment = result.get("assessment")
+    if assessment is None and "theta" not in result["identification"]:
+        number = result["frequency_response"]["frequencies"]
+        return f"The frequency response was measured at {number} frequencies."
     if assessment is None:
         return f"The model was estimated from {result['samples']} samples."
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in verdict(result))

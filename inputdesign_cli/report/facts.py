@@ -35,7 +35,7 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
         yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
-    if "frequency_response" in result and "lines" in result["frequency_response"]:
+    if "worst_ratio" in result.get("frequency_response", {}):
         yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
         told = error["confidence"]
@@ -120,7 +120,7 @@ def proofs(result: Result) -> Iterator[str]:
     """What is proved of other experiments."""
     found = result.get("objective", {})
     family = f"no {result.get('spectrum', {}).get('type', 'such')} spectrum gets"
-    if "frequency_response" in result:
+    if "frequency_response" in result and "objective" in result:
         family = "no powers of these lines get"
     if "moments" in result:
         family = f"no {result['moments']['structure']} moments get"

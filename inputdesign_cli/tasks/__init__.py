@@ -22,11 +22,13 @@ from inputdesign_cli.tasks.build.exploration import model_to_judge
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.response import build_measurement
 from inputdesign_cli.tasks.build.system import build_model
 from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.control_systems import system_of
 from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
+from inputdesign_cli.tasks.measured_response import measure
 
 if TYPE_CHECKING:
     import control
@@ -83,6 +85,7 @@ def identify(
     remove_means: bool = False,
     operating_point: Mapping[str, float] | None = None,
     preparation: Preparation | None = None,
+    frequency_response: bool = False,
 ) -> Results:
     """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
 
@@ -92,6 +95,8 @@ def identify(
         remove_means: whether to take the means of u and y away, file by file.
         operating_point: what to take away from a channel, by name: {"u1": 40, "y1": 52.3}.
         preparation: what else to do to the records before.
+        frequency_response: whether to measure the frequency response without a model instead, at the lines of
+            `accuracy.frequency_response` where the spec has it.
 
     Raises:
         SpecError: the plant is not supported.
@@ -99,6 +104,9 @@ def identify(
     """
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
+        if frequency_response:
+            measured, _ = measure(build_measurement(spec), _paths(data), known)
+            return finite(measured, most_extreme(spec.content))
         found = identify_records(build_identification(spec), _paths(data), known)
         return finite(found, most_extreme(spec.content))
 
@@ -123,6 +131,10 @@ def assess(
     """
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
+        if spec.accuracy.frequency_response is not None:
+            results, judged = measure(build_measurement(spec), _paths(data), known, assess=True)
+            assert judged is not None  # the spec has lines
+            return Assessment(judged.verdict, finite(results, most_extreme(spec.content)))
         return assess_records(build_identification(spec), _paths(data), known)
 
 

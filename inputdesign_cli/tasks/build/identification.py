@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.accuracy.calibration import with_alpha
-from inputdesign_cli.errors import bad_spec, refuse
+from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
@@ -38,12 +38,6 @@ def build_identification(spec: Spec) -> Identification:
             hint="write the plant as polynomials A, B, F in q^-1, or in s under continuous",
             key="plant",
         )
-    if spec.accuracy.frequency_response is not None:
-        raise refuse(
-            "accuracy.frequency_response",
-            what="estimate a parametric model for a frequency response",
-            hint="remove it, or ask for a model_error",
-        )
     nominal = build_model(spec)
     stated = stated_prior(spec)
     if stated is not None:
@@ -53,14 +47,14 @@ def build_identification(spec: Spec) -> Identification:
         header=build_header(spec),
         nominal=nominal,
         assessable=bool(spec.accuracy.requirements),
-        operating_point=_operating_point(spec),
+        operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
         at=lambda model, samples, factor, source: _question(_restated(spec, model, source), samples, factor),
     )
 
 
-def _operating_point(spec: Spec) -> dict[str, float]:
+def operating_point(spec: Spec) -> dict[str, float]:
     """`signal.offset`, about which u varies; in closed loop r does, and nothing is known of u."""
     if spec.closed_loop or spec.signal.offset is None:
         return {}

@@ -15,6 +15,7 @@ from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import GivenMultisine
 from inputdesign_cli.tasks.build.header import build_header, build_units
+from inputdesign_cli.tasks.build.identification import operating_point
 from inputdesign_cli.tasks.build.limits import build_power_limits
 from inputdesign_cli.tasks.build.line_grid import build_grid, build_periods, stated_response
 from inputdesign_cli.tasks.build.model_error import positive_table
@@ -22,6 +23,7 @@ from inputdesign_cli.tasks.build.signal_settings import build_record_request
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.system import build_cost, build_model
 from inputdesign_cli.tasks.build.tables import has_column
+from inputdesign_cli.tasks.measured_response import Measurement
 from inputdesign_cli.tasks.response import KEY, ResponseTask
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
@@ -59,7 +61,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
         1 if goal == "samples" else periods.blocks * periods.kept(spec.experiment.samples) * periods.period
     )
     G = model.plant_at(grid.frequencies)
-    lines = ResponseLines(G, _noise(spec, model, grid), _admitted(spec, grid, G))
+    lines = ResponseLines(G, _noise(spec, model, grid), _admitted(spec, grid, G), stated.relative)
     experiment = Experiment(model, counted)
     return ResponseTask(
         header=build_header(spec),
@@ -77,6 +79,21 @@ def build_response_task(spec: Spec) -> ResponseTask:
         asked=spec.experiment.samples,
         record=build_record_request(spec, experiment.size),
         simulation=build_simulation(spec, experiment),
+    )
+
+
+def build_measurement(spec: Spec) -> Measurement:
+    """How a frequency response is measured by data: the lines of the spec, or what the data excite.
+
+    Raises:
+        SpecError, DataError: see `build_response_task`.
+    """
+    asked = spec.accuracy.frequency_response is not None
+    return Measurement(
+        header=build_header(spec),
+        model=build_model(spec),
+        task=build_response_task(spec) if asked else None,
+        operating_point=operating_point(spec),
     )
 
 
