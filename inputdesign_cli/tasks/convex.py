@@ -14,16 +14,11 @@ from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
 from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time, seconds_left, what_ended
-from inputdesign_cli.design.convex.designs import (
-    Design,
-    Question,
-    UnfinishedDesignError,
-    solve_design,
-    white_power,
-    whitened_problem,
-)
+from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
+from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.designs import Design, UnfinishedDesignError, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
-from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
@@ -414,7 +409,7 @@ class ConvexTask:
         optimality = optimality_curves(units, design)
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
-        shown = white if problem.needs_definite else None
+        shown = white if problem.demands.definite else None
         ellipses = experiment_ellipses(done.experiment, done.information, shown, self.ellipses)
         if ellipses is not None:
             curves["ellipses"] = ellipses

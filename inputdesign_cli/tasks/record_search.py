@@ -9,8 +9,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from inputdesign_cli.design.convex.designs import Design, Question, solve_design
+from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.runs.results import Json

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve
-from inputdesign_cli.design.convex.designs import Alternative, solve_design
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from inputdesign_cli.design.convex.designs import Question
 from inputdesign_cli.design.convex.problem import Goal
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
