@@ -68,7 +68,9 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     more = ", .." if len(found["active"]) > len(bound) else ""
     left = f"; {found['discarded']} are left out" if found["discarded"] else ""
     drawn = "listed" if found["source"] == "scenarios" else "drawn"
-    again = f"{found['rejected']} unstable ones were drawn again" if found["rejected"] else ""
+    again = (
+        f"{found['rejected']} that were unstable, or no plants, were drawn again" if found["rejected"] else ""
+    )
     yield "plants", f"what is asked holds at the plant of the spec and {kept} {drawn}{left}", again
     if bound:
         yield "binding", ", ".join(bound) + more, ""

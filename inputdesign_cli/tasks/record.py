@@ -33,6 +33,7 @@ from inputdesign_cli.tasks.shortest_record import shortest_record
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
 _FALLS_SHORT = 5e-3
+_DEAR = 1.0  # beyond the cost of the design, relative to it
 _TAKES_PART = 1e-6
 _NO_RECORD = (
     "there is no record: it would have {} samples, and at most {} are computed for this model; "
@@ -265,6 +266,12 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
             f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; the limits on the "
             "powers, the level asked for or its length leave no room: a little more power or a few more "
             "samples would do"
+        )
+    if record.method != "given" and record.extra_power > _DEAR:
+        notes.append(
+            f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its "
+            f"{len(record.samples)} samples are few beside the dead times and time constants of the plant, "
+            "and much of what they cause comes after the last one; take more samples"
         )
     asked = request.samples or experiment
     if record.method != "given" and len(record.samples) > asked + request.settings.block:

@@ -44,6 +44,25 @@ spectrum: {type: fir, order: 3}
 signal: {candidates: 1, seed: 1}
 solver: {any_spectrum_tolerance: 0.009}
 """
+PROCESS = """
+sample_time: 1
+plant: {continuous: {gain: 2, time_constant: 10, dead_time: 2}, sample: zoh}
+noise: {variance: 0.04}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 8}
+"""
+PHYSICAL = """
+sample_time: 1
+plant:
+  parameters: {K: 2, T: 15}
+  continuous: {numerator: ["sqrt(K)/(T - 5)"], denominator: ["T", 1]}
+  sample: zoh
+noise: {variance: 0.04}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 8}
+"""
 COVARIANCE = "[[0.01, 0, 0], [0, 0.001, 0], [0, 0, 0.0004]]"
 
 
@@ -167,6 +186,20 @@ def test_the_risk_sets_the_number_of_plants():
         assert len(build_convex(spec).plants.batch.plants) == number
 
 
+@pytest.mark.parametrize(
+    ("text", "intervals", "name"),
+    [(PROCESS, "dead_time: [-1, 4]", "dead_time"), (PHYSICAL, "K: [-1, 3]", "K")],
+)
+def test_what_is_no_plant_is_drawn_again_and_counted(text, intervals, name):
+    """A fifth of the interval is a negative dead time; the root of a negative number is no gain."""
+    prior = f"uncertainty={{intervals: {{{intervals}}}, scenarios: 40, seed: 1}}"
+    batch = build_convex(parse_spec(text, overrides=[prior])).plants.batch
+    assert len(batch.plants) == 40
+    assert 2 <= batch.rejected <= 25
+    index = batch.plants[0].experiment.model.names.index(name)
+    assert np.all(batch.thetas[:, index] >= 0.0)
+
+
 def test_unstable_loops_are_drawn_again_and_counted():
     """In this loop f1 < -1.02 or so is unstable."""
     prior = "intervals: {f1: [-1.2, -0.6]}, scenarios: 60, seed: 3"
@@ -216,6 +249,15 @@ def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
     [
         (FIRST, "scenarios: [{f1: -0.6}, {a1: 0.3}]", "unknown-parameter", "uncertainty.scenarios[1]"),
         (FIRST, "scenarios: [{f1: -1.6}]", "no-stable-plant", "uncertainty.scenarios[0]"),
+        (FIRST, "scenarios: [{f1: -1.0}]", "no-stable-plant", "uncertainty.scenarios[0]"),
+        (FIRST, "scenarios: [{c1: 1.0}]", "no-stable-plant", "uncertainty.scenarios[0]"),
+        (PROCESS, "scenarios: [{time_constant: 1.0e-3, dead_time: 2.0}]", "without-effect", "uncertainty"),
+        (FIRST, "scenarios: [{b1: 3}, {b1: 0}]", "not-a-plant", "uncertainty.scenarios[1]"),
+        (PROCESS, "scenarios: [{gain: 0}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PROCESS, "scenarios: [{time_constant: 0}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PROCESS, "scenarios: [{dead_time: -1.0e-3}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PHYSICAL, "scenarios: [{K: -1}]", "not-a-plant", "uncertainty.scenarios[0]"),
+        (PHYSICAL, "scenarios: [{T: 5}]", "not-a-plant", "uncertainty.scenarios[0]"),
         (FIRST, "covariance: [[1, 0], [0, 1]]", "wrong-shape", "uncertainty.covariance"),
         (FIRST, "covariance: [[1, 0], [0, 1]], parameters: [b1, b9]", "unknown-parameter",
          "uncertainty.covariance"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from inputdesign_cli.identification import Estimate, Extension, ScoreTest
 from inputdesign_cli.plant import Model
 
@@ -67,6 +69,25 @@ def differences(estimate: Estimate, files: Sequence[str]) -> list[str]:
     return [
         f"{name} and {against} are not of one system (probability {probability:.1e} that their parameters "
         "differ as much by chance): assess each alone, and look for what has changed between them"
+    ]
+
+
+def repetitions(estimate: Estimate, files: Sequence[tuple[str, int]]) -> list[str]:
+    """What to say where samples seem to be given twice; `files` are names and numbers of samples."""
+    found = estimate.repeated
+    if found is None:
+        return []
+    ends = np.cumsum([samples for _, samples in files])
+    # By their middle: the ends are not sharp.
+    first, second = (
+        files[int(np.searchsorted(ends, at + found.length // 2, side="right"))][0]
+        for at in (found.first, found.second)
+    )
+    where = f"{second} repeat" if first == second else f"{second} are those of {first}"
+    return [
+        f"about {found.length} samples of {where}: their residuals follow each other as those of no "
+        "two experiments do, and counted twice they make the estimate look surer than it is; give each "
+        "sample once"
     ]
 
 
