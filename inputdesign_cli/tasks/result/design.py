@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement
+from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.designs import Design
@@ -23,6 +23,7 @@ from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
 
 # A limit binds when the design uses all but this share of it.
+_ROUNDING = 1e-9
 _BINDS = 1e-6
 # Below this share of its largest price, power at a frequency is called free of charge.
 _FREE = 1e-3
@@ -263,10 +264,28 @@ def _notes(done: Designed) -> list[str]:
         sources += ["experiment.prior"] if experiment.prior is not None else []
         known = " and ".join(sources) or "the noise"
         return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
-    notes = _left_out(done) + _too_short(experiment)
+    notes = _left_out(done) + _too_short(experiment) + _as_large_as_the_plant(done)
     if units.closed_loop and not found.basis.has_density:
         notes += _free_of_charge(done)
     return notes
+
+
+def _as_large_as_the_plant(done: Designed) -> list[str]:
+    """Requirements that leave even the sign of G open."""
+    notes = []
+    for requirement in model_errors(done.problem.requirements):
+        size, admitted = (
+            requirement.nominal_size(requirement.grid),
+            requirement.admissible.at(requirement.grid),
+        )
+        acts = size > 0.0
+        least = float(np.min(admitted[acts] / size[acts], initial=np.inf))
+        if 1.0 - _ROUNDING <= least < np.inf:
+            notes.append(
+                f"the admissible error is {least:.4g} times |G| or more at every frequency of its band: a "
+                "model that meets it may have the wrong sign (relative: 0.1 means 10 %)"
+            )
+    return list(dict.fromkeys(notes))
 
 
 def _too_short(experiment: Experiment) -> list[str]:
