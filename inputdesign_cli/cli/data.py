@@ -171,8 +171,8 @@ def preparation(
     Raises:
         typer.BadParameter: One of them cannot be read.
     """
+    from inputdesign_cli.tasks.build.columns import TIME_UNITS
     from inputdesign_cli.tasks.build.preparation import DETRENDS, Preparation
-    from inputdesign_cli.tasks.build.signals import TIME_UNITS
 
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise typer.BadParameter("it is a positive number", param_hint="--sample-time")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -13,6 +12,16 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.columns import (
+    SECONDS,
+    channel_columns,
+    other_units,
+    reference_columns,
+    time_column,
+    time_unit_of,
+    unused_columns,
+    with_names,
+)
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import (
     EVEN,
@@ -26,9 +35,7 @@ from inputdesign_cli.tasks.build.preparation import (
     trend,
     whole_segments,
 )
-from inputdesign_cli.tasks.build.signals import SECONDS, Signals, signals_of, time_unit_of
-
-_CHANNEL = re.compile(r"([uy])(\d+)(?![a-z0-9]).*")
+from inputdesign_cli.tasks.build.tables import columns_of, is_dated
 
 
 @dataclass(frozen=True)
@@ -83,6 +90,70 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
     )
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What stands in the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
+
+    Attributes:
+        time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
+        dated: whether the times stand as dates; they are counted in seconds then.
+        inputs, outputs: what notes call the columns of u and y.
+    """
+
+    sheet: Sheet
+    time: Array
+    name: str
+    dated: bool
+    u: Array
+    y: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+def signals_of(
+    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Sequence[str] = ()
+) -> Signals:
+    """The columns of so many channels; those of `references` follow the inputs.
+
+    Raises:
+        DataError: a column is missing, or holds text or nothing.
+    """
+    wanted = {
+        **channel_columns("u", inputs, sheet, preparation),
+        **channel_columns("y", outputs, sheet, preparation),
+        **{name: name for name in references},
+        **time_column(sheet, preparation),
+    }
+    found = columns_of(sheet, wanted)
+    for role, numbers in found.items():
+        if np.isnan(numbers).all():
+            message = f"the column {wanted[role]} holds no number"
+            raise DataError(sheet.error("data-not-a-number", message, "is it another column?", 0))
+    rows = np.arange(preparation.skip, len(sheet.lines))
+    time = found.get("time", np.arange(len(sheet.lines), dtype=float))
+    if preparation.span is not None:
+        begin, end = preparation.span
+        scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
+        rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
+    if not rows.size:
+        message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
+        raise DataError.because("data-unreadable", message, "mind --skip and --range", sheet.key)
+    kept = replace(
+        sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
+    )
+    driving = (*_labels("u", inputs), *references)
+    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
+    y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
+    name = wanted.get("time", "")
+    dated = bool(name) and is_dated(sheet, name)
+    return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
+
+
+def _labels(letter: str, count: int) -> tuple[str, ...]:
+    """What notes call channels: u, or u1, u2, .. of several."""
+    return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
 
 
 def prepared(
@@ -156,13 +227,15 @@ def _worst_step(time: Array, step: float) -> int:
 def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) -> Data:
     """One file, which the notes name if asked to."""
     sheet = read_sheet(path, key="")
-    references = _references(units, sheet.header)
+    references = reference_columns(units, sheet.header)
+    preparation = with_names(sheet, units, preparation)
     signals = signals_of(sheet, units.inputs, units.outputs, preparation, references)
-    if signals.dated:
-        signals = replace(signals, time=signals.time / SECONDS[units.time_unit])
+    unit = "s" if signals.dated else preparation.time_unit
+    if unit is not None and signals.name:
+        signals = replace(signals, time=signals.time * (SECONDS[unit] / SECONDS[units.time_unit]))
     _check_steps(signals, units, preparation)
     segments, told = prepared(signals, units.sample_time, units.time_unit, preparation)
-    told += _unused(sheet, units, preparation)
+    told += [*unused_columns(sheet, units, preparation), *other_units(sheet, units, preparation)]
     inputs = np.concatenate([part.u for part in segments])
     return Data(
         inputs[:, : units.inputs],
@@ -194,33 +267,6 @@ def _check_different(paths: Sequence[Path], parts: Sequence[Data]) -> None:
                 )
 
 
-def _unused(sheet: Sheet, units: Units, preparation: Preparation) -> list[str]:
-    """Columns that are called as channels are, of which the plant has fewer."""
-    counts = {"u": units.inputs, "y": units.outputs}
-    found = [(name, _CHANNEL.fullmatch(name)) for name in sheet.header]
-    extra = [
-        name
-        for name, match in found
-        if match and int(match[2]) > counts[match[1]] and name not in preparation.columns.values()
-    ]
-    if not extra:
-        return []
-    verb = "is" if len(extra) == 1 else "are"
-    return [
-        f"{', '.join(extra)} {verb} not used: the plant of the spec has {units.inputs} inputs and "
-        f"{units.outputs} outputs; what such an input causes counts as noise here"
-    ]
-
-
-def _references(units: Units, header: Sequence[str]) -> Sequence[str]:
-    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
-    if not units.closed_loop:
-        return []
-    if units.inputs == 1:
-        return [name for name in ("r1", "r") if name in header][:1]
-    return list(units.excitations) if set(units.excitations) <= set(header) else []
-
-
 @contextmanager
 def blaming_columns(path: Path) -> Iterator[None]:
     """Lays what an estimator says against the signals at the columns of the file that they came from.
@@ -249,10 +295,10 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         DataError: `data-wrong-unit` or `data-not-uniform`.
     """
     sheet = signals.sheet
-    unit = None if signals.dated else preparation.time_unit or time_unit_of(signals.name)
+    unit = None if signals.dated or preparation.time_unit else time_unit_of(signals.name)
     if unit is not None and unit != units.time_unit:
         message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
-        hint = f"set time_unit: {unit} (and sample_time in it), or convert the column"
+        hint = f"add --time-unit {unit} to convert them, or set time_unit: {unit} (and sample_time in it)"
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)

@@ -11,10 +11,10 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.data import prepared
+from inputdesign_cli.tasks.build.columns import time_unit_of
+from inputdesign_cli.tasks.build.data import prepared, signals_of
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.signals import signals_of, time_unit_of
 
 _CHANNELS = {
     "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),

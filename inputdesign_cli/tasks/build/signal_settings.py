@@ -9,9 +9,9 @@ from inputdesign_cli.runs.results import Table
 from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.columns import SECONDS
 from inputdesign_cli.tasks.build.demand import check_record, longest_record
 from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.signals import SECONDS
 from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
 
