@@ -139,7 +139,9 @@ class ConvexTask:
         try:
             made = self._recorded(done)
         except OutOfTimeError:
-            made = Made(None, self.record, done.design, notes=(no_record_in_time(),))
+            made = Made(
+                None, self.record, done.design, notes=(no_record_in_time(self.record.settings.candidates),)
+            )
         record = made.record
         tables, curves = self._illustrations(done, record)
         if self.plants is not None:
