@@ -113,7 +113,9 @@ class ConvexTask:
             if self.exact is not None:
                 made = self.exact.recorded(done, made, self.record, partial(self._known, done))
         except OutOfTimeError:
-            made = Made(None, self.record, done.design, notes=(no_record_in_time(),))
+            made = Made(
+                None, self.record, done.design, notes=(no_record_in_time(self.record.settings.candidates),)
+            )
         record = made.record
         tables, curves = self._illustrations(done, record)
         if self.plants is not None:
