@@ -179,7 +179,7 @@ def preparation(
     Raises:
         typer.BadParameter: One of them cannot be read.
     """
-    from inputdesign_cli.tasks.build.data import TIME_UNITS
+    from inputdesign_cli.tasks.build.columns import TIME_UNITS
     from inputdesign_cli.tasks.build.preparation import DETRENDS, Preparation
 
     if sample_time is not None and not 0.0 < sample_time < math.inf:

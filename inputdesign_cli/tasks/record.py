@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.design.convex.cost import Weight, weights_of
+from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.design.convex.problem import FEW, Weight, weights_of
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
@@ -289,7 +290,7 @@ def shortfall(design: Design, record: Record, information: Array) -> list[str]:
     """
     problem, notes = design.problem, []
     best = float(np.sqrt(design.result.objective))
-    if problem.goal == "factor" and problem.stated_criterion is None:
+    if problem.goal == "factor" and problem.demands.criterion is None:
         more = record.worst_ratio / best - 1.0
         if more > _FALLS_SHORT:
             notes.append(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
     Coloured,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.designs import Alternative
+from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
