@@ -44,7 +44,11 @@ _PREDICTION_ERROR = (
 def assumptions(question: Question, result: Result) -> list[str]:
     """What the numbers rest on, beyond the arithmetic."""
     rests = "The design is best" if "objective" in result else "The figures hold"
-    if "identification" in result:
+    if result.get("frequency_response", {}).get("method"):
+        said = [
+            "The plant is linear and in steady state; the noise is that which the scatter of the data tells."
+        ]
+    elif "identification" in result:
         from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."
         chosen = "Orders and delays were chosen by what the model simulates of data that it has not seen."
         said = [chosen if "exploration" in result else from_spec]

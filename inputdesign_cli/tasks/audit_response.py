@@ -13,7 +13,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.problem import weights_of
+from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, Results

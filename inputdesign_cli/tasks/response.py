@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.design.convex.cost import Weight, weights_of
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Weight, weights_of
 from inputdesign_cli.design.response import (
     Goal,
     ResponseDesign,

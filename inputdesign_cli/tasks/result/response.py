@@ -10,8 +10,8 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Weight, weighted_sum
 from inputdesign_cli.design.response import Goal, ResponseDesign, ResponseLines, ResponseProblem
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
