@@ -78,6 +78,7 @@ class BoundPanel:
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
     entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
+    names: str = ""  # of the input and the output, where the user gave them
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,8 @@ class ResponsePanel:
     G: NDArray[np.complex128]
     radius: Array
     model: NDArray[np.complex128]
-    entry: tuple[int, int] | None = None  # as of `BoundPanel`
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,8 @@ class ErrorBandPanel:
     quantiles: Mapping[float, Array]  # probability -> (n,)
     r_u: Array | None = None
     r_adm: Array | None = None
-    entry: tuple[int, int] | None = None  # as in `BoundPanel`
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
 
 
 @dataclass(frozen=True)
