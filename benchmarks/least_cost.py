@@ -36,7 +36,7 @@ import cvxpy as cp  # noqa: E402
 import numpy as np  # noqa: E402
 
 from inputdesign_cli import load_spec  # noqa: E402
-from inputdesign_cli.design.convex.designs import white_power, whitened_problem  # noqa: E402
+from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem  # noqa: E402
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange  # noqa: E402
 from inputdesign_cli.design.convex.problem import Problem  # noqa: E402
 from inputdesign_cli.spectrum import LinesBasis  # noqa: E402
@@ -66,7 +66,7 @@ def prepared(bound: str, order: int) -> tuple[Problem, float]:
     power = white_power(task.question)
     problem = whitened_problem(task.question, power)
     # Caches only of what both start from. Those of the requirement are left to be timed.
-    _ = problem.information_map, problem.price, problem.grid, problem.baseline_information
+    _ = problem.information_map, problem.price, problem.gradients.grid, problem.baseline_information
     return problem, power
 
 
@@ -96,7 +96,7 @@ def ours(problem: Problem, power: float) -> ExchangeResult:
 
 def anywhere(problem: Problem, power: float) -> ExchangeResult:
     """The optimum over every spectrum, with its proof."""
-    lines = LinesBasis.anywhere(problem.grid)
+    lines = LinesBasis.anywhere(problem.gradients.grid)
     return exchange(replace(problem, basis=lines), power * lines.flat, tolerance=1e-6)
 
 
@@ -149,7 +149,7 @@ def compare(bound: str, order: int) -> dict[str, float | str]:
         "textbook_with_binding_frequencies": checked,
         "difference_on_grid": abs(on_grid - mine.objective) / mine.objective,
         "difference_with_binding_frequencies": abs(checked - mine.objective) / mine.objective,
-        "worst_ratio": problem.worst_ratio(mine.informations).ratio,
+        "worst_ratio": problem.demands.worst_ratio(mine.informations).ratio,
     }
 
 

@@ -16,7 +16,8 @@ import time
 from pathlib import Path
 
 from inputdesign_cli import parse_spec
-from inputdesign_cli.design.convex.designs import Design, Question, solve_design
+from inputdesign_cli.design.convex.designs import Design, solve_design
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.result.robust import robust_result
 

@@ -10,14 +10,14 @@ from inputdesign_cli.accuracy.admissible import (
     Weighted as Weighted,
 )
 from inputdesign_cli.accuracy.criteria import Criterion as Criterion, criterion_of as criterion_of
-from inputdesign_cli.accuracy.cuts import (
+from inputdesign_cli.accuracy.cut import (
     ConcaveFunction as ConcaveFunction,
     Cut as Cut,
     CutBlock as CutBlock,
     Inequality as Inequality,
-    MatrixCut as MatrixCut,
     positive_part as positive_part,
 )
+from inputdesign_cli.accuracy.cuts import MatrixCut as MatrixCut
 from inputdesign_cli.accuracy.ellipsoid import EllipsoidError as EllipsoidError
 from inputdesign_cli.accuracy.information_target import InformationTarget as InformationTarget
 from inputdesign_cli.accuracy.model_error import (

@@ -17,7 +17,8 @@ from typing import Literal
 import numpy as np
 import scipy.linalg
 
-from inputdesign_cli.accuracy.cuts import Cut, DeterminantCut, MatrixCut, TraceCut, VarianceCut
+from inputdesign_cli.accuracy.cut import Cut
+from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut
 from inputdesign_cli.accuracy.requirement import OneCondition, Requirement
 from inputdesign_cli.plant.polynomial import Array
 

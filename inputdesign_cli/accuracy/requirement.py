@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inputdesign_cli.accuracy.cuts import Cut
+from inputdesign_cli.accuracy.cut import Cut
 from inputdesign_cli.plant.polynomial import Array
 
 Entry = tuple[int, int]

@@ -80,6 +80,11 @@ def what_ended() -> str:
     return "the interrupt" if was_stopped() else "solver.time_limit"
 
 
+def more_time() -> str:
+    """What gives a computation more of it, as a demand."""
+    return "let it run to its end" if was_stopped() else "raise solver.time_limit"
+
+
 def out_of_time(reached: str) -> OutOfTimeError:
     """The error, with a sentence on what was reached."""
     when = "before the interrupt" if was_stopped() else "within solver.time_limit"
@@ -87,6 +92,6 @@ def out_of_time(reached: str) -> OutOfTimeError:
     return OutOfTimeError.because(
         "out-of-time",
         f"{told}: {reached}" if reached else told,
-        hint="raise solver.time_limit (in seconds), lower the orders, or ask for a shorter signal",
+        hint=f"{more_time()}, lower the orders, or ask for a shorter signal",
         key="solver.time_limit",
     )

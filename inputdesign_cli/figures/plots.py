@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from inputdesign_cli.figures.bound import draw_bound
 from inputdesign_cli.figures.campaign import draw_campaign, draw_estimates, draw_trade, draw_true_ratio
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
+from inputdesign_cli.figures.deviations import draw_deviations
 from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.exploration import draw_orders
 from inputdesign_cli.figures.fan import draw_fan
@@ -27,6 +28,7 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.BoundCurves: draw_bound,
     of.CampaignCurves: draw_campaign,
     of.CloudCurves: draw_cloud,
+    of.DeviationCurves: draw_deviations,
     of.DirectionCurves: draw_directions,
     of.EllipseCurves: draw_ellipses,
     of.EstimateCurves: draw_estimates,

@@ -23,7 +23,9 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     grid = page.subplots(len(channels), 2, sharey="row", squeeze=False, width_ratios=[5, 1])
     for (name, values), (record, histogram) in zip(channels, grid, strict=True):
         _draw_record(record, curves.time[:shown], values[:shown])
-        record.set_ylabel(curves.labels.get(name) or f"{name[0]}{name[1:].translate(LOWERED)}(t)")
+        label, symbol = curves.labels.get(name, ""), f"{name[0]}{name[1:].translate(LOWERED)}(t)"
+        nameless = not label or label.startswith("(")  # a unit alone
+        record.set_ylabel(f"{symbol} {label}".strip() if nameless else label)
         _draw_histogram(histogram, values)
         for bound in curves.limits.get(name, ()):
             for axes in (record, histogram):

@@ -14,8 +14,8 @@ from inputdesign_cli.plant.polynomial import Array
 # A direction is not excited where gradients change by more than this share of themselves when they are
 # rounded otherwise.
 _UNCERTAIN = 0.03
-# Residuals of this power relative to the output are rounding.
-_EXACT = 1e-20
+# Residuals of this power relative to the output are rounding, of files with eight digits.
+_EXACT = 1e-16
 # Correlation matrices of residuals with a smaller eigenvalue are singular but for rounding.
 _COMBINED = 1e-13
 # Fewer samples than this for each parameter say nothing about a covariance.

@@ -18,6 +18,7 @@ from inputdesign_cli.identification.one_system import of_one_system
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
 from inputdesign_cli.identification.records import Records
+from inputdesign_cli.identification.repeated import Repetition, repetition
 from inputdesign_cli.identification.residual_tests import ResidualTest, cross_correlations, whiteness
 from inputdesign_cli.identification.rivals import Rival
 from inputdesign_cli.identification.search import Search
@@ -47,6 +48,7 @@ class Estimate:
         lengths: the samples of each of the records, which follow each other.
         rivals: other minima that explain the data nearly as well.
         alike: of several experiments, the probability that each differs as much from the others.
+        repeated: where errors come again, as those of samples that are given twice.
         whiteness, independence: of the residuals, and of residuals and past inputs, all channels at once;
             their correlations are (lags, p, p) and (lags, p, r).
         tests: of the structure, and `directed` of one parameter more; `failed` tells which of them refute it.
@@ -72,6 +74,7 @@ class Estimate:
     directed: tuple[Directed, ...]
     alike: tuple[float, ...]
     rivals: tuple[Rival, ...]
+    repeated: Repetition | None
 
     @cached_property
     def information(self) -> Array:
@@ -181,6 +184,7 @@ def concluded(
         directed=directed_tests(records, point, extensions),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
+        repeated=repetition(point.errors),
     )
 
 

@@ -24,6 +24,7 @@ RELATIVE_ERROR = 1e-11
 _PHASE_PER_PANEL = 16.0
 _MAX_REFINEMENTS = 4
 _ROUNDING = 1e-7
+_ON_AXIS = 1e-6
 _NONE = np.zeros(0)
 
 
@@ -115,8 +116,8 @@ def integrate(
     parameters are nearly indistinguishable), which no rule can mend.
 
     Raises:
-        InaccurateError: `integral-inaccurate` when refinement does not settle the integrals
-            to 1e-11 of the largest entry (a pole on the axis itself).
+        InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:
+            `integral-inaccurate` for a pole on the axis itself, `numerically-singular` where there is none.
     """
 
     def rule_of(refine: int) -> Quadrature:
@@ -133,6 +134,16 @@ def integrate(
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
             return fine
         coarse, earlier = fine, change
+    off = np.hypot(singularities.real - np.clip(singularities.real, lo, hi), singularities.imag)
+    if off.min(initial=np.inf) > _ON_AXIS:
+        raise InaccurateError.because(
+            "numerically-singular",
+            "an integral of the information matrix did not settle: parameters have so nearly the same effect "
+            "on the samples that what tells them apart is rounding",
+            hint="look for dynamics much faster than the sampling, for orders too high, or for poles and "
+            "zeros that nearly cancel; plant.known takes what need not be estimated",
+            key="plant",
+        )
     raise InaccurateError.because(
         "integral-inaccurate",
         "an integral of the information matrix did not settle: the integrand has a pole on, "

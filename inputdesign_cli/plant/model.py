@@ -55,6 +55,10 @@ class Model(Protocol):
         """(k,): values of the parameters."""
 
     @property
+    def flaw(self) -> str | None:
+        """What makes the parameters none of a plant, as a negative dead time; None where nothing does."""
+
+    @property
     def in_plant(self) -> NDArray[np.bool_]:
         """(k,): the parameters on which G depends."""
 
@@ -179,6 +183,16 @@ class Parametrised:
     def theta(self) -> Array:
         """(k,): values of the parameters."""
         return np.array([parameter.value for parameter in self.parameters])
+
+    @property
+    def flaw(self) -> str | None:
+        """See `Model`."""
+        for parameter in self.parameters:
+            if not np.isfinite(parameter.value):
+                return f"{parameter.name} has no finite value"
+            if parameter.letter == DELAY and parameter.value < 0.0:
+                return f"the dead time {parameter.name} is negative"
+        return None
 
 
 class WhiteNoise:

@@ -67,6 +67,12 @@ class Parametrisation:
         """(K, k): of the coefficients in the free parameters."""
         return self._image[1]
 
+    @property
+    def undefined(self) -> str | None:
+        """The first term that has no value or no derivative here; None where all have both."""
+        sound = np.isfinite(self.coefficients) & np.all(np.isfinite(self.jacobian), axis=1)
+        return None if np.all(sound) else self.terms[int(np.argmin(sound))].text
+
     @cached_property
     def _image(self) -> tuple[Array, Array]:
         found = [term.at(self.symbols, self.values) for term in self.terms]

@@ -76,6 +76,12 @@ class Reparametrised:
         """(k,): their values."""
         return self.parametrisation.theta
 
+    @property
+    def flaw(self) -> str | None:
+        """See `Model`."""
+        undefined = self.parametrisation.undefined
+        return self.coefficients.flaw if undefined is None else f"{undefined} is not defined"
+
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         """(k,): the parameters on which G depends."""

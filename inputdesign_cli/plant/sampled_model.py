@@ -12,13 +12,13 @@ from inputdesign_cli.plant.continuous_model import ContinuousModel
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import HeldEntry, integrators
 from inputdesign_cli.plant.intersample import Intersample
-from inputdesign_cli.plant.model import Fraction, Parameter, WhiteNoise
+from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, WhiteNoise
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import StateSpace
 
 
 @dataclass(frozen=True)
-class SampledModel(WhiteNoise):
+class SampledModel(Parametrised, WhiteNoise):
     """A transfer matrix in s sampled at `sample_time` behind a zero-order hold; parameters stay those of s.
 
     Sampling is linear in G, so that the gradient of the sampled plant is the sampled gradient
@@ -49,16 +49,6 @@ class SampledModel(WhiteNoise):
     def parameters(self) -> tuple[Parameter, ...]:
         """The k parameters, those of the plant in s."""
         return self.continuous_plant.parameters
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the k parameters."""
-        return self.continuous_plant.names
-
-    @property
-    def theta(self) -> Array:
-        """(k,): values of the parameters."""
-        return self.continuous_plant.theta
 
     @cached_property
     def _entries(self) -> dict[tuple[int, int], HeldEntry]:

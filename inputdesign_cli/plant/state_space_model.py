@@ -21,11 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.held import whole_samples
-from inputdesign_cli.plant.loop import close_loop
 from inputdesign_cli.plant.model import DELAY, Fraction, Parameter, Parametrised
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.plant.sampled_loop import SampledLoop
-from inputdesign_cli.plant.transfer import StateSpace, TransferMatrix
+from inputdesign_cli.plant.transfer import StateSpace
 
 # This near to a pole at z = 1, in rad/sample, the response is taken to be as it is there.
 _BESIDE = 1e-8
@@ -338,49 +336,5 @@ class StateSpaceModel(Parametrised):
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
         """What u (.., n, r) and e (.., n, p) cause at the outputs (.., n, p), each from rest."""
-        A, B, C, D = self.realisation
         noise = StateSpace(self.held[0], self.matrices.K, self.matrices.C, np.eye(self.outputs))
-        return recursion(StateSpace(A, B, C, D), u), recursion(noise, e)
-
-
-def recursion(system: StateSpace, v: Array) -> Array:
-    """(.., N, q): what samples v (.., N, m) cause, from rest."""
-    A, B, C, D = (M.T for M in system)
-    x = np.zeros((*v.shape[:-2], len(A)))
-    driven, found = v @ B, v @ D
-    for t in range(v.shape[-2]):
-        found[..., t, :] += x @ C
-        x = x @ A + driven[..., t, :]
-    return np.asarray(found)
-
-
-@dataclass(frozen=True)
-class StateSpaceLoop(SampledLoop):
-    """`Loop` with R = H^-1 and N = H^-1 G of the predictor, so that R H = I."""
-
-    model: StateSpaceModel
-
-    @property
-    def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the filters that make the gradient of the prediction."""
-        return self.model.predictor_poles
-
-    @property
-    def noise_gain(self) -> Array:
-        """(states, p): K, behind the past of the inputs and before the controller."""
-        K = self.model.matrices.K
-        past = len(self.model.realisation.A) - len(K)
-        behind = len(self.controller.realisation.A)
-        return np.concatenate([np.zeros((past, K.shape[1])), K, np.zeros((behind, K.shape[1]))])
-
-    def left_at(self, w: ArrayLike) -> ComplexArray:
-        """(n, p + r, p + r): the matrix on the left of `Loop`."""
-        left, p = super().left_at(w), self.model.outputs
-        R, N = self.model.predictor_at(w)
-        left[:, :p, :p], left[:, :p, p:] = R, -N
-        return left
-
-
-@close_loop.register
-def _(model: StateSpaceModel, controller: TransferMatrix) -> StateSpaceLoop:
-    return StateSpaceLoop(model, controller)
+        return self.realisation.from_rest(u), noise.from_rest(e)

@@ -110,6 +110,16 @@ class StateSpace(NamedTuple):
     C: Array
     D: Array
 
+    def from_rest(self, v: Array) -> Array:
+        """(.., N, q): what samples v (.., N, m) cause."""
+        A, B, C, D = (M.T for M in self)
+        x = np.zeros((*v.shape[:-2], len(A)))
+        driven, found = v @ B, v @ D
+        for t in range(v.shape[-2]):
+            found[..., t, :] += x @ C
+            x = x @ A + driven[..., t, :]
+        return np.asarray(found)
+
     @classmethod
     def of(cls, blocks: Iterable[tuple[Array, Array, Array]], direct: Array) -> StateSpace:
         """Blocks (A, B, C) that share all inputs and of which the outputs add up; D (q, m) is `direct`."""

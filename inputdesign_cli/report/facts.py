@@ -35,6 +35,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
         yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+    if "worst_ratio" in result.get("frequency_response", {}):
+        yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
         told = error["confidence"]
         low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
@@ -61,6 +63,17 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
 
 
+def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
+    """How the lines of a frequency response are measured, and how well."""
+    counted = found["periods"] - found["transient"]
+    blocks = "" if found["blocks"] == 1 else f" in each of {found['blocks']} blocks"
+    text = (
+        f"{found['lines']} lines, {counted} of {found['periods']} periods of {found['period']} samples "
+        f"count{blocks}; standard deviations at most {found['worst_ratio']:.6g} of those admitted"
+    )
+    return "response", text, f"worst at {found['worst_frequency']:.4g} rad/{time_unit}"
+
+
 def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     """What holds at the plants that the true one might be, and at others drawn in the same way."""
     kept = found["scenarios"] - found["discarded"]
@@ -68,7 +81,9 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     more = ", .." if len(found["active"]) > len(bound) else ""
     left = f"; {found['discarded']} are left out" if found["discarded"] else ""
     drawn = "listed" if found["source"] == "scenarios" else "drawn"
-    again = f"{found['rejected']} unstable ones were drawn again" if found["rejected"] else ""
+    again = (
+        f"{found['rejected']} that were unstable, or no plants, were drawn again" if found["rejected"] else ""
+    )
     yield "plants", f"what is asked holds at the plant of the spec and {kept} {drawn}{left}", again
     if bound:
         yield "binding", ", ".join(bound) + more, ""
@@ -105,6 +120,8 @@ def proofs(result: Result) -> Iterator[str]:
     """What is proved of other experiments."""
     found = result.get("objective", {})
     family = f"no {result.get('spectrum', {}).get('type', 'such')} spectrum gets"
+    if "frequency_response" in result and "objective" in result:
+        family = "no powers of these lines get"
     if "moments" in result:
         family = f"no {result['moments']['structure']} moments get"
     for key, side in (("lower_bound", "below"), ("upper_bound", "above")):

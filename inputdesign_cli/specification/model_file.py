@@ -15,10 +15,16 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
     """The block `estimate` of a file that the spec names at `key`; nothing else of the file is shown.
 
     Raises:
-        SpecError: `bad-model-file`.
+        SpecError: `bad-model-file`; what is wrong with the file itself.
     """
     try:
-        data = read(read_text(spec.resolve_path(name)), name).data
+        text = read_text(spec.resolve_path(name))
+    except SpecError as error:
+        found = error.diagnostics[0]
+        hint = found.hint or "paths are relative to the folder of the spec"
+        raise spec.complain(found.code, found.message, hint=hint, key=key) from error
+    try:
+        data = read(text, name).data
         return Estimated.model_validate(data.get("estimate") if isinstance(data, dict) else None)
     except (SpecError, ValidationError) as error:
         raise spec.complain(

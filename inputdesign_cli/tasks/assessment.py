@@ -34,7 +34,13 @@ from inputdesign_cli.tasks.identification import (
 from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
-from inputdesign_cli.tasks.result.refutations import contradictions, differences, refutations, unsettled
+from inputdesign_cli.tasks.result.refutations import (
+    contradictions,
+    differences,
+    refutations,
+    repetitions,
+    unsettled,
+)
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors
 
@@ -114,6 +120,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     reasons = [
         *unsettled(found.estimate),
         *differences(found.estimate, [name for name, _ in found.data.files]),
+        *repetitions(found.estimate, found.data.files),
         *refutations(found.model, found.estimate),
         *contradictions(found.estimate),
     ]

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.design.convex.problem import Goal, Scenario, weights_of
+from inputdesign_cli.design.convex.cost import weights_of
+from inputdesign_cli.design.convex.demands import Scenario
+from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import graded_grid
@@ -110,7 +112,7 @@ class _Audit:
 
     def _reached(self, plants: list[_Reread], value: float) -> Iterator[str]:
         """The value of the best accuracy is that of the plant at which it is worst."""
-        criterion = self.done.problem.stated_criterion
+        criterion = self.done.problem.demands.criterion
         if criterion is not None:
             found = min(reread.criterion for reread in self._doubtful(plants))
             size = float(self.done.experiment.size) if criterion.letter == "D" else abs(value)

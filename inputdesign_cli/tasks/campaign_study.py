@@ -9,7 +9,7 @@ from math import inf
 
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.batches import run_batches

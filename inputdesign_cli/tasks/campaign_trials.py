@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import OnModelError, model_errors
-from inputdesign_cli.design.convex.problem import Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.identification import fit_batch, identify, information_of_data
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind

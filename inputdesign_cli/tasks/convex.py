@@ -6,25 +6,17 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import partial
 
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, model_errors
-from inputdesign_cli.accuracy.calibration import Calibration, with_alpha
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import OutOfTimeError, out_of_time, seconds_left, what_ended
-from inputdesign_cli.design.convex.designs import (
-    Design,
-    Question,
-    UnfinishedDesignError,
-    solve_design,
-    white_power,
-    whitened_problem,
-)
+from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.designs import Design, UnfinishedDesignError, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
-from inputdesign_cli.design.convex.problem import Weight
-from inputdesign_cli.design.convex.textbook import solve_on_grid
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
@@ -32,20 +24,13 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
-from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.audit import audit
-from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, covered, settled_alpha
+from inputdesign_cli.tasks.confidence import Confidence, covered
+from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
-from inputdesign_cli.tasks.record import (
-    RecordRequest,
-    designed_spectrum,
-    make_record,
-    record_notes,
-    redrawn,
-    shortfall,
-    worst_ratio,
-)
-from inputdesign_cli.tasks.record_search import Made, fitting_record
+from inputdesign_cli.tasks.grid_method import GridMethod
+from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, shortfall
+from inputdesign_cli.tasks.record_search import Made, fitting_record, samples_of_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
@@ -58,19 +43,6 @@ from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.robust import Plants, without_dearest
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
-
-# A record that needs a larger alpha is made anew, this often at the most.
-_RECORDS = 4
-# Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
-_LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
-
-
-@dataclass(frozen=True)
-class GridMethod:
-    """The papers' own program: on how many frequencies, and how positivity is written."""
-
-    lines: int
-    positivity: Literal["gram", "kyp"]
 
 
 @dataclass(frozen=True)
@@ -88,7 +60,7 @@ class ConvexTask:
     experiment: Experiment
     cost: dict[PowerKind, Weight]
     alpha: float
-    calibration: Calibration | None
+    exact: ExactConfidence | None
     tolerance: float
     any_spectrum_tolerance: float | None
     most_samples: int | None
@@ -137,9 +109,13 @@ class ConvexTask:
         else:
             notes = [] if done.design.any_spectrum else [no_other_spectra()]
         try:
-            made = self._recorded(done)
+            made = fitting_record(self.record, done.question, done.design, done.experiment)
+            if self.exact is not None:
+                made = self.exact.recorded(done, made, self.record, partial(self._known, done))
         except OutOfTimeError:
-            made = Made(None, self.record, done.design, notes=(no_record_in_time(),))
+            made = Made(
+                None, self.record, done.design, notes=(no_record_in_time(self.record.settings.candidates),)
+            )
         record = made.record
         tables, curves = self._illustrations(done, record)
         if self.plants is not None:
@@ -171,78 +147,25 @@ class ConvexTask:
         renewed = Redrawn("design", generator, found.basis, found.x)
         return Delivered(results, record.samples, renewed, done.confidence.alpha)
 
-    def _recorded(self, done: Designed) -> Made:
-        """The record, and where the confidence is calibrated, one that keeps it by its own samples.
-
-        A record distributes its information otherwise than the design, so that it may need a larger alpha.
-        """
-        design, experiment, alpha = done.design, done.experiment, done.confidence.alpha
-        made = fitting_record(self.record, done.question, design, experiment)
-        if self.calibration is None:
-            return made
-        for _ in range(_RECORDS):
-            known = self._known(done, made.record)
-            if known is None or not (made.record and made.record.met):
-                return made
-            needed = self.calibration.alpha(bounded_errors(done.problem.requirements), known)
-            if needed <= alpha * (1.0 + SETTLED):
-                break
-            alpha = needed
-            stricter = tuple(with_alpha(design.problem.requirements, alpha))
-            design = replace(design, problem=replace(design.problem, requirements=stricter))
-            made = fitting_record(self.record, done.question.at_alpha(alpha), design, experiment)
-        known = self._known(done, made.record)
-        if made.record is None or known is None:
-            return made
-        ratio = worst_ratio(done.problem.requirements)(known)
-        return replace(made, record=replace(made.record, worst_ratio=ratio))
-
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.
 
         Raises:
             InfeasibleError, InaccurateError: see `solve`.
         """
-        if self.calibration is None:
-            return self._designed(Confidence(self.alpha, self.alpha))
-        calibration, found = self.calibration, dict[float, tuple[Designed, dict[str, Json]]]()
+        if self.exact is None:
+            return self._designed(self.question, Confidence(self.alpha, self.alpha))
+        return self.exact.designed(self._designed)
 
-        def needed(alpha: float) -> float | None:
-            at = replace(self, question=self.question.at_alpha(alpha))
-            try:
-                found[alpha] = at._designed(Confidence(alpha, self.alpha))
-            except InfeasibleError:  # a smaller alpha may do
-                return None
-            done = found[alpha][0]
-            return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
-
-        alpha = settled_alpha(needed, self._first_alpha(calibration))
-        done, how = found[alpha]
-        errors = bounded_errors(done.problem.requirements)
-        coverage = calibration.coverage(errors, done.information, self._reached(errors, done.information))
-        confidence = Confidence(alpha, self.alpha, calibration.probability, coverage)
-        return replace(done, confidence=confidence), {**how, "designs": len(found)}
-
-    def _reached(self, errors: Sequence[ModelError], information: Array) -> float:
-        """What r_adm is multiplied by: where the best accuracy is sought, the ratio that was reached."""
-        if self.question.goal != "factor":
-            return 1.0
-        return max(error.worst(information).ratio for error in errors)
-
-    def _first_alpha(self, calibration: Calibration) -> float:
-        """That of white excitation where the least cost is sought, lest the first design be out of reach."""
-        question = self.question
-        power = white_power(question) if question.goal == "cost" else 0.0
-        if power == 0.0:
-            return self.alpha
-        flat = replace(question, basis=flat_basis(self.experiment))
-        problem = whitened_problem(flat, np.full(self.experiment.inputs, power / self.experiment.inputs))
-        errors = bounded_errors(problem.requirements)
-        return calibration.alpha(errors, problem.information(np.array([power])))
-
-    def _designed(self, confidence: Confidence) -> tuple[Designed, dict[str, Json]]:
-        question, kept = self.question, list(range(len(self.question.others)))
-        design, how = self._by_exchange(question) if self.grid is None else self._by_grid(self.grid)
+    def _designed(self, question: Question, confidence: Confidence) -> tuple[Designed, dict[str, Json]]:
+        kept = list(range(len(question.others)))
+        design, how = (
+            self._by_exchange(question)
+            if self.grid is None
+            else self.grid.design(
+                question, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
+            )
+        )
         if self.plants is not None and self.plants.discard:
             kept = without_dearest(question, design, self.plants.discard)
             question = replace(question, others=[question.others[number] for number in kept])
@@ -267,10 +190,10 @@ class ConvexTask:
                 question,
                 unreachable,
                 self.stated,
-                samples_of_record=self._samples_of_record,
+                samples_of_record=partial(samples_of_record, self.record, question),
             ) from unreachable
         except UnfinishedDesignError as unfinished:
-            if self.calibration is not None:  # it need not keep the confidence that alpha is sought for
+            if self.exact is not None:  # it need not keep the confidence that alpha is sought for
                 raise
             design, ended = unfinished.design, {"ended_by": what_ended()}
         found = design.result
@@ -293,50 +216,6 @@ class ConvexTask:
         if design.any_spectrum is not None:
             how["any_spectrum_gap"] = design.any_spectrum.gap
         return design, how | ended
-
-    def _samples_of_record(self, samples: int) -> int | None:
-        """The samples of a record that is found to meet the accuracy where a spectrum takes so many."""
-        for _ in range(_LENGTHS):
-            samples = max(int(np.ceil(samples * _LONGER)), 2)
-            if samples > _TRIED:
-                return None
-            stated = self.question.of_length(samples)
-            try:
-                design = solve_design(stated, tolerance=_ROUGH, any_spectrum_tolerance=_ANY)
-                request = replace(self.record, samples=None)
-                record = make_record(request, design, design.problem.experiment, longer=False)
-            except (OutOfTimeError, UnreachableError):
-                return None
-            if record is None or record.met:
-                return samples if record is not None else None
-            if not np.isfinite(record.worst_ratio):
-                return None
-            samples = int(np.ceil(samples * record.worst_ratio**2))
-        return None
-
-    def _by_grid(self, method: GridMethod) -> tuple[Design, dict[str, Json]]:
-        white = replace(self.question, basis=flat_basis(self.experiment))
-        baseline = solve_design(
-            white, tolerance=self.tolerance, any_spectrum_tolerance=self.any_spectrum_tolerance
-        )
-        basis = self.question.basis
-        problem = replace(baseline.problem, basis=basis)
-        stated = [r for r in problem.requirements if isinstance(r, ModelError)]
-        lo, hi = stated[0].band
-        frequencies = np.geomspace(max(lo, 1e-3 * hi), hi, method.lines)
-        start = baseline.white_power * basis.even
-        answer = solve_on_grid(problem, stated, frequencies, start, positivity=method.positivity)
-        on_grid = replace(
-            baseline.result,
-            basis=basis,
-            x=answer.x,
-            objective=answer.cost,
-            informations=problem.informations(answer.x),
-            certificate=answer.certificate,
-            active=(),
-        )
-        how = {"method": "lmi", "status": "optimal_on_grid", "grid": method.lines}
-        return replace(baseline, problem=problem, result=on_grid), how
 
     def _check_length(self, result: dict[str, Json]) -> None:
         """Raise `InfeasibleError` when even the shortest experiment is longer than limits.samples."""
@@ -377,10 +256,8 @@ class ConvexTask:
             spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
         known = self._known(done, record)
-        if self.calibration is not None and known is not None:
-            errors = bounded_errors(done.problem.requirements)
-            coverage = self.calibration.coverage(errors, known, self._reached(errors, known))
-            entry["confidence"] = covered(coverage)
+        if self.exact is not None and known is not None:
+            entry["confidence"] = covered(self.exact.coverage(done.problem.requirements, known))
         return entry | made.entry
 
     def _illustrations(
@@ -414,7 +291,7 @@ class ConvexTask:
         optimality = optimality_curves(units, design)
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality
-        shown = white if problem.needs_definite else None
+        shown = white if problem.demands.definite else None
         ellipses = experiment_ellipses(done.experiment, done.information, shown, self.ellipses)
         if ellipses is not None:
             curves["ellipses"] = ellipses

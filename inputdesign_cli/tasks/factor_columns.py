@@ -31,7 +31,7 @@ def restrict_columns(asked: FewColumns, design: Design) -> tuple[Design, dict[st
     The bound of the design over all factors stays: it is the upper bound of [mohan-spectral].
     """
     problem, x = design.problem, design.result.x
-    basis, criterion = problem.basis, problem.stated_criterion
+    basis, criterion = problem.basis, problem.demands.criterion
     if not isinstance(basis, PolynomialBasis) or criterion is None:
         raise ValueError("a factor of few columns is for a criterion and a polynomial spectrum")
     columns = min(asked.columns, basis.gram_order)

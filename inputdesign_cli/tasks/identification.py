@@ -27,7 +27,7 @@ from inputdesign_cli.tasks.result.estimates import (
     model_text,
     prior_notes,
 )
-from inputdesign_cli.tasks.result.refutations import differences
+from inputdesign_cli.tasks.result.refutations import differences, repetitions
 from inputdesign_cli.tasks.result.rivals import beyond_errors
 
 
@@ -153,6 +153,7 @@ def identification_results(task: Identification, found: Identified, started: flo
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
     notes = identification_notes(found.data.notes, found.model, estimate)
     notes += differences(estimate, [name for name, _ in found.data.files])
+    notes += repetitions(estimate, found.data.files)
     notes += prior_notes(estimate, stated=task.has_prior)
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")

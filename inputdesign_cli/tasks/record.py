@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
+from inputdesign_cli.design.convex.cost import Weight, weights_of
+from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
-from inputdesign_cli.design.convex.problem import FEW, Weight, weights_of
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
@@ -32,6 +33,7 @@ from inputdesign_cli.tasks.shortest_record import shortest_record
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
 _FALLS_SHORT = 5e-3
+_DEAR = 1.0  # beyond the cost of the design, relative to it
 _TAKES_PART = 1e-6
 _NO_RECORD = (
     "there is no record: it would have {} samples, and at most {} are computed for this model; "
@@ -265,6 +267,12 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
             "powers, the level asked for or its length leave no room: a little more power or a few more "
             "samples would do"
         )
+    if record.method != "given" and record.extra_power > _DEAR:
+        notes.append(
+            f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its "
+            f"{len(record.samples)} samples are few beside the dead times and time constants of the plant, "
+            "and much of what they cause comes after the last one; take more samples"
+        )
     asked = request.samples or experiment
     if record.method != "given" and len(record.samples) > asked + request.settings.block:
         notes.append(
@@ -282,7 +290,7 @@ def shortfall(design: Design, record: Record, information: Array) -> list[str]:
     """
     problem, notes = design.problem, []
     best = float(np.sqrt(design.result.objective))
-    if problem.goal == "factor" and problem.stated_criterion is None:
+    if problem.goal == "factor" and problem.demands.criterion is None:
         more = record.worst_ratio / best - 1.0
         if more > _FALLS_SHORT:
             notes.append(

@@ -9,8 +9,13 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from inputdesign_cli.design.convex.designs import Design, Question, solve_design
+import numpy as np
+
+from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.design.convex.designs import Design, solve_design
+from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.runs.results import Json
@@ -21,6 +26,8 @@ from inputdesign_cli.tasks.record import RecordRequest, design_cost, make_record
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
 _ROOM = 1.02
 _TOLERANCE = 1e-5
+# Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
+_LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
 _WORDS = {"filtered_noise": "noise", "multisine": "a multisine", "binary": "a binary signal"}
 
 
@@ -135,3 +142,24 @@ def _longer(
         besides = f"; tried besides: {', '.join(kinds)}" if kinds else ""
         hints = "; or ".join(text for text in (told.hint, hint) if text)
         raise InfeasibleError(replace(told, message=told.message + besides, hint=hints)) from missed
+
+
+def samples_of_record(request: RecordRequest, question: Question, samples: int) -> int | None:
+    """The samples of a record that is found to meet the accuracy where a spectrum takes so many."""
+    for _ in range(_LENGTHS):
+        samples = max(int(np.ceil(samples * _LONGER)), 2)
+        if samples > _TRIED:
+            return None
+        stated = question.of_length(samples)
+        try:
+            design = solve_design(stated, tolerance=_ROUGH, any_spectrum_tolerance=_ANY)
+            of_any_length = replace(request, samples=None)
+            record = make_record(of_any_length, design, design.problem.experiment, longer=False)
+        except (OutOfTimeError, UnreachableError):
+            return None
+        if record is None or record.met:
+            return samples if record is not None else None
+        if not np.isfinite(record.worst_ratio):
+            return None
+        samples = int(np.ceil(samples * record.worst_ratio**2))
+    return None

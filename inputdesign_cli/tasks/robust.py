@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.design.convex.designs import Alternative, Design, Question, solve_design
+from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
@@ -110,8 +111,8 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
     worst = [Kept(0.0)] * len(problem.scenarios)
     for side in (False, True):
         admitted = _admitted(problem, design, side=side)
-        for index, violation in problem.violations(informations, side=side):
-            number, share = problem.asked[index].scenario, violation.ratio / admitted
+        for index, violation in problem.demands.violations(informations, side=side):
+            number, share = problem.demands.asked[index].scenario, violation.ratio / admitted
             if share > worst[number].share:
                 worst[number] = Kept(share, violation.frequency)
     return worst
@@ -156,7 +157,7 @@ def _tried(design: Design, basis: Basis, power: float, samples: int, plant: Alte
         worst = Kept(0.0)
         for side in (False, True):
             admitted = _admitted(design.problem, design, side=side)
-            for _, violation in alone.violations(informations, side=side):
+            for _, violation in alone.demands.violations(informations, side=side):
                 if violation.ratio / admitted > worst.share:
                     worst = Kept(violation.ratio / admitted, violation.frequency)
         return worst

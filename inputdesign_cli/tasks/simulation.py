@@ -16,7 +16,7 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
-from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, Recorded, Redrawn

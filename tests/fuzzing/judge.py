@@ -15,7 +15,8 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.run_directory import finished_result
 from inputdesign_cli.runs.text_formats import json_text
-from tests.fuzzing.textbook import NotJudgedError, findings
+from tests.fuzzing.excitation import NotJudgedError
+from tests.fuzzing.textbook import findings
 
 # No input leads to these: they say that something is wrong with the program.
 _OURS_TO_MEND = ("internal-disagreement",)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from inputdesign_cli.design.convex.designs import Question, solve_design
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.signal import DesignedSpectrum, SignalGenerator, SignalSettings, Target, best_record
 from inputdesign_cli.spectrum import FirBasis

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, ModelError, Relative
-from inputdesign_cli.design.convex.designs import Question, solve_design
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.spectrum import FirBasis, LinesBasis

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Relative
-from inputdesign_cli.design.convex.designs import Alternative
+from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import close_loop
 

@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text
+from tests.support.heater import heater
 
 
 @pytest.fixture
@@ -16,6 +17,20 @@ def write(tmp_path):
     def written(columns, name="data.csv"):
         path = tmp_path / name
         path.write_text(csv_text(Table(columns)), encoding="utf-8")
+        return path
+
+    return written
+
+
+@pytest.fixture
+def heater_record(tmp_path):
+    """Writes a record of the heater."""
+
+    def written(name, *args, **kwargs):
+        columns, path = heater(*args, **kwargs), tmp_path / name
+        rows = zip(*columns.values(), strict=True)
+        text = "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+        path.write_text(",".join(columns) + "\n" + text)
         return path
 
     return written

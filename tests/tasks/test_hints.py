@@ -7,7 +7,7 @@ import re
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InfeasibleError
+from inputdesign_cli.errors import InfeasibleError, SpecError
 
 PLANTS = {
     "open": "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.9], variance: 1.0}\n"
@@ -64,3 +64,48 @@ def test_who_follows_a_hint_succeeds(plant, limit, relative, level):
     assert followed
     if told.code == "infeasible":
         assert "a record can" in told.hint
+
+
+INTEGRATING = """
+plant: {B: [0, 0.5], F: [1, -1], known: [f1]}
+noise: {variance: 1.0}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.1}}
+"""
+
+
+@pytest.mark.parametrize("spectrum", [[], ["spectrum={type: fir, order: 6}"], ["spectrum={type: free}"]])
+def test_both_ways_around_a_pole_at_zero_can_be_gone(spectrum):
+    with pytest.raises(SpecError) as raised:
+        solve(parse_spec(INTEGRATING, overrides=spectrum))
+    (told,) = raised.value.diagnostics
+    assert told.code == "infinite-information"
+    found = re.findall(r"(limits|spectrum): (\{[^}]*\})", told.hint)
+    lines, *band = [f"{key}={value}" for key, value in found]
+    for way in ([lines], [*(() if band[0].startswith("spectrum") else spectrum), *band]):
+        assert solve(parse_spec(INTEGRATING, overrides=way)).result["status"] == "optimal"
+
+
+@pytest.mark.parametrize(("relative", "told"), [(0.1, False), (0.99, False), (1.0, True), (10, True)])
+def test_an_error_as_large_as_the_plant_is_remarked_upon(relative, told):
+    spec = parse_spec(
+        INTEGRATING.replace("-1]", "-0.5]"), overrides=[f"accuracy.model_error.relative={relative}"]
+    )
+    notes = solve(spec).result.get("notes", [])
+    assert any("wrong sign" in note for note in notes) == told
+
+
+def test_a_record_that_is_too_short_for_its_spectrum_is_told():
+    text = """
+sample_time: 1
+plant: {continuous: {gain: 2, time_constant: 10, dead_time: %s}, sample: zoh}
+noise: {variance: 0.04}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 4}
+signal: {candidates: 1}
+"""
+    for dead_time, told in ((2.5, False), (290.5, True)):
+        found = solve(parse_spec(text % dead_time)).result
+        assert any("times what the designed spectrum does" in note for note in found.get("notes", [])) == told
+        assert (found["signal"]["extra_power"] > 1.0) == told

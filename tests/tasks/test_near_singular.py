@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.errors import InaccurateError, SpecError
 
 
 def worst_ratio(B, F, variance, lines, samples, relative, alpha, band):
@@ -100,3 +100,48 @@ spectrum: {{type: fir, order: 3}}
 """
     notes = solve(parse_spec(spec)).result.get("notes", [])
     assert any("the slowest mode" in note for note in notes) == told
+
+
+FAST = """
+sample_time: 1
+plant: {{continuous: {{gain: 2, {dynamics}}}, sample: zoh}}
+noise: {{variance: 0.04}}
+experiment: {{samples: 5000}}
+accuracy: {{model_error: {{relative: 0.1}}}}
+spectrum: {{type: fir, order: 4}}
+solver: {{any_spectrum: false}}
+signal: {{samples: 100}}
+"""
+
+
+@pytest.mark.parametrize(
+    "dynamics",
+    [
+        *[f"time_constant: {T:.1e}" for T in np.geomspace(1e-4, 1e3, 15)],
+        *[f"time_constant: {T:.1e}, dead_time: 2.5" for T in np.geomspace(1e-4, 1e3, 15)],
+        *[f"damping: 0.5, natural_frequency: {w:.1e}" for w in np.geomspace(1e-2, 1e3, 11)],
+    ],
+)
+def test_dynamics_that_samples_do_not_show_are_not_taken_for_poles_on_the_circle(dynamics):
+    """What is left of a mode after a sample is exp(-h/T): below rounding nothing tells it."""
+    try:
+        found = solve(parse_spec(FAST.format(dynamics=dynamics))).result
+    except (SpecError, InaccurateError) as error:
+        (told,) = error.diagnostics
+        assert told.code in ("without-effect", "numerically-singular", "not-identifiable")
+        number = float(dynamics.split()[1].strip(",")) if "time" in dynamics[:4] else 0.0
+        assert number < 0.2  # slow plants are never refused
+    else:
+        assert found["status"] == "optimal"
+
+
+def test_a_predictor_on_the_circle_is_not_called_a_plant_that_integrates():
+    states = "A: [[a]], B: [[1]], C: [[1]], K: [['a - 1']], time: discrete"
+    text = f"""
+plant: {{parameters: {{a: 0.9}}, state_space: {{{states}}}}}
+noise: {{variance: 1}}
+experiment: {{samples: 500}}
+accuracy: {{model_error: {{relative: 0.1}}}}
+"""
+    with pytest.raises(SpecError, match="A - K C, sampled, has an eigenvalue of radius 1"):
+        solve(parse_spec(text))

@@ -1,33 +1,13 @@
-"""Specs with limits, criteria and further requirements: results, messages, and what they promise."""
+"""Specs with limits, criteria and further requirements: what their results say."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from inputdesign_cli import load_spec, parse_spec, solve, validate
+from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.cli.summary import summary
-from inputdesign_cli.errors import DataError, InfeasibleError, SpecError
-
-PLANT = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-"""
-ERROR = "accuracy: {model_error: {relative: 0.01, alpha: 2.45}}\n"
-FIR = "spectrum: {type: fir, order: 8}\nsignal: {candidates: 2}\n"
-
-
-def run(text):
-    return solve(parse_spec(PLANT + text, file="plant.yaml")).result
-
-
-def complaint_of(text, kind=SpecError, verb=solve):
-    with pytest.raises(kind) as caught:
-        verb(parse_spec(PLANT + text, file="plant.yaml"))
-    (diagnostic,) = caught.value.diagnostics
-    assert diagnostic.hint
-    return diagnostic
+from tests.support.first_order_specs import ERROR, FIR, PLANT, run
 
 
 def test_what_a_shortest_experiment_says_is_of_its_whole_samples():
@@ -224,95 +204,6 @@ def test_density_limits_from_numbers_tables_and_filters(tmp_path):
         assert outcome.result["limits"][-1]["binding"]
 
 
-# --- what cannot be had ----------------------------------------------------------------------------------
-
-
-def test_infeasible_limits_are_explained():
-    least = run(ERROR + FIR)["cost"]
-    diagnostic = complaint_of(ERROR + FIR + "limits: {input_power: 0.2}\n", InfeasibleError)
-    assert (diagnostic.code, diagnostic.key) == ("infeasible", "limits.input_power")
-    assert diagnostic.location is not None
-    needed = float(diagnostic.message.split(">= ")[1].split(",")[0])
-    assert least <= needed <= least * (1 + 1e-4)
-    factor = float(diagnostic.hint.split("errors ")[1].split(" times")[0])
-    assert factor == pytest.approx(np.sqrt(least / 0.2), rel=1e-3)
-    assert "type: free" in diagnostic.hint  # 0.1925 is enough for one sinusoid
-    # What the message promises is true.
-    assert run(ERROR + FIR + f"limits: {{input_power: {needed * (1 + 1e-6)}}}\n")["cost"] <= needed
-
-
-def test_infeasible_without_a_way_out_by_one_limit():
-    limits = "limits: {input_power: 0.01, output_power: 0.1}\n"
-    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
-    assert "no change of a single limit is enough" in diagnostic.message
-    times = float(diagnostic.message.split("have to be ")[1].split(" times")[0])
-    # What the message promises is true, and no overstatement.
-    raised = (
-        f"limits: {{input_power: {0.01 * times * (1 + 1e-4)}, output_power: {0.1 * times * (1 + 1e-4)}}}\n"
-    )
-    assert run(ERROR + FIR + raised)["status"] == "optimal"
-    lowered = (
-        f"limits: {{input_power: {0.01 * times * (1 - 1e-3)}, output_power: {0.1 * times * (1 - 1e-3)}}}\n"
-    )
-    assert complaint_of(ERROR + FIR + lowered, InfeasibleError).code == "infeasible"
-
-
-def test_a_density_that_is_too_low_is_told_its_factor():
-    # A flat spectrum needs 1.705495; below that level no spectrum has more at any frequency.
-    diagnostic = complaint_of(ERROR + FIR + "limits: {spectrum: 1.5}\n", InfeasibleError)
-    times = float(diagnostic.message.split("limits.spectrum would have to be ")[1].split(" times")[0])
-    assert times == pytest.approx(1.705495 / 1.5, rel=1e-4)
-
-
-def test_contradictory_limits():
-    limits = "limits: {input_power: 0.3, output_power: {min: 300}}\n"
-    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
-    assert diagnostic.code == "contradictory-limits"
-    assert "output_power" in diagnostic.message
-    assert "input_power" in diagnostic.message
-
-
-def test_too_long():
-    limits = "objective: shortest_experiment\nlimits: {input_power: 0.2, samples: 400}\n"
-    diagnostic = complaint_of(ERROR + FIR + limits, InfeasibleError)
-    assert (diagnostic.code, diagnostic.key) == ("too-long", "limits.samples")
-
-
-TWO = "{frequencies: [0.1], type: multisine}"
-BAD = [
-    ("accuracy: {standard_deviation: {b7: 1}}\n" + FIR, "unknown-parameter", "accuracy.standard_deviation"),
-    ("accuracy: {application: {parameters: [b1, x], hessian: [[1, 0], [0, 1]], gamma: 1}}\n" + FIR,
-     "unknown-parameter", "accuracy.application"),
-    ("accuracy: {information: [[1, 0], [0, 1]]}\n" + FIR, "wrong-shape", "accuracy.information"),
-    (ERROR + FIR + "limits: {band: [0, 1]}\n", "bad-limit", "limits.band"),
-    (ERROR + "spectrum: {type: free}\nlimits: {spectrum: 3}\n", "bad-limit", "limits.spectrum"),
-    (ERROR + "spectrum: {type: multisine, lines: 3}\nlimits: {band: [0.1, 0.2]}\n", "too-few-lines",
-     "spectrum.lines"),
-    (ERROR + FIR + "limits: {spectrum: {max: 1, min: {numerator: [1.5]}}}\n", "bad-limit", "limits.spectrum"),
-    ("accuracy: {weighted_variance: {weight: {continuous: {numerator: [1], denominator: [1, 1]}}, max: 1}}\n"
-     + FIR, "not-sampled", "accuracy.weighted_variance.weight"),
-    ("accuracy: {weighted_variance: {max: 1, relative: perhaps}}\n" + FIR, "unknown-word",
-     "accuracy.weighted_variance.relative"),
-    (ERROR + FIR + "objective: best_accuracy\n", "needs-limits", "accuracy.model_error"),
-    (ERROR + FIR + "solver: {method: lmi}\nlimits: {input_power: 1}\n", "not-supported", "solver.method"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("text", "code", "key"), BAD, ids=[f"{c}-{k}" for _, c, k in BAD])
-def test_bad_specs_name_the_key(text, code, key):
-    diagnostic = complaint_of(text, verb=validate)
-    assert (diagnostic.code, diagnostic.key) == (code, key)
-    assert diagnostic.location is not None
-
-
-def test_a_table_of_levels_must_be_in_order(tmp_path):
-    table = tmp_path / "level.csv"
-    table.write_text("frequency,phi\n1,1\n0,1\n", encoding="utf-8")
-    text = ERROR + FIR + f"limits: {{spectrum: {{max: {{table: {table}}}}}}}\n"
-    diagnostic = complaint_of(text, DataError, validate)
-    assert diagnostic.code == "bad-table"
-
-
 def test_free_power_near_dc_is_noted(flexible):
     """With an integrator in the loop the free optimum has free power at DC: said, and mended by a cap."""
     from inputdesign_cli import load_spec
@@ -325,21 +216,6 @@ def test_free_power_near_dc_is_noted(flexible):
     assert "notes" not in capped
     assert capped["power"]["excitation"][0] <= 20 * (1 + 1e-9)
     assert capped["cost"] == pytest.approx(6.556636, rel=2e-2)
-
-
-def test_what_only_noise_tells_is_out_of_reach_of_any_power():
-    """Of y = G u + (1 - 0.5 q^-1) e the variance of c1 is (1 - 0.5^2) / N, whatever u is."""
-    spec = parse_spec(
-        "plant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.5], variance: 1.0}\n"
-        "experiment: {samples: 500}\naccuracy: {standard_deviation: {c1: 0.01}}\n"
-        "spectrum: {type: fir, order: 3}\n"
-    )
-    with pytest.raises(InfeasibleError) as caught:
-        solve(spec)
-    (diagnostic,) = caught.value.diagnostics
-    ratio = np.sqrt((1 - 0.25) / 500) / 0.01
-    assert f"{ratio:.6g} times what is asked" in diagnostic.message
-    assert f"{ratio**2:.4g} times as many samples" in diagnostic.hint
 
 
 @pytest.mark.parametrize(

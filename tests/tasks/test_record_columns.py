@@ -9,6 +9,7 @@ import scipy.signal
 
 from inputdesign_cli import identify, parse_spec
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.tasks.build.preparation import Preparation
 
 STRUCTURE = "sample_time: 2\ntime_unit: min\nplant: {B: [0, 1], F: [1, -0.7]}\n"
 U = np.random.default_rng(1).standard_normal(200)
@@ -51,6 +52,61 @@ def test_times_may_be_dates(estimated):
 def test_another_unit_is_told(estimated):
     with pytest.raises(DataError, match="the times are in ms"):
         estimated("t_ms", 2 * np.arange(200))
+
+
+def test_a_unit_that_the_user_states_is_converted(tmp_path):
+    path = tmp_path / "s.csv"
+    path.write_text(
+        "t_s,u,y\n"
+        + "".join(
+            f"{120 * k},{u!r},{y!r}\n" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
+        )
+    )
+    spec = parse_spec(STRUCTURE, design=False)
+    with pytest.raises(DataError, match="the times are in s") as raised:
+        identify(spec, path)
+    assert "--time-unit s" in raised.value.diagnostics[0].hint
+    found = identify(spec, path, preparation=Preparation(time_unit="s")).result
+    assert found["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)
+
+
+CHANNELS = "channels: {u1: {name: Valve, unit: '%'}, y1: {name: Level, unit: mm}}\n"
+
+
+@pytest.mark.parametrize(
+    ("header", "told"),
+    [
+        ("Valve,Level", []),
+        ("valve [%],Level (MM)", []),
+        ("Valve (mA),Level [cm]", ["Valve (mA) is in mA", "Level [cm] is in cm"]),
+        ("u (mA),y", ["u (mA) is in mA"]),
+        ("u1 Valve (%),y1 Level (m)", ["y1 Level (m) is in m"]),
+    ],
+)
+def test_columns_go_by_the_names_of_channels_and_other_units_are_told(header, told, tmp_path):
+    path = tmp_path / "d.csv"
+    rows = "".join(f"{u!r},{y!r}\n" for u, y in zip(U.tolist(), Y.tolist(), strict=True))
+    path.write_text(f"{header}\n{rows}")
+    found = identify(parse_spec(STRUCTURE + CHANNELS, design=False), path).result
+    assert found["identification"]["theta"]["b1"] == pytest.approx(1.0, abs=0.1)
+    noted = [note for note in found.get("notes", []) if "not converted" in note]
+    assert len(noted) == len(told)
+    assert all(any(part in note for note in noted) for part in told)
+
+
+def test_the_hint_about_missing_columns_can_be_pasted(tmp_path):
+    path = tmp_path / "d.csv"
+    rows = "".join(
+        f"{2 * k},{u!r},{y!r}\n" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
+    )
+    path.write_text(f"time,Heater 1,Temp 1\n{rows}")
+    spec = parse_spec(STRUCTURE, design=False)
+    with pytest.raises(DataError, match="Heater 1, Temp 1") as raised:
+        identify(spec, path)
+    (named,) = re.findall('--columns "(.*)"', raised.value.diagnostics[0].hint)
+    columns = dict(part.split("=") for part in named.split(","))
+    columns = {f"{letter}1": column for letter, column in columns.items()}
+    assert identify(spec, path, preparation=Preparation(columns=columns)).result["identification"]
 
 
 def test_a_column_that_only_begins_like_a_time_is_none(estimated):

@@ -6,54 +6,16 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve
-from inputdesign_cli.design.convex.designs import Alternative, solve_design
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.design.convex.designs import solve_design
+from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.tasks.build.convex import build_convex
-from inputdesign_cli.tasks.build.task import build_task
 from inputdesign_cli.tasks.robust import Batch, tried_on
-
-FIRST = """
-plant: {B: [0, 3.6], F: [1, -0.7]}
-noise: {C: [1, -0.9], variance: 1.0}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.02}}
-spectrum: {type: fir, order: 6}
-signal: {candidates: 1, seed: 1}
-"""
-LOOP = """
-plant: {B: [0, 0.5], F: [1, -0.8]}
-noise: {variance: 1.0}
-experiment: {samples: 500, controller: {numerator: [0.4], denominator: [1, -0.95]}}
-cost: {input_power: 1, output_power: 1}
-accuracy: {model_error: {relative: 0.1}}
-spectrum: {type: fir, order: 6}
-signal: {candidates: 1, seed: 1}
-"""
-TWO = """
-plant: {A: [[1, -0.7], [1, 0.4]], B: [[[0, 1.0, 0.4], [0, -0.5, 0.3]], [[0, 0.6, 0.2], [0, 1.2, -0.5]]]}
-noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.2}}
-spectrum: {type: fir, order: 3}
-signal: {candidates: 1, seed: 1}
-solver: {any_spectrum_tolerance: 0.009}
-"""
-COVARIANCE = "[[0.01, 0, 0], [0, 0.001, 0], [0, 0, 0.0004]]"
-
-
-def solved(text, *overrides):
-    return solve(parse_spec(text, overrides=list(overrides))).result
-
-
-def complaint(text, *overrides):
-    with pytest.raises(SpecError) as caught:
-        build_task(parse_spec(text, overrides=list(overrides)))
-    return caught.value.diagnostics[0]
+from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
 
 
 @pytest.mark.parametrize(
@@ -117,65 +79,6 @@ def test_the_cost_is_that_of_the_nominal_plant_or_the_mean():
     assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
 
 
-@pytest.mark.parametrize(
-    "prior",
-    [
-        f"covariance: {COVARIANCE}",
-        "information: [[100, 0, 0], [0, 1000, 0], [0, 0, 2500]]",
-        "covariance: [[0.01, 0], [0, 0.0004]], parameters: [b1, f1]",
-        "intervals: {b1: [3.3, 3.9], f1: [-0.75, -0.65]}",
-    ],
-)
-def test_plants_are_drawn_from_what_is_known(prior):
-    spec = parse_spec(FIRST, overrides=[f"uncertainty={{{prior}, scenarios: 150}}"])
-    thetas = build_convex(spec).plants.batch.thetas
-    assert thetas.shape == (150, 3)
-    mean, spread = thetas.mean(axis=0), thetas.std(axis=0)
-    assert mean == pytest.approx([3.6, -0.9, -0.7], abs=0.03)
-    b1, c1, f1 = (0.1, 0.0316, 0.02) if "intervals" not in prior else (0.1732, 0.0, 0.02887)
-    assert spread == pytest.approx([b1, 0.0 if "b1, f1" in prior else c1, f1], rel=0.2)
-    again = build_convex(spec).plants.batch.thetas
-    np.testing.assert_array_equal(thetas, again)
-
-
-def test_a_record_and_a_model_file_tell_how_well_the_plant_is_known(tmp_path):
-    rng = np.random.default_rng(1)
-    np.savetxt(tmp_path / "first.csv", rng.normal(size=400), header="u", comments="")
-    (tmp_path / "model.yaml").write_text(
-        "estimate: {parameters: {b1: 3.6, c1: -0.9, f1: -0.7}, covariance: " + COVARIANCE + "}"
-    )
-    for asked in ("information: first.csv", "covariance: model.yaml", "information: model.yaml"):
-        spec = parse_spec(FIRST, overrides=[f"uncertainty={{{asked}, scenarios: 100}}"], folder=tmp_path)
-        thetas = build_convex(spec).plants.batch.thetas
-        if "model" in asked:
-            assert thetas.std(axis=0) == pytest.approx([0.1, 0.0316, 0.02], rel=0.2)
-        else:
-            # White input of power one: the variance of b1 is about that of a mean of 400 samples or more.
-            assert 0.02 < thetas[:, 0].std() < 0.2
-    moved = "estimate: {parameters: {b1: 4.6, c1: -0.9, f1: -0.7}, covariance: " + COVARIANCE + "}"
-    (tmp_path / "model.yaml").write_text(moved)
-    spec = parse_spec(FIRST, overrides=["uncertainty={covariance: model.yaml}"], folder=tmp_path)
-    with pytest.raises(SpecError, match=r"b1 is 4\.6 there and 3\.6 here"):
-        build_task(spec)
-
-
-def test_the_risk_sets_the_number_of_plants():
-    for order, risk, number in ((10, 0.1, 235), (6, 0.2, 85)):
-        asked = f"uncertainty={{covariance: {COVARIANCE}, risk: {risk}}}"
-        spec = parse_spec(FIRST, overrides=[asked, f"spectrum.order={order}"])
-        assert len(build_convex(spec).plants.batch.plants) == number
-
-
-def test_unstable_loops_are_drawn_again_and_counted():
-    """In this loop f1 < -1.02 or so is unstable."""
-    prior = "intervals: {f1: [-1.2, -0.6]}, scenarios: 60, seed: 3"
-    batch = build_convex(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}}}"])).plants.batch
-    assert len(batch.plants) == 60
-    assert batch.rejected > 0
-    for plant in batch.plants:
-        assert np.abs(plant.experiment.loop.closed_poles).max() < 0.9981
-
-
 def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
     found = solved(FIRST, f"uncertainty={{covariance: {COVARIANCE}, scenarios: 40, fresh: 120}}")
     robust = found["robust"]
@@ -208,64 +111,6 @@ def test_r_adm_has_a_floor_where_it_vanishes_at_a_plant():
     assert complaint(text, plant % ", floor: 0").code == "admissible-not-positive"
     fixed = solved(text, plant % ", r_adm: fixed")
     assert fixed["cost"] < solved(text, plant % "")["cost"]
-
-
-@pytest.mark.parametrize(
-    ("text", "stated", "code", "key"),
-    [
-        (FIRST, "scenarios: [{f1: -0.6}, {a1: 0.3}]", "unknown-parameter", "uncertainty.scenarios[1]"),
-        (FIRST, "scenarios: [{f1: -1.6}]", "no-stable-plant", "uncertainty.scenarios[0]"),
-        (FIRST, "covariance: [[1, 0], [0, 1]]", "wrong-shape", "uncertainty.covariance"),
-        (FIRST, "covariance: [[1, 0], [0, 1]], parameters: [b1, b9]", "unknown-parameter",
-         "uncertainty.covariance"),
-        (FIRST, "information: [[1, 0, 0], [0, 0, 0], [0, 0, 1]]", "not-positive-definite",
-         "uncertainty.information"),
-        (LOOP, "intervals: {b1: [-90, -30], f1: [-0.9, -0.7]}", "bad-interval", "uncertainty.intervals.b1"),
-        (LOOP, "covariance: [[1.0e+4, 0], [0, 1]]", "no-stable-plant", "uncertainty"),
-        (LOOP, "covariance: [[1, 0], [0, 1]], stable_within: 0.5", "no-stable-plant",
-         "uncertainty.stable_within"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_drawn_is_said(text, stated, code, key):
-    found = complaint(text, f"uncertainty={{{stated}}}")
-    assert (found.code, found.key) == (code, key)
-    assert found.hint
-
-
-@pytest.mark.parametrize(
-    ("stated", "code"),
-    [
-        ("seed: 3", "missing-key"),
-        (f"covariance: {COVARIANCE}, intervals: {{b1: [1, 5]}}", "conflicting-keys"),
-        (f"covariance: {COVARIANCE}, scenarios: [{{b1: 3}}]", "conflicting-keys"),
-        ("scenarios: [{b1: 3}], risk: 0.1", "conflicting-keys"),
-        (f"covariance: {COVARIANCE}, scenarios: 10, risk: 0.1", "conflicting-keys"),
-        ("covariance: [[1, 2], [2, 1]]", "not-positive-definite"),
-        ("intervals: {b1: [4, 3]}", "bad-interval"),
-        (f"covariance: {COVARIANCE}, scenarios: 5000", "too-large"),
-        (f"covariance: {COVARIANCE}, discard: 0.7", "out-of-range"),
-    ],
-)
-def test_what_contradicts_itself_is_said(stated, code):
-    with pytest.raises(SpecError) as caught:
-        parse_spec(FIRST, overrides=[f"uncertainty={{{stated}}}"])
-    assert code in {found.code for found in caught.value.diagnostics}
-
-
-@pytest.mark.parametrize(
-    "overrides",
-    [
-        ["spectrum={given: {type: white, power: 1}}"],
-        ["solver.method=lmi"],
-        ["accuracy={criterion: D}", "limits={input_power: 1}",
-         "spectrum={type: polynomial, order: 4, band: [0, 3], factor_columns: 1}"],
-        ["accuracy={model_error: {relative: 0.1, region: ellipsoid}}", "uncertainty.r_adm=fixed"],
-        ["accuracy={model_error: {relative: 0.1, confidence: {exact: 0.95}}}"],
-    ],
-)  # fmt: skip
-def test_what_is_not_made_robust_is_said(overrides):
-    found = complaint(FIRST, "uncertainty={scenarios: [{b1: 3}]}", *overrides)
-    assert (found.code, found.key) == ("not-supported", "uncertainty")
 
 
 def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
@@ -328,15 +173,3 @@ def test_what_is_said_is_said_under_the_prior():
     assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
     assert "true plant" in assumptions(question, found.result)[0]
     assert sum("Campi" in source for source in citations(question, found.result)) == 2
-
-
-@pytest.mark.parametrize("listed", ["scenarios: [{dead_time: 900}]", "intervals: {dead_time: [1, 5000]}"])
-def test_a_dead_time_beyond_the_record_is_refused_at_every_plant(listed):
-    text = (
-        "sample_time: 1\nplant: {continuous: {gain: 2, time_constant: 10, dead_time: 2}, sample: zoh}\n"
-        "noise: {variance: 0.04}\nexperiment: {samples: 500}\naccuracy: {model_error: {relative: 0.1}}\n"
-        f"spectrum: {{type: fir, order: 6}}\nuncertainty: {{{listed}}}\n"
-    )
-    with pytest.raises(SpecError) as caught:
-        solve(parse_spec(text))
-    assert caught.value.diagnostics[0].code == "delay-beyond-record"

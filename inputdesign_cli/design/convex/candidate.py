@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.problem import FEW, Problem
+from inputdesign_cli.design.convex.demands import FEW
+from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
 
 Place = tuple[int, float | None]
@@ -68,13 +69,13 @@ def scaled_up(problem: Problem, z: Array, s: float, places: Sequence[Place]) -> 
     if problem.goal == "factor":
         # All of M' scales, so that one look at the ratios gives the factor, above or below one.
         informations = candidate_at(problem, z, s).informations
-        factor = problem.largest(informations, default=1.0) ** 2
+        factor = problem.demands.largest(informations, default=1.0) ** 2
         return candidate_at(problem, factor * z, factor * s)
     factor, at = 1.0, set(places)
     for _ in range(12 + len(problem.others)):
         factor = _smallest_factor(problem, z, s, at, factor)
         informations = candidate_at(problem, factor * z, factor * s).informations
-        found = problem.violations(informations, above=1.0, few=FEW)
+        found = problem.demands.violations(informations, above=1.0, few=FEW)
         missed = [(i, v) for i, v in found if v.ratio > 1.0 + _MEETS]
         if not missed:
             break
@@ -104,9 +105,9 @@ def _smallest_factor(problem: Problem, z: Array, s: float, at: set[Place], facto
 
     def excess(f: float) -> float:
         ratios = [
-            problem.requirement(i).ratios(fixed[n] + f * excited[n], np.array(w)).max()
+            problem.demands.requirement(i).ratios(fixed[n] + f * excited[n], np.array(w)).max()
             for i, w in places.items()
-            for n in (problem.asked[i].scenario,)
+            for n in (problem.demands.asked[i].scenario,)
         ]
         return float(max(ratios, default=0.0)) ** 2 - 1.0
 
@@ -124,8 +125,8 @@ def excess(problem: Problem, candidate: Candidate) -> float:
     """How far the worst condition is missed, negative when all are met: requirements and limits alike."""
     z, s, informations = candidate.z, candidate.s, candidate.informations
     try:
-        ratios = [v.ratio**2 for _, v in problem.violations(informations)]
-        ratios += [s * v.ratio**2 for _, v in problem.violations(informations, side=True)]
+        ratios = [v.ratio**2 for _, v in problem.demands.violations(informations)]
+        ratios += [s * v.ratio**2 for _, v in problem.demands.violations(informations, side=True)]
     except np.linalg.LinAlgError:
         return np.inf
     for limit, functional in zip(problem.limits, problem.limit_functionals, strict=True):

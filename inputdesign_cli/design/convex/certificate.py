@@ -23,8 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.design.convex.gradients import weighty_ones
 from inputdesign_cli.design.convex.master import Proof, Row
-from inputdesign_cli.design.convex.problem import Problem, weighty_ones
+from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Functional
 
@@ -99,7 +100,7 @@ def _certified(
                 fixed_lower += w * row.bound
     if price is None:
         raise ValueError("a goal with s needs an upper limit")
-    pricing = problem.basis.price(price, value, problem.grid_of(weighty_ones(weights)))
+    pricing = problem.basis.price(price, value, problem.gradients.grid_of(weighty_ones(weights)))
     gain = required - float(np.sum(weights * problem.fixed_information)) + fixed_lower
     t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
     if problem.goal == "cost":

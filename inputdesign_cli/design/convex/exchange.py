@@ -10,43 +10,23 @@ until everything holds (`candidate`). Lower bound: its multipliers, made exactly
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Cut, Violation
 from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.compute.watching import Round, tell
-from inputdesign_cli.design.convex.candidate import (
-    Candidate,
-    Place,
-    candidate_at,
-    least_scale,
-    mixed,
-    scaled_up,
-)
-from inputdesign_cli.design.convex.certificate import Certificate, certify
-from inputdesign_cli.design.convex.limits import DensityBreach
-from inputdesign_cli.design.convex.master import PlacedCut, Proof, Row, solve_master
-from inputdesign_cli.design.convex.problem import FEW, Problem
-from inputdesign_cli.design.convex.rows import alike, density_row, first_density_rows, on_basis, power_rows
+from inputdesign_cli.design.convex.candidate import Place
+from inputdesign_cli.design.convex.certificate import Certificate
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.state import State, first_state
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, Face
+from inputdesign_cli.spectrum import Basis
 
 MAX_ROUNDS = 60
-# A far-off iterate is not worth repairing: its upper bound would say nothing.
-_WORTH_REPAIRING = 1.5
-_FIRST_CUTS = 0.3
-_MORE_CUTS = 6
-_HALVINGS = 6
-_BINDS = 1e-5
-_IDLE = 3
-_PROGRESS = 1e-5
 _STAGE_TOLERANCE = 1e-2
 _STAGE_ROUNDS = 10
-_MOST_ROWS = 12
 # Rounds without a tenth of progress after which rounding has the last word. A basis that still grows may
 # take several to find the sinusoids that pay.
 _PATIENCE, _PATIENCE_GROWING = 6, 16
@@ -134,11 +114,11 @@ def exchange(
     coarser = [] if interior is not None else problem.basis.coarser()
     # x of a coarser basis is the head of x of the next, so that they share their integrals.
     stages = [replace(problem, basis=coarse, finer=problem) for coarse in coarser] + [problem]
-    state = _first_state(stages[0], start, interior, known)
+    state = first_state(stages[0], start, interior, known)
     rounds = 0
     for stage in stages:
         if stage is not stages[0]:
-            state = state.moved_to(stage) if state.solved else _first_state(stage, start, interior, known)
+            state = state.moved_to(stage) if state.solved else first_state(stage, start, interior, known)
         goal = tolerance if stage is problem else max(_STAGE_TOLERANCE, tolerance)
         gaps: list[float] = []
         for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
@@ -159,7 +139,7 @@ def exchange(
     return _result(state, rounds)
 
 
-def _result(state: _State, rounds: int) -> ExchangeResult:
+def _result(state: State, rounds: int) -> ExchangeResult:
     best, problem = state.best, state.problem
     whole = problem.goal == "samples" or not problem.scaled
     return ExchangeResult(
@@ -173,226 +153,3 @@ def _result(state: _State, rounds: int) -> ExchangeResult:
         rounds=rounds,
         cuts=len(state.cuts),
     )
-
-
-@dataclass
-class _State:
-    """What the method knows: the face, cuts and rows of the finite program, the best design and proof."""
-
-    problem: Problem
-    face: Face
-    best: Candidate
-    interior: Candidate | None
-    keys: list[Place]
-    idle: list[int]  # rounds since each cut last bound
-    cuts: list[Cut]
-    rows: list[Row]
-    certificate: Certificate
-    active: tuple[Place, ...] = ()
-    proof: Proof | None = None
-    solved: tuple[Face, Array] | None = None  # the face and y of the latest finite program
-
-    @property
-    def gap(self) -> float:
-        return (self.best.objective - self.certificate.bound) / self.best.objective
-
-    @property
-    def placed(self) -> list[PlacedCut]:
-        """The cuts with their scenarios."""
-        asked = [self.problem.asked[index] for index, _ in self.keys]
-        return [PlacedCut(cut, a.scenario, a.side) for cut, a in zip(self.cuts, asked, strict=True)]
-
-    def improve(self, tolerance: float) -> bool:
-        """One round: solve, prove, repair, enlarge. False when another could not improve anything."""
-        problem, face, best, cuts = self.problem, self.face, self.best, len(self.cuts)
-        answer = solve_master(
-            problem,
-            self.face,
-            self.placed,
-            self.rows,
-            self.best,
-            tolerance=tolerance,
-            keep=self.interior is not None,
-        )
-        if answer is None:
-            return False
-        before = (self.best.objective, self.certificate.bound)
-        self.solved, self.proof = (self.face, answer.y), answer.proof
-        proved = certify(problem, answer.proof, self.rows)
-        moves = proved.bound > (1.0 + _PROGRESS) * self.certificate.bound
-        if proved.bound > self.certificate.bound:
-            self.certificate = proved
-            self.active = _active(self.keys, answer.proof)
-        if moves:  # else cuts that hold without weight (a degenerate optimum) would come and go for ever
-            self._prune(answer.proof)
-        z, s = self._definite(answer.z, answer.s)
-        found, breaches = self._misses(z, s)
-        worst = max([v.ratio for _, v in found] + [b.ratio for b in breaches], default=1.0)
-        if self.interior is not None:
-            self.best = min(self.best, mixed(problem, z, s, self.interior), key=lambda c: c.objective)
-        elif worst <= _WORTH_REPAIRING:
-            places = [(i, v.frequency) for i, v in found]
-            with suppress(np.linalg.LinAlgError):  # singular on the way up: the best so far stays
-                self.best = min(self.best, scaled_up(problem, z, s, places), key=lambda c: c.objective)
-        self._add(_most_violated(problem, found, self.keys))
-        self._add_rows(breaches)
-        basis, self.face = problem.basis.enlarge(self.face, answer.y, proved.directions, problem.price)
-        if basis is not problem.basis:
-            self._grow(problem.grown(basis))
-        same = self.face is face and self.best is best and len(self.cuts) == cuts
-        if same and not (moves or breaches):
-            return False  # the next round would solve the same program
-        better = self.best.objective < 0.9 * before[0] or self.certificate.bound > 1.1 * before[1]
-        return answer.converged or better
-
-    def _misses(self, z: Array, s: float) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
-        problem = self.problem
-        informations = candidate_at(problem, z, s).informations
-        found = problem.violations(informations, above=1.0)
-        if problem.side:
-            root = np.sqrt(s)
-            sides = problem.violations(informations, above=1.0 / root, side=True)
-            found += [(i, replace(v, ratio=root * v.ratio)) for i, v in sides]
-        return found, problem.density_breaches(z, s, above=1.0)
-
-    def _prune(self, proof: Proof) -> None:
-        """Drop the cuts that have not bound for some rounds; each costs the solver a k x k cone.
-
-        Those that do not bind in one round often do in the next.
-        """
-        weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
-        idle = np.where(weights > _BINDS * weights.sum(), 0, np.array(self.idle, dtype=int) + 1)
-        kept = np.flatnonzero(idle < _IDLE)
-        self.idle = idle[kept].tolist()
-        self.keys = [self.keys[i] for i in kept]
-        self.cuts = [self.cuts[i] for i in kept]
-        self.proof = Proof(tuple(proof.cuts[i] for i in kept), proof.rows)
-
-    def _definite(self, z: Array, s: float) -> tuple[Array, float]:
-        """(z, s), or halfway to the best design when z leaves some parameter without information."""
-        if not self.problem.needs_definite:
-            return z, s
-        for _ in range(_HALVINGS):
-            try:
-                np.linalg.cholesky(candidate_at(self.problem, z, s).informations)
-            except np.linalg.LinAlgError:
-                z, s = 0.5 * (z + self.best.z), 0.5 * (s + self.best.s)
-            else:
-                return z, s
-        return self.best.z, self.best.s
-
-    def _grow(self, problem: Problem) -> None:
-        """The same state on a basis with more functions."""
-        more = problem.basis.size - self.best.z.size
-        self.problem = problem
-        self.best = replace(self.best, z=np.pad(self.best.z, (0, more)))
-        if self.interior is not None:
-            self.interior = replace(self.interior, z=np.pad(self.interior.z, (0, more)))
-        self.rows = [on_basis(problem, row) for row in self.rows]
-
-    def on(self, problem: Problem) -> _State:
-        """The best so far as a spectrum of `problem`, with the proof that holds there."""
-        if self.problem.basis.size >= problem.basis.size:
-            return self
-        if self.solved:
-            return self.moved_to(problem)
-        z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
-        return replace(self, problem=problem, best=candidate_at(problem, z, self.best.s))
-
-    def tight(self) -> _State:
-        """The same, its best design with just the s that it needs: an interior one has room to spare."""
-        if self.problem.goal != "factor":
-            return self
-        worst = self.problem.largest(self.best.informations, default=1.0)
-        best = candidate_at(self.problem, worst**2 * self.best.z, worst**2 * self.best.s)
-        return replace(self, best=best)
-
-    def moved_to(self, problem: Problem) -> _State:
-        """The same knowledge for a richer family of spectra: its first face comes from the prices so far."""
-        assert self.solved is not None
-        assert self.proof is not None
-        z = np.pad(self.best.z, (0, problem.basis.size - self.best.z.size))
-        rows = [on_basis(problem, row) for row in self.rows]
-        proved = certify(problem, self.proof, rows[: self.proof.rows.size])
-        _, face = problem.basis.enlarge(*self.solved, proved.directions, problem.price)
-        best = candidate_at(problem, z, self.best.s)
-        return replace(self, problem=problem, face=face, best=best, certificate=proved, rows=rows)
-
-    def _add(self, keys: list[Place]) -> None:
-        self.keys += keys
-        self.idle += [0] * len(keys)
-        self.cuts += [self.problem.requirement(i).cut(w) for i, w in keys]
-
-    def _add_rows(self, breaches: list[DensityBreach]) -> None:
-        most = _MOST_ROWS * self.problem.experiment.inputs
-        for breach in sorted(breaches, key=lambda b: -b.ratio)[:most]:
-            # Rows that nearly coincide spoil the solver's linear algebra: the new one replaces its like.
-            self.rows = [row for row in self.rows if not alike(self.problem, row, breach.place)]
-            self.rows.append(density_row(self.problem, breach.place))
-
-
-def _first_state(problem: Problem, start: Array, interior: Array | None, known: Sequence[Place]) -> _State:
-    size, inner = problem.basis.size, None
-    if interior is not None:
-        inner = _inner(problem, interior[:size])
-        best = inner
-    else:
-        best = scaled_up(problem, start[:size], 0.0, [])
-    state = _State(
-        problem=problem,
-        face=problem.basis.first_face(problem.price),
-        best=best,
-        interior=inner,
-        keys=[],
-        idle=[],
-        cuts=[],
-        rows=power_rows(problem),
-        certificate=Certificate(
-            0.0,
-            np.zeros_like(problem.baselines),
-            np.zeros((problem.basis.size, 0)),
-            np.zeros(len(problem.limits)),
-        ),
-    )
-    state._add(list(known))
-    nearly = problem.violations(best.informations, above=_FIRST_CUTS, few=FEW)
-    state._add(_most_violated(problem, nearly, state.keys))
-    if problem.side:
-        close = problem.violations(best.informations / best.s, above=_FIRST_CUTS, side=True)
-        state._add(_most_violated(problem, close, state.keys))
-    if problem.densities:
-        state.rows += first_density_rows(problem)
-    return state
-
-
-def _inner(problem: Problem, x: Array) -> Candidate:
-    """The interior design in the unknowns (z, s), its requirements met with room where s allows that."""
-    unit = candidate_at(problem, x, 1.0)
-    if not problem.scaled:
-        return unit
-    ratio = problem.largest(unit.informations, default=0.0)
-    s = 1.2 * ratio**2 if problem.requirements else 1.2 * least_scale(problem, x)
-    if problem.goal == "samples":
-        s = 1.2 * scaled_up(problem, x, 1.0, []).s
-    return candidate_at(problem, s * x, s)
-
-
-def _most_violated(problem: Problem, found: list[tuple[int, Violation]], known: list[Place]) -> list[Place]:
-    """Where to cut next: the worst places that have no cut yet (a flat ratio has hundreds of maxima).
-
-    Of many scenarios the worst few: what serves them serves most of the others.
-    """
-    most = 2 * problem.experiment.size + _MORE_CUTS
-    ranked = [
-        (i, v.frequency)
-        for i, v in sorted(found, key=lambda item: -item[1].ratio)
-        if (i, v.frequency) not in known
-    ]
-    worst = list(dict.fromkeys(problem.asked[i].scenario for i, _ in ranked))[:FEW]
-    return [place for place in ranked if problem.asked[place[0]].scenario in worst][:most]
-
-
-def _active(keys: list[Place], proof: Proof) -> tuple[Place, ...]:
-    weights = np.array([np.trace(cut.weight) for cut in proof.cuts])
-    largest_first = np.argsort(-weights, kind="stable")
-    return tuple(keys[i] for i in largest_first if weights[i] > 1e-4 * weights.sum())

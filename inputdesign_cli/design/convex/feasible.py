@@ -8,9 +8,10 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Requirement
 from inputdesign_cli.design.convex.candidate import least_scale, missing_floor, scaled_up
+from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Problem, Scenario
+from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InaccurateError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
@@ -72,7 +73,7 @@ def strictly_feasible(problem: Problem, start: Array) -> tuple[Basis, Array]:
         within = np.sqrt(reached.s) * reached.x
         problem, start = problem.on(reached.basis), np.pad(start, (0, within.size - start.size))
     factor = replace(problem.with_requirements(asked), goal="factor", finer=problem)
-    if not factor.asked:
+    if not factor.demands.asked:
         return problem.basis, within if within is not None else start * (0.5 / least_scale(factor, start))
     found = exchange(factor, start, tolerance=_TOLERANCE, interior=within, enough=_decided)
     if found.objective >= 1.0 > found.certificate.bound and problem.goal == "cost":

@@ -112,7 +112,7 @@ def solve_master(
     columns = np.concatenate([face.columns, ray], axis=1)
     inside, number = face.columns.shape[1], columns.shape[1]
     objective, worth = best.objective, problem.price.at(best.z)
-    definite = problem.needs_definite
+    definite = problem.demands.definite
     # The nominal plant where there are no cuts: a program without M is solved by no spectrum at all.
     involved = sorted({placed.scenario for placed in cuts}) or [0]
     turns = {plant: _congruence(best.informations[plant], definite=definite) for plant in involved}

@@ -9,7 +9,8 @@ import scipy.optimize
 
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.compute.time_limit import seconds_left
-from inputdesign_cli.design.convex.problem import Problem, RequirementFactory
+from inputdesign_cli.design.convex.demands import RequirementFactory
+from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.errors import InfeasibleError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import flat_basis
@@ -39,10 +40,10 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         def excess(log_power: float, problem: Problem = problem) -> float:
             seconds_left()
             informations = problem.informations(np.array([np.exp(log_power)]))
-            return np.log(max(problem.worst_ratio(informations).ratio, 1e-300))
+            return np.log(max(problem.demands.worst_ratio(informations).ratio, 1e-300))
 
         if np.linalg.matrix_rank(problem.baseline_information) == coordinates.size:
-            without = worst([v for _, v in problem.violations(problem.baselines)])
+            without = worst([v for _, v in problem.demands.violations(problem.baselines)])
             if without.ratio <= 1.0:
                 return 0.0
         lo = hi = np.log(power)

@@ -102,11 +102,13 @@ def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
 def _check(spec: Spec, stated: Campaign) -> None:
     """Raise `SpecError` (`not-supported`) for what is not done in parts."""
     what, hint, key = "", "state accuracy.model_error and let the power follow", "campaign"
-    if spec.plant.kind == "regression" or spec.accuracy.closed_loop_error is not None:
+    accuracy = spec.accuracy
+    elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
+    if spec.plant.kind == "regression" or elsewhere:
         what = "this kind of design"
     elif not spec.designs:
         what, hint = "a given excitation", "let it be designed: spectrum: {type: fir, order: 20}"
-    elif not spec.accuracy.requirements or spec.goal != "least_cost":
+    elif not accuracy.requirements or spec.goal != "least_cost":
         what, hint = "another goal than the least cost", "ask for an accuracy that ends the campaign"
     elif not spec.plant.sampled:
         what, hint = "an experiment in continuous time", "write plant.sample: zoh"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from inputdesign_cli.design.convex.designs import Question
 from inputdesign_cli.design.convex.problem import Goal
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
@@ -23,8 +23,10 @@ from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.spectra import build_basis
 from inputdesign_cli.tasks.build.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.tasks.build.uncertainty import build_plants
-from inputdesign_cli.tasks.convex import ConvexTask, GridMethod
+from inputdesign_cli.tasks.convex import ConvexTask
+from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns
+from inputdesign_cli.tasks.grid_method import GridMethod
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 
@@ -60,13 +62,14 @@ def build_convex(spec: Spec) -> ConvexTask:
         mean_cost=plants is not None and plants.mean_cost,
     )
     check_every_direction_counts(spec, question)
+    alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)
     return ConvexTask(
         header=build_header(spec),
         question=question,
         experiment=experiment,
         cost=cost,
-        alpha=model_error_alpha(spec, experiment.model),
-        calibration=build_calibration(spec),
+        alpha=alpha,
+        exact=None if calibration is None else ExactConfidence(calibration, alpha, question),
         tolerance=spec.solver.tolerance,
         any_spectrum_tolerance=spec.solver.any_spectrum_tolerance if spec.solver.any_spectrum else None,
         most_samples=spec.limits.samples,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -13,6 +12,16 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.columns import (
+    SECONDS,
+    channel_columns,
+    other_units,
+    reference_columns,
+    time_column,
+    time_unit_of,
+    unused_columns,
+    with_names,
+)
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import (
     EVEN,
@@ -27,14 +36,6 @@ from inputdesign_cli.tasks.build.preparation import (
     whole_segments,
 )
 from inputdesign_cli.tasks.build.tables import columns_of, is_dated
-
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
-TIME_UNITS = tuple(_SECONDS)
-_UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
-    unit: unit for unit in TIME_UNITS
-}
-_CHANNEL = re.compile(r"([uy])(\d+)(?![a-z0-9]).*")
-_TIME = re.compile(r"(sampling[ _]|elapsed[ _])?(time|t|timestamp)(?![a-z0-9]).*")
 
 
 @dataclass(frozen=True)
@@ -123,8 +124,8 @@ def signals_of(
         DataError: a column is missing, or holds text or nothing.
     """
     wanted = {
-        **_channels("u", inputs, sheet, preparation),
-        **_channels("y", outputs, sheet, preparation),
+        **channel_columns("u", inputs, sheet, preparation),
+        **channel_columns("y", outputs, sheet, preparation),
         **{name: name for name in references},
         **time_column(sheet, preparation),
     }
@@ -156,28 +157,6 @@ def signals_of(
 def _labels(letter: str, count: int) -> tuple[str, ...]:
     """What notes call channels: u, or u1, u2, .. of several."""
     return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
-
-
-def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
-    """`time` -> the name of its column, if there is one.
-
-    Raises:
-        DataError: there are several.
-    """
-    if "time" in preparation.columns:
-        return {"time": preparation.columns["time"]}
-    timed = [name for name in sheet.header if _TIME.fullmatch(name)]
-    if len(timed) > 1:
-        message = f"{sheet.path.name} has several columns of times: {', '.join(timed)}"
-        hint = f"say which one counts: --columns time={timed[0]}"
-        raise DataError(sheet.error("data-missing-column", message, hint))
-    return {"time": timed[0]} if timed else {}
-
-
-def time_unit_of(name: str) -> str | None:
-    """The unit in the name of a column of times: `time_ms`, `Time (sec)`."""
-    words = re.findall(r"[a-z]+", name.lower())
-    return _UNITS.get(words[-1]) if len(words) > 1 else None
 
 
 def prepared(
@@ -251,13 +230,15 @@ def _worst_step(time: Array, step: float) -> int:
 def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) -> Data:
     """One file, which the notes name if asked to."""
     sheet = read_sheet(path, key="")
-    references = _references(units, sheet.header)
+    references = reference_columns(units, sheet.header)
+    preparation = with_names(sheet, units, preparation)
     signals = signals_of(sheet, units.inputs, units.outputs, preparation, references)
-    if signals.dated:
-        signals = replace(signals, time=signals.time / _SECONDS[units.time_unit])
+    unit = "s" if signals.dated else preparation.time_unit
+    if unit is not None and signals.name:
+        signals = replace(signals, time=signals.time * (SECONDS[unit] / SECONDS[units.time_unit]))
     _check_steps(signals, units, preparation)
     segments, told = prepared(signals, units.sample_time, units.time_unit, preparation)
-    told += _unused(sheet, units, preparation)
+    told += [*unused_columns(sheet, units, preparation), *other_units(sheet, units, preparation)]
     inputs = np.concatenate([part.u for part in segments])
     return Data(
         inputs[:, : units.inputs],
@@ -290,33 +271,6 @@ def _check_different(paths: Sequence[Path], parts: Sequence[Data]) -> None:
                 )
 
 
-def _unused(sheet: Sheet, units: Units, preparation: Preparation) -> list[str]:
-    """Columns that are called as channels are, of which the plant has fewer."""
-    counts = {"u": units.inputs, "y": units.outputs}
-    found = [(name, _CHANNEL.fullmatch(name)) for name in sheet.header]
-    extra = [
-        name
-        for name, match in found
-        if match and int(match[2]) > counts[match[1]] and name not in preparation.columns.values()
-    ]
-    if not extra:
-        return []
-    verb = "is" if len(extra) == 1 else "are"
-    return [
-        f"{', '.join(extra)} {verb} not used: the plant of the spec has {units.inputs} inputs and "
-        f"{units.outputs} outputs; what such an input causes counts as noise here"
-    ]
-
-
-def _references(units: Units, header: Sequence[str]) -> Sequence[str]:
-    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
-    if not units.closed_loop:
-        return []
-    if units.inputs == 1:
-        return [name for name in ("r1", "r") if name in header][:1]
-    return list(units.excitations) if set(units.excitations) <= set(header) else []
-
-
 @contextmanager
 def blaming_columns(path: Path) -> Iterator[None]:
     """Lays what an estimator says against the signals at the columns of the file that they came from.
@@ -338,15 +292,6 @@ def blaming_columns(path: Path) -> Iterator[None]:
         raise DataError([placed(diagnostic) for diagnostic in error.diagnostics]) from error
 
 
-def _channels(letter: str, count: int, sheet: Sheet, preparation: Preparation) -> dict[str, str]:
-    """Channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user said."""
-    found = {}
-    for name in (f"{letter}{i + 1}" for i in range(count)):
-        plain = count == 1 and not any(header.startswith(name) for header in sheet.header)
-        found[name] = preparation.columns.get(name, letter if plain else name)
-    return found
-
-
 def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> None:
     """The file is sampled as the spec says.
 
@@ -354,10 +299,10 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         DataError: `data-wrong-unit` or `data-not-uniform`.
     """
     sheet = signals.sheet
-    unit = None if signals.dated else preparation.time_unit or time_unit_of(signals.name)
+    unit = None if signals.dated or preparation.time_unit else time_unit_of(signals.name)
     if unit is not None and unit != units.time_unit:
         message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
-        hint = f"set time_unit: {unit} (and sample_time in it), or convert the column"
+        hint = f"add --time-unit {unit} to convert them, or set time_unit: {unit} (and sample_time in it)"
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)

@@ -5,6 +5,8 @@ What a single key may ask for stands in `specification.models.sizes`.
 
 from __future__ import annotations
 
+import numpy as np
+
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.specification import Spec
@@ -19,6 +21,7 @@ _COPIES = 4  # of a record's gradient while its information matrix is formed
 _CUTS, _STEPS, _ROUNDS, _UNKNOWNS = 50, 15, 15, 250
 _CRITERION, _FACTORINGS = 4, 60
 _PER_SECOND = 1e10  # multiplications
+_PROBES, _TRACE = 40, 1e-12
 _GENEROUS = 10  # times the first rounds: plants that are hard take as long
 
 
@@ -37,6 +40,30 @@ def check_model(spec: Spec, model: Model) -> None:
             f"a model of {len(model.names)} parameters and {channels} entries",
             f"{room} parameters",
         )
+
+
+def check_effects(spec: Spec, experiment: Experiment) -> None:
+    """Whether every parameter of the plant leaves a trace in the samples, beyond the rounding of G.
+
+    Raises:
+        SpecError: `without-effect`.
+    """
+    model, (lo, hi) = experiment.model, experiment.band
+    w = np.union1d(np.linspace(lo, hi, _PROBES + 1)[1:-1], np.geomspace(max(lo, 1e-4 * hi), hi, _PROBES)[:-1])
+    G, slope = np.abs(model.plant_at(w)), np.abs(model.plant_gradient(w))
+    share = np.max(slope / np.maximum(G, np.finfo(float).tiny)[:, None], axis=(0, 2, 3)) * np.abs(model.theta)
+    lost = model.in_plant & (model.theta != 0.0) & (share < _TRACE)
+    if not np.any(lost):
+        return
+    names = ", ".join(name for name, gone in zip(model.names, lost, strict=True) if gone)
+    raise spec.complain(
+        "without-effect",
+        f"{names}: to change it by all of its value moves G by less than {_TRACE:g} of itself at every "
+        "frequency of the experiment, so that no data tell it",
+        hint="dynamics that are much faster than the sampling leave no trace: sample faster (sample_time), "
+        f"or write plant.known: [{names}]",
+        key="plant",
+    )
 
 
 def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:

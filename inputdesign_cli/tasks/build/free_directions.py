@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.designs import Question
-from inputdesign_cli.design.convex.problem import weights_of
+from inputdesign_cli.design.convex.cost import weights_of
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.spectrum import matrices

@@ -59,12 +59,15 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
         return replace(experiment, band=(0.5 * lowest, hi))
     unit = build_units(spec).frequency
     loop = ", under a controller" if experiment.loop is None else ", under a controller that integrates"
+    # A FIR spectrum has power everywhere.
+    fir = spec.plant.sampled and (spec.spectrum is None or spec.spectrum.type == "fir")
+    other = "spectrum: {type: free} with " if fir else ""
     raise spec.complain(
         "infinite-information",
         f"the plant integrates: power at frequency zero tells without end of {grown}, so that no design with "
         "power there has a value",
-        hint=f"leave it out, limits: {{band: [{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}} or spectrum: "
-        f"{{type: multisine, lines: 100}}; or make the experiment in closed loop{loop}",
+        hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}limits: {{band: "
+        f"[{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}; or make the experiment in closed loop{loop}",
         key="spectrum" if spec.spectrum is not None else "plant",
     )
 

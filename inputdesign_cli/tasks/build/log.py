@@ -11,7 +11,8 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.data import prepared, signals_of, time_unit_of
+from inputdesign_cli.tasks.build.columns import time_unit_of
+from inputdesign_cli.tasks.build.data import prepared, signals_of
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from inputdesign_cli.accuracy import Criterion, InformationTarget, WeightedVariance, active_entries
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.design.convex.problem import RequirementFactory
+from inputdesign_cli.design.convex.demands import RequirementFactory
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.specification import Spec
@@ -207,5 +207,6 @@ BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "application": _application,
     "weighted_variance": _weighted_variances,
     "standard_deviation": _standard_deviations,
+    "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
 }
 """What makes the requirement of each key of `accuracy`; a new requirement adds its own."""

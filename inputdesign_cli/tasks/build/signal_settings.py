@@ -9,6 +9,7 @@ from inputdesign_cli.runs.results import Table
 from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.columns import SECONDS
 from inputdesign_cli.tasks.build.demand import check_record, longest_record
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step
@@ -19,7 +20,6 @@ _CANDIDATES, _FEWEST = 20, 4
 _PATIENCE = 4  # times as many at most, where noise happens to fit badly
 # Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
 _OPTIMISED = 4
-_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
@@ -150,7 +150,7 @@ def deviations(spec: Spec, table: Table) -> Array:
 
 def sampling_rate(spec: Spec) -> float:
     """Samples a second."""
-    return 1.0 / (spec.sample_time * _SECONDS[spec.time_unit])
+    return 1.0 / (spec.sample_time * SECONDS[spec.time_unit])
 
 
 def _method(spec: Spec) -> Method:

@@ -54,8 +54,10 @@ def _check(spec: Spec, plant: StateSpacePlant, model: StateSpaceModel) -> None:
             hint="remove K, or C, D and drift",
             key=f"{key}.K",
         )
+    away = np.abs(model.predictor_poles[:, None] - model.poles).min(axis=1, initial=np.inf)
+    own = model.predictor_poles[away > np.sqrt(_ROUNDING)]  # those that K makes
     worst = float(np.max(np.abs(model.predictor_poles), initial=0.0))
-    if worst > 1.0 + _ROUNDING:
+    if worst > 1.0 + _ROUNDING or np.any(np.abs(own) > 1.0 - _ROUNDING):
         what = "A - K C" if plant.state_space.K is not None else "A"
         raise spec.complain(
             "unstable-polynomial",

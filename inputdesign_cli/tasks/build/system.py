@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.design.convex.problem import Weight
+from inputdesign_cli.design.convex.cost import Weight
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import (
     Coloured,
@@ -34,7 +34,7 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.tasks.build.controllers import controller_matrix
-from inputdesign_cli.tasks.build.demand import check_model
+from inputdesign_cli.tasks.build.demand import check_effects, check_model
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
@@ -120,8 +120,8 @@ def build_experiment(spec: Spec) -> Experiment:
     """The experiment in raw coordinates with its prior, its loop checked for stability and delay.
 
     Raises:
-        SpecError: `needs-band`; `too-large`; `infinite-information`; an unstable or algebraic
-            loop; a prior that does not fit the parameters.
+        SpecError: `needs-band`; `too-large`; `without-effect`; `infinite-information`; an unstable or
+            algebraic loop; a prior that does not fit the parameters.
         DataError: the record of a prior cannot be used.
     """
     model, controller = build_model(spec), spec.experiment.controller
@@ -130,6 +130,7 @@ def build_experiment(spec: Spec) -> Experiment:
     if loop is not None:
         loop.check_delay()
     experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+    check_effects(spec, experiment)
     experiment = on_finite_information(spec, experiment)
     return replace(experiment, prior=_prior(spec, experiment))
 

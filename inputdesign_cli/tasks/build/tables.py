@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
+
+_TIME = re.compile(r"(sampling[ _]|elapsed[ _])?(time|t|timestamp)(?![a-z0-9]).*")
 
 
 def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
@@ -65,6 +68,11 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
 
+def is_time(name: str) -> bool:
+    """Whether a column of this name, in small letters, holds times."""
+    return _TIME.fullmatch(name) is not None
+
+
 def is_dated(sheet: Sheet, name: str) -> bool:
     """Whether a column holds dates, as seconds since the first."""
     return sheet.columns[_named(sheet, name.strip().lower())[0]].dated
@@ -99,9 +107,11 @@ def _named(sheet: Sheet, start: str) -> list[int]:
 def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
     hint = f"name one column {' and one '.join(names)}"
     if not sheet.key:
-        hint += (
-            f", or say which it is: --columns {','.join(f'{name}=NAME' for name in names)} (or its number)"
-        )
+        others = [name.strip() for name in sheet.names if not is_time(name.strip().lower())]
+        called = others if len(others) == len(names) else ["NAME"] * len(names)
+        columns = ",".join(f"{name}={column}" for name, column in zip(names, called, strict=True))
+        quoted = f'"{columns}"' if " " in columns else columns
+        hint += f", or say which it is: --columns {quoted} (or its number)"
     if names == ["frequency"]:
         hint += ", such as frequency_rad_per_s"
     message = f"{sheet.path.name} has {what} for {', '.join(names)}"
@@ -109,7 +119,7 @@ def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
         message = f"{sheet.path.name} has no header that names {', '.join(names)}"
         message += f" (it has {len(sheet.columns)} columns)"
     elif sheet.shown:
-        message += f" (its header is: {', '.join(sheet.header)})"
+        message += f" (its header is: {', '.join(name.strip() for name in sheet.names)})"
     return sheet.error("data-missing-column", message, hint)
 
 

@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.designs import Alternative
+from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.plant import Model
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.specification import Spec, load_estimate
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
 from inputdesign_cli.spectrum import Basis
-from inputdesign_cli.tasks.build.parameters import check_known, embedded
-from inputdesign_cli.tasks.build.prior import inverse
+from inputdesign_cli.tasks.build.demand import check_effects
+from inputdesign_cli.tasks.build.integrators import on_finite_information
+from inputdesign_cli.tasks.build.parameter_draws import Draw, drawing
+from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked
-from inputdesign_cli.tasks.build.system import build_loop, read_excitation_record, record_step
+from inputdesign_cli.tasks.build.system import build_loop
 from inputdesign_cli.tasks.robust import CONFIDENCE, Batch, Plants
 
 _KEY = "uncertainty"
 _DEFAULT_SCENARIOS, _DEFAULT_RADIUS = 100, 0.998
 # So many draws for each plant that is asked for, and no fewer than so many.
 _TRIES, _LEAST_TRIES = 20, 500
-_AWAY = 3.0  # standard deviations
 
-Draw = Callable[[np.random.Generator], Array]
+_ON_CIRCLE = 1e-9
+# Where an entry of G is looked at, of the band.
+_PROBES = np.array([0.31, 0.57, 0.83])
 
 
 def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | None:
@@ -39,7 +43,8 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         experiment: on the nominal plant, of the length that the question is about.
 
     Raises:
-        SpecError: `no-stable-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`, `wrong-estimate`;
+        SpecError: `no-stable-plant`, `not-a-plant`, `unstable-loop`, `unknown-parameter`, `wrong-shape`,
+            `wrong-estimate`;
             what is wrong with a requirement at one of the plants.
         DataError: a record cannot be used.
     """
@@ -52,7 +57,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
     if isinstance(stated.scenarios, tuple):
         return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, mean_cost)
     number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
-    draw = scenario.drawing()
+    draw = drawing(spec, stated, experiment)
     batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
 
     def afresh() -> Batch:
@@ -129,6 +134,14 @@ def farthest_radius(spec: Spec, experiment: Experiment) -> float:
     return within
 
 
+class _NoPlantError(Exception):
+    """Parameters that are none of a stable plant: the code of the error, and what is wrong."""
+
+    def __init__(self, code: str, what: str) -> None:
+        super().__init__(what)
+        self.code, self.what = code, what
+
+
 @dataclass(frozen=True)
 class _Scenarios:
     """What makes plants out of parameters."""
@@ -146,19 +159,20 @@ class _Scenarios:
         """Beyond this radius poles are too near to the unit circle, or outside."""
         return farthest_radius(self.spec, self.experiment)
 
-    def at(self, theta: Array, radius: float) -> Alternative | None:
-        """The plant with these parameters; None where it, or its loop, has poles beyond the radius."""
-        model, controller, loop = self._nominal.at(theta), self.spec.experiment.controller, None
-        if controller is not None:
-            try:
-                loop = build_loop(self.spec, model, controller)
-            except SpecError:
-                return None
-        if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
-            return None
+    def at(self, theta: Array, radius: float) -> Alternative:
+        """The plant with these parameters.
+
+        Raises:
+            _NoPlantError: they are none of a plant of this structure, or it, or its loop, has poles beyond
+                the radius.
+            SpecError: it is one, but what is asked cannot be asked of it.
+        """
+        model, loop = self._sound(theta, radius)
         self._check_seen(theta, model)
-        experiment = replace(self.experiment, model=model, loop=loop)
         try:
+            experiment = replace(self.experiment, model=model, loop=loop)
+            check_effects(self.spec, experiment)
+            experiment = on_finite_information(self.spec, experiment)
             return Alternative(experiment, *build_asked(self.spec, experiment, self._nominal))
         except SpecError as error:
             found = error.diagnostics[0]
@@ -168,6 +182,37 @@ class _Scenarios:
                 hint=found.hint,
                 key=_KEY,
             ) from error
+
+    def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
+        model, controller = self._nominal.at(theta), self.spec.experiment.controller
+        flaw = model.flaw
+        if flaw is not None:
+            raise _NoPlantError("not-a-plant", flaw)
+        if model.names != self._nominal.names:
+            raise _NoPlantError(
+                "not-a-plant", "a first coefficient of B is zero, which would be a known delay"
+            )
+        lost = self._acting(self._nominal) & ~self._acting(model)
+        if np.any(lost):
+            output, input = np.argwhere(lost)[0] + 1
+            raise _NoPlantError("not-a-plant", f"output {output} does not depend on input {input}")
+        loop = None
+        if controller is not None:
+            try:
+                loop = build_loop(self.spec, model, controller)
+            except SpecError as error:
+                raise _NoPlantError("no-stable-plant", error.diagnostics[0].message) from error
+        if not (loop or model).radius <= radius or (model.continuous and model.radius >= 1.0):
+            what = "the plant" if loop is None else "the loop"
+            raise _NoPlantError(
+                "no-stable-plant", f"{what} has a pole, or C a root, on or beyond the unit circle"
+            )
+        return model, loop
+
+    def _acting(self, model: Model) -> NDArray[np.bool_]:
+        """(p, r): whether an entry of G is zero nowhere but by chance."""
+        lo, hi = self.experiment.band
+        return np.any(model.plant_at(lo + (hi - lo) * _PROBES) != 0.0, axis=0)
 
     def _check_seen(self, theta: Array, model: Model) -> None:
         """Raise `delay-beyond-record` where a dead time outlasts the experiment, as at the nominal plant."""
@@ -189,135 +234,49 @@ class _Scenarios:
     def listed(self, scenarios: Sequence[Mapping[str, float]]) -> Batch:
         """The plants that the spec states one by one."""
         names, thetas, plants = list(self._nominal.names), [], []
+        # A known integrator is one at every plant.
+        farthest = max((self.experiment.loop or self._nominal).radius, 1.0 - _ON_CIRCLE)
         for number, values in enumerate(scenarios):
             key = f"{_KEY}.scenarios[{number}]"
             theta = self._nominal.theta.copy()
             for name, value in values.items():
                 check_known(self.spec, names, name, key)
                 theta[names.index(name)] = value
-            plant = self.at(theta, 1.0)
-            if plant is None:
-                what = "the loop" if self.spec.closed_loop else "the plant"
+            try:
+                plants.append(self.at(theta, farthest))
+            except _NoPlantError as error:
                 raise self.spec.complain(
-                    "no-stable-plant",
-                    f"{what} is unstable at the scenario {self._named(theta)}",
+                    error.code,
+                    f"at the scenario {self._named(theta)} {error.what}",
                     hint="leave the scenario out, or mend its parameters",
                     key=key,
-                )
+                ) from error
             thetas.append(theta)
-            plants.append(plant)
         return Batch(np.array(thetas), tuple(plants), len(plants))
 
     def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
-        """So many plants, drawn again where they are unstable.
+        """So many plants, drawn again where they are unstable, or no plants.
 
         Raises:
-            SpecError: `no-stable-plant` where next to none is stable.
+            SpecError: `no-stable-plant` where next to none is left.
         """
         radius, thetas, plants = self._radius, list[Array](), list[Alternative]()
-        most_draws, drawn = max(_TRIES * number, _LEAST_TRIES), 0
+        most_draws, drawn, last = max(_TRIES * number, _LEAST_TRIES), 0, ""
         while len(plants) < number:
             if drawn >= most_draws:
                 what = "loops" if self.spec.closed_loop else "plants"
                 raise self.spec.complain(
                     "no-stable-plant",
-                    f"only {len(plants)} of {drawn} {what} drawn have all their poles within {radius:.6g}",
-                    hint="the uncertainty reaches far beyond what is stable: state it more tightly",
+                    f"only {len(plants)} of {drawn} {what} drawn have all their poles within {radius:.6g}, "
+                    f"and dead times, gains and expressions that a plant can have{last}",
+                    hint="the uncertainty reaches far beyond what is possible: state it more tightly",
                     key=_KEY,
                 )
             theta, drawn = draw(rng), drawn + 1
-            plant = self.at(theta, radius)
-            if plant is not None:
-                thetas.append(theta)
-                plants.append(plant)
+            try:
+                plants.append(self.at(theta, radius))
+            except _NoPlantError as error:
+                last = f"; at the last one, {self._named(theta)}, {error.what}"
+                continue
+            thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), drawn)
-
-    def drawing(self) -> Draw:
-        """How parameters (k,) are drawn."""
-        if self.stated.intervals is not None:
-            return self._even(self.stated.intervals)
-        covariance = self._covariance()
-        varied = np.diag(covariance) > 0.0
-        root = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
-        nominal = self._nominal.theta
-
-        def draw(rng: np.random.Generator) -> Array:
-            theta = nominal.copy()
-            theta[varied] += root @ rng.standard_normal(len(root))
-            return theta
-
-        return draw
-
-    def _even(self, intervals: Mapping[str, tuple[float, float]]) -> Draw:
-        names, nominal = list(self._nominal.names), self._nominal.theta
-        for name, (low, high) in intervals.items():
-            key = f"{_KEY}.intervals.{name}"
-            check_known(self.spec, names, name, key)
-            value = nominal[names.index(name)]
-            if not low <= value <= high:
-                raise self.spec.complain(
-                    "bad-interval",
-                    f"{name} is {value:.6g} in the plant, outside of [{low:g}, {high:g}]",
-                    hint="widen the interval, or move the plant into it",
-                    key=key,
-                )
-        index = [names.index(name) for name in intervals]
-        low, high = np.array(list(intervals.values())).T
-
-        def draw(rng: np.random.Generator) -> Array:
-            theta = nominal.copy()
-            theta[index] = rng.uniform(low, high)
-            return theta
-
-        return draw
-
-    def _covariance(self) -> Array:
-        """(k, k), zero for parameters that are known."""
-        stated, names = self.stated, self._nominal.names
-        key = f"{_KEY}.{stated.stated(*SOURCES)[0]}"
-        source = stated.covariance if stated.covariance is not None else stated.information
-        if isinstance(source, str):
-            if not source.endswith((".yaml", ".yml")):
-                return self._inverted(self._of_record(source, key), key)
-            found = load_estimate(self.spec, source, key)
-            covariance, listed = np.array(found.covariance, dtype=float), tuple(found.parameters)
-            full = embedded(self.spec, names, covariance, listed, key)
-            self._check_same_plant(source, found.parameters, full, key)
-            return full
-        matrix = np.array(source, dtype=float)
-        if stated.covariance is None:
-            matrix = self._inverted(matrix, key)
-        return embedded(self.spec, names, matrix, stated.parameters, key)
-
-    def _of_record(self, name: str, key: str) -> Array:
-        """(k, k): what the samples of an earlier excitation tell of the nominal plant."""
-        record = read_excitation_record(self.spec, name, key)
-        earlier = replace(self.experiment, samples=len(record), prior=None)
-        return FiniteRecord(earlier, len(record), record_step(self.spec)).information(record)
-
-    def _inverted(self, information: Array, key: str) -> Array:
-        try:
-            return inverse(information)
-        except np.linalg.LinAlgError:
-            raise self.spec.complain(
-                "not-positive-definite",
-                "the information matrix is singular: it says nothing about some of the parameters, so that "
-                "no plants can be drawn",
-                hint="name the parameters that it is about, or take an experiment that tells all apart",
-                key=key,
-            ) from None
-
-    def _check_same_plant(self, name: str, values: Mapping[str, float], covariance: Array, key: str) -> None:
-        """Raise `SpecError` (`wrong-estimate`) where the file is about another plant than the spec."""
-        nominal = dict(zip(self._nominal.names, self._nominal.theta.tolist(), strict=True))
-        deviation = dict(zip(self._nominal.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-        far = [p for p, x in values.items() if abs(x - nominal[p]) > _AWAY * deviation[p]]
-        if far:
-            told = ", ".join(f"{p} is {values[p]:.4g} there and {nominal[p]:.4g} here" for p in far)
-            raise self.spec.complain(
-                "wrong-estimate",
-                f"{name} is an estimate of another plant: {told}, more than {_AWAY:g} standard deviations "
-                "apart",
-                hint="take plant and noise from the same file: include: " + name,
-                key=key,
-            )

@@ -8,10 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement
+from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.design.convex.candidate import candidate_at
-from inputdesign_cli.design.convex.designs import Design, Question
-from inputdesign_cli.design.convex.problem import Problem, Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.designs import Design
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
@@ -21,6 +23,7 @@ from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
 
 # A limit binds when the design uses all but this share of it.
+_ROUNDING = 1e-9
 _BINDS = 1e-6
 # Below this share of its largest price, power at a frequency is called free of charge.
 _FREE = 1e-3
@@ -176,7 +179,7 @@ def _objective(design: Design) -> dict[str, Json]:
     value, bound = found.objective, found.certificate.bound
     any_bound = 0.0 if anything is None else anything.certificate.bound
     proved, proved_of_any = (b > 0.0 or value == 0.0 for b in (bound, any_bound))
-    criterion, goal = design.problem.stated_criterion, design.problem.goal
+    criterion, goal = design.problem.demands.criterion, design.problem.goal
     entry: dict[str, Json]
     if goal == "factor" and criterion is not None:
         # s is the inverse of the level, so that its lower bound is an upper bound of the criterion.
@@ -210,8 +213,8 @@ def _white(done: Designed, cost: float) -> dict[str, Json]:
     }
     if problem.goal == "samples":
         entry["samples"] = int(np.ceil(design.white.s * (1 - 1e-9)))
-    elif problem.stated_criterion is not None:
-        entry["value"] = problem.stated_criterion.value(1.0 / design.white.objective)
+    elif problem.demands.criterion is not None:
+        entry["value"] = problem.demands.criterion.value(1.0 / design.white.objective)
     elif problem.goal == "factor":
         entry["value"] = float(np.sqrt(design.white.objective))
     if done.question.limits or done.question.densities:
@@ -261,10 +264,28 @@ def _notes(done: Designed) -> list[str]:
         sources += ["experiment.prior"] if experiment.prior is not None else []
         known = " and ".join(sources) or "the noise"
         return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
-    notes = _left_out(done) + _too_short(experiment)
+    notes = _left_out(done) + _too_short(experiment) + _as_large_as_the_plant(done)
     if units.closed_loop and not found.basis.has_density:
         notes += _free_of_charge(done)
     return notes
+
+
+def _as_large_as_the_plant(done: Designed) -> list[str]:
+    """Requirements that leave even the sign of G open."""
+    notes = []
+    for requirement in model_errors(done.problem.requirements):
+        size, admitted = (
+            requirement.nominal_size(requirement.grid),
+            requirement.admissible.at(requirement.grid),
+        )
+        acts = size > 0.0
+        least = float(np.min(admitted[acts] / size[acts], initial=np.inf))
+        if 1.0 - _ROUNDING <= least < np.inf:
+            notes.append(
+                f"the admissible error is {least:.4g} times |G| or more at every frequency of its band: a "
+                "model that meets it may have the wrong sign (relative: 0.1 means 10 %)"
+            )
+    return list(dict.fromkeys(notes))
 
 
 def _too_short(experiment: Experiment) -> list[str]:
@@ -298,7 +319,7 @@ def _free_of_charge(done: Designed) -> list[str]:
     units, problem = done.units, done.problem
     lines, matrices = done.design.result.basis.lines(done.design.result.x)
     power = np.einsum("naa->n", matrices).real
-    costs, all_costs = (_unit_price(problem.price.density(w)) for w in (lines, problem.grid))
+    costs, all_costs = (_unit_price(problem.price.density(w)) for w in (lines, problem.gradients.grid))
     cheap = (costs < _FREE * all_costs.max()) & (power > _SUPPORT * power.sum())
     if not np.any(cheap):
         return []

@@ -11,6 +11,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Curves, FitCurves, FitPanel, Json, OrderCurves, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.log import Log
+from inputdesign_cli.tasks.result.refutations import chance
 
 
 def validation_entry(found: Fits) -> dict[str, Json]:
@@ -93,8 +94,8 @@ def exploration_notes(
         for j in found.still
     ]
     notes += [
-        f"past outputs help to predict {'u' if alone else f'u{j + 1}'} (probability {p:.1e} by chance): the "
-        "data may come from a loop. The direct method is used; the noise model must then be right, and "
+        f"past outputs help to predict {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by chance): "
+        "the data may come from a loop. The direct method is used; the noise model must then be right, and "
         "without a reference that moves the plant may not be identifiable: add a reference or dither, and "
         "write experiment.controller"
         for j, p in loops

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError
-from inputdesign_cli.design.convex.designs import Question, solve_design
+from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import LinesBasis
@@ -40,7 +41,8 @@ def explain(
     involved = bought.involved
     if unreachable.limits_alone:
         return _contradiction(involved, nearest.certificate.bound)
-    names = " and ".join(dict.fromkeys(problem.requirement(index).name for index, _ in nearest.active))
+    missed = (problem.demands.requirement(index) for index, _ in nearest.active)
+    names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
     try:
         parts = _what_would_do(
             unreachable, involved, only_density=bool(problem.densities and not question.limits)

@@ -16,6 +16,7 @@ from inputdesign_cli.identification import Directed, Estimate
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.result.refutations import chance
 
 # Two-sided 95 % of the normal distribution.
 _ALLOWED = 1.959963984540054
@@ -73,7 +74,7 @@ def objections(units: Units, found: Sequence[Neglected]) -> list[str]:
     return [
         f"one more {one.directed.extensions[0].what} ({one.directed.test.name}) would move G by "
         f"{one.moves:.3g} times the admissible error about {units.named(one.frequency)} (probability "
-        f"{one.directed.test.probability:.1e}): estimate it along"
+        f"{chance(one.directed.test.probability)}): estimate it along"
         for one in found
         if one.directed.matters(one.moves)
     ]

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from inputdesign_cli.identification import Estimate, Extension, ScoreTest
 from inputdesign_cli.plant import Model
 
 _FOUND = {
-    "plant": "past inputs explain residuals{where} (probability {p:.1e}), most at lag {lag}: the plant has "
+    "plant": "past inputs explain residuals{where} (probability {p}), most at lag {lag}: the plant has "
     "more structure than the model; {remedy}, or compare with an FIR model (B: [0, 1, 1, ..]) that is long "
     "enough",
-    "noise": "the residuals are not white{where} (probability {p:.1e}), most at lag {lag}: the noise has "
+    "noise": "the residuals are not white{where} (probability {p}), most at lag {lag}: the noise has "
     "more structure than the model, and the covariance is not to be trusted; {remedy}",
-    "drift": "the residuals drift slowly{where} (probability {p:.1e}): remove the trend from the record, "
+    "drift": "the residuals drift slowly{where} (probability {p}): remove the trend from the record, "
     "use a part of it without drift, or {remedy}",
 }
-_MISSING = "one parameter is missing (probability {p:.1e} without it): one more {what} ({name})"
+_MISSING = "one parameter is missing (probability {p} without it): one more {what} ({name})"
 _IN_Q = {
     "plant": "raise the orders of B and F (or A), or change the delay",
     "noise": "raise the orders of C and D (or A)",
@@ -30,6 +32,12 @@ _IN_S = {
 
 # The prior and the data of one system differ as much with this probability.
 _ONE_SYSTEM = 1e-3
+_LEAST = 1e-300
+
+
+def chance(probability: float) -> str:
+    """A probability for a sentence, also one that is below the smallest number."""
+    return f"{probability:.1e}" if probability >= _LEAST else f"below {_LEAST:.0e}"
 
 
 def unsettled(estimate: Estimate) -> list[str]:
@@ -47,8 +55,8 @@ def contradictions(estimate: Estimate) -> list[str]:
     if estimate.agreement is None or estimate.agreement >= _ONE_SYSTEM:
         return []
     return [
-        f"experiment.prior and these data contradict each other (probability {estimate.agreement:.1e} for "
-        "one system): remove the prior, or look for what has changed since"
+        f"experiment.prior and these data contradict each other (probability {chance(estimate.agreement)} "
+        "for one system): remove the prior, or look for what has changed since"
     ]
 
 
@@ -65,8 +73,27 @@ def differences(estimate: Estimate, files: Sequence[str]) -> list[str]:
     others = [other for other in files if other != name]
     against = others[0] if len(others) == 1 else "the other records"
     return [
-        f"{name} and {against} are not of one system (probability {probability:.1e} that their parameters "
-        "differ as much by chance): assess each alone, and look for what has changed between them"
+        f"{name} and {against} are not of one system (probability {chance(probability)} that their "
+        "parameters differ as much by chance): assess each alone, and look for what has changed between them"
+    ]
+
+
+def repetitions(estimate: Estimate, files: Sequence[tuple[str, int]]) -> list[str]:
+    """What to say where samples seem to be given twice; `files` are names and numbers of samples."""
+    found = estimate.repeated
+    if found is None:
+        return []
+    ends = np.cumsum([samples for _, samples in files])
+    # By their middle: the ends are not sharp.
+    first, second = (
+        files[int(np.searchsorted(ends, at + found.length // 2, side="right"))][0]
+        for at in (found.first, found.second)
+    )
+    where = f"{second} repeat" if first == second else f"{second} are those of {first}"
+    return [
+        f"about {found.length} samples of {where}: their residuals follow each other as those of no "
+        "two experiments do, and counted twice they make the estimate look surer than it is; give each "
+        "sample once"
     ]
 
 
@@ -82,12 +109,12 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
     remedies = _IN_S if model.continuous else _IN_Q
     of_many = [
         _FOUND[fault].format(
-            p=test.probability, lag=test.lag, remedy=remedies[fault], where=_where(model, test)
+            p=chance(test.probability), lag=test.lag, remedy=remedies[fault], where=_where(model, test)
         )
         for fault, test in strongest.items()
     ]
     of_one = [
-        _MISSING.format(p=test.probability, what=directed[test][0].what, name=directed[test][0].name)
+        _MISSING.format(p=chance(test.probability), what=directed[test][0].what, name=directed[test][0].name)
         + _or_else(directed[test][1:])
         for test in sorted(directed, key=lambda test: test.probability)
         if test in estimate.failed

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from inputdesign_cli.design.convex.problem import Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.statistics import binomial_limits, whitened_eigenvalues, wishart_range
 from inputdesign_cli.monte_carlo.study import Study, Tried

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.compute.time_limit import what_ended
+from inputdesign_cli.compute.time_limit import more_time, what_ended
 from inputdesign_cli.runs.results import Json, Result
 
 
@@ -15,8 +15,8 @@ def unfinished_notes(result: Result) -> list[str]:
     found, notes = result["objective"], list[str]()
     if result["status"] == "gap_open":
         notes.append(
-            f"{what_ended()} ended the design: it meets all that is required, and {_how_far(found)}; raise "
-            "solver.time_limit to close the gap"
+            f"{what_ended()} ended the design: it meets all that is required, and {_how_far(found)}; "
+            f"{more_time()} to close the gap"
         )
     elif "any_spectrum_bound" not in found:
         notes.append(
@@ -32,7 +32,7 @@ def _how_far(found: Json) -> str:
         return "nothing is proved yet of what others reach"
     if "upper_bound" in found:
         return f"no other gets above {found['upper_bound']:.6g}"
-    return f"no other gets below {found['lower_bound']:.6g}, {100 * gap:.2g} % less"
+    return f"no other gets below {found['lower_bound']:.6g} ({100 * gap:.2g} % lower)"
 
 
 def no_other_spectra() -> str:
@@ -43,10 +43,10 @@ def no_other_spectra() -> str:
     )
 
 
-def no_record_in_time() -> str:
-    """That a design has no record because its time was over, and what to do."""
+def no_record_in_time(candidates: int) -> str:
+    """That a design has no record, of so many candidates, because its time was over, and what to do."""
+    fewer = "fewer records (signal.candidates: 1) or shorter ones" if candidates > 1 else "a shorter one"
     return (
         f"there is no record: {what_ended()} came before one was found; the spectrum is that of the design. "
-        "Raise solver.time_limit, or try fewer records (signal.candidates: 1) or shorter ones "
-        "(signal.samples)"
+        f"To have one, {more_time()}, or try {fewer} (signal.samples)"
     )

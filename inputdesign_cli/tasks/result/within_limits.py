@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.design.convex.demands import Asked
 from inputdesign_cli.design.convex.exchange import ExchangeResult
 from inputdesign_cli.design.convex.limits import PowerLimit
-from inputdesign_cli.design.convex.problem import Asked, Problem
+from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 
@@ -118,7 +119,7 @@ class Bought:
     @property
     def _binding(self) -> list[tuple[Asked, float | None]]:
         """Where the requirements bind, the place of the largest multiplier first."""
-        return [(self.problem.asked[index], w) for index, w in self.nearest.active]
+        return [(self.problem.demands.asked[index], w) for index, w in self.nearest.active]
 
     def _place(self, place: tuple[Asked, float | None]) -> str:
         requirement, w = place[0].requirement, place[1]

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.accuracy import Criterion
-from inputdesign_cli.design.convex.designs import Question, white_power, whitened_problem
+from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.design.convex.exchange import exchange
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import ContinuousModel
 from inputdesign_cli.spectrum import PolynomialBasis

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.accuracy import ModelError, Relative
-from inputdesign_cli.design.convex.designs import Question, solve_design
+from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.exchange import exchange
+from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.textbook import solve_on_grid
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import FirBasis
@@ -47,7 +48,7 @@ def check(case, solution):
     """Everything that a design promises, recomputed on dense grids."""
     result, problem = solution.result, solution.problem
     if solution.white_power == 0.0:
-        assert problem.worst_ratio(problem.baselines).ratio <= 1.0
+        assert problem.demands.worst_ratio(problem.baselines).ratio <= 1.0
         return
     assert result.gap <= 1e-5, case.name
     assert result.certificate.bound <= result.objective * (1 + 1e-9)
@@ -128,7 +129,7 @@ def test_certificate_holds_for_random_spectra(first_order):
         excited = problem.information(x) - problem.baseline_information
         assert problem.price.at(x) >= np.sum(Y * excited) * (1 - 1e-9)
         # scaled until it is admissible, it costs no less than the bound
-        if problem.worst_ratio(problem.informations(1e6 * x)).ratio <= 1:
+        if problem.demands.worst_ratio(problem.informations(1e6 * x)).ratio <= 1:
             assert problem.price.at(1e6 * x) >= solution.result.certificate.bound
 
 

@@ -31,6 +31,6 @@ def test_sixteen_parameters(seed):
     design = solve_design(task.question, tolerance=1e-6, any_spectrum_tolerance=1e-3)
     assert design.result.gap <= 1e-6
     assert design.any_spectrum.gap <= 1e-3
-    assert design.problem.worst_ratio(design.result.informations).ratio <= 1.0 + 1e-9
+    assert design.problem.demands.worst_ratio(design.result.informations).ratio <= 1.0 + 1e-9
     # Any frequencies at all make a relaxation: a plain bound by the active ones holds.
     assert design.any_spectrum.certificate.bound <= design.result.objective

@@ -9,8 +9,9 @@ import pytest
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import Criterion
-from inputdesign_cli.design.convex.designs import Alternative, Question, solve_design
+from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.spectrum import FirBasis, LinesBasis
 from inputdesign_cli.tasks.build.system import build_model

@@ -1,0 +1,28 @@
+"""What a cost is made of: weights of the powers of input, output and excitation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from inputdesign_cli.information import PowerKind
+
+Weight = float | tuple[float, ...]
+
+
+def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | None, float]]:
+    """The positive weights of a cost: kind, channel (None is the sum over the channels), weight."""
+    listed: list[tuple[PowerKind, int | None, float]] = []
+    for kind, weight in cost.items():
+        if isinstance(weight, tuple):
+            listed += [(kind, channel, w) for channel, w in enumerate(weight) if w > 0]
+        elif weight > 0:
+            listed.append((kind, None, weight))
+    return listed
+
+
+def weighted_sum(weights: Mapping[PowerKind, Weight], power: Mapping[PowerKind, Sequence[float]]) -> float:
+    """What powers, by kind and channel, cost at these weights."""
+    return sum(
+        weight * (sum(power[kind]) if channel is None else power[kind][channel])
+        for kind, channel, weight in weights_of(weights)
+    )

@@ -1,0 +1,180 @@
+"""What is required at the scenarios, and which of their requirements an information matrix misses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, worst
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant.polynomial import Array
+
+RequirementFactory = Callable[[Experiment], Requirement]
+# So many scenarios are enough for a next step: what serves the worst few serves most of the others.
+FEW = 4
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A plant that the design must serve, in coordinates of its own, and what is required of it there."""
+
+    experiment: Experiment
+    requirements: tuple[Requirement, ...]
+    side: tuple[Requirement, ...] = ()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One requirement of all, of the scenario with this number; `side` as in `Problem`."""
+
+    scenario: int
+    requirement: Requirement
+    side: bool
+
+
+@dataclass
+class _Seen:
+    """The ratios (S,) that scenarios had at most, and K (S, k, k) with K M K^T = I there.
+
+    Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
+    what it was. Most of many scenarios need not be looked at again.
+    """
+
+    ratios: Array
+    roots: NDArray[np.float64] | None = None
+
+    @classmethod
+    def none(cls, number: int) -> _Seen:
+        """Nothing is known yet."""
+        return cls(np.full(number, np.inf))
+
+    def most(self, informations: NDArray[np.float64]) -> Array:
+        """(S,): the largest ratios that are possible with these M_s (S, k, k)."""
+        if self.roots is None:
+            return self.ratios.copy()
+        share = np.linalg.eigvalsh(self.roots @ informations @ self.roots.swapaxes(1, 2))[:, 0]
+        with np.errstate(divide="ignore"):
+            return np.where(share > 0.0, self.ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
+
+    def note(self, number: int, information: Array, ratio: float) -> None:
+        """What a scenario was found to have, at most."""
+        if self.roots is None:
+            self.roots = np.broadcast_to(
+                np.eye(len(information)), (self.ratios.size, *information.shape)
+            ).copy()
+        try:
+            self.roots[number] = np.linalg.inv(np.linalg.cholesky(information))
+            self.ratios[number] = ratio
+        except np.linalg.LinAlgError:
+            self.ratios[number] = np.inf
+
+
+@dataclass(frozen=True)
+class Demands:
+    """The requirements of all scenarios together, and what has been seen of their ratios so far."""
+
+    scenarios: tuple[Scenario, ...]
+
+    @cached_property
+    def asked(self) -> tuple[Asked, ...]:
+        """All requirements, scenario by scenario, side ones after the others of theirs."""
+        return tuple(
+            Asked(number, requirement, side)
+            for number, scenario in enumerate(self.scenarios)
+            for side, listed in ((False, scenario.requirements), (True, scenario.side))
+            for requirement in listed
+        )
+
+    @property
+    def criterion(self) -> Criterion | None:
+        """The criterion of the nominal plant that is to be maximised, if that is the goal."""
+        return criterion_of(self.scenarios[0].requirements)
+
+    @property
+    def definite(self) -> bool:
+        """Whether a singular information matrix is out of the question."""
+        return any(asked.requirement.definite for asked in self.asked)
+
+    def requirement(self, index: int) -> Requirement:
+        """By the index that `violations` gives."""
+        return self.asked[index].requirement
+
+    def violations(
+        self,
+        informations: NDArray[np.float64],
+        *,
+        above: float = -np.inf,
+        side: bool = False,
+        few: int | None = None,
+    ) -> list[tuple[int, Violation]]:
+        """All local maxima of all requirements' ratios, each with the index of its requirement in `asked`.
+
+        Args:
+            side: look at the side requirements, not at the others.
+            few: so many scenarios with violations are enough; those that were worst before are first.
+        """
+        if len(self.scenarios) == 1:
+            return list(self._violated(0, informations[0], above, side))
+        found, bad = list[tuple[int, Violation]](), 0
+        for number in self._by_most(informations, above, side):
+            own = list(self._violated(number, informations[number], above, side))
+            found += own
+            bad += bool(own)
+            if few is not None and bad >= few:
+                break
+        return found
+
+    def largest(self, informations: NDArray[np.float64], *, default: float) -> float:
+        """The largest ratio of the requirements, side ones left out; the default without any."""
+        found: list[float] = []
+        for number in self._by_most(informations, -np.inf, False) if len(self.scenarios) > 1 else [0]:
+            if found and self._seen[0].ratios[number] <= max(found):
+                break  # the next ones are no larger
+            found += [v.ratio for _, v in self._violated(number, informations[number], -np.inf, False)]
+        return max(found, default=default)
+
+    def _by_most(self, informations: NDArray[np.float64], above: float, side: bool) -> list[int]:
+        """The scenarios whose ratios may exceed `above`, those that may have the largest first."""
+        seen = self._seen[int(side)]
+        for number in np.flatnonzero(seen.most(informations) > above).tolist():
+            asked = [self.asked[index] for index in self._asked_of[number]]
+            most = [a.requirement.most(informations[number]) for a in asked if a.side == side]
+            seen.note(number, informations[number], max(most, default=0.0))
+        now = seen.most(informations)
+        return [n for n in np.argsort(-now, kind="stable").tolist() if now[n] > above]
+
+    def _violated(
+        self, number: int, information: Array, above: float, side: bool
+    ) -> Iterator[tuple[int, Violation]]:
+        """Those of one scenario."""
+        for index in self._asked_of[number]:
+            if self.asked[index].side == side:
+                for violation in self.asked[index].requirement.violations(information, above=above):
+                    yield index, violation
+
+    @cached_property
+    def _seen(self) -> tuple[_Seen, _Seen]:
+        """What is known of the ratios of requirements, and of side ones."""
+        return _Seen.none(len(self.scenarios)), _Seen.none(len(self.scenarios))
+
+    @cached_property
+    def _asked_of(self) -> list[list[int]]:
+        """The numbers of its requirements for each scenario."""
+        return [
+            [index for index, asked in enumerate(self.asked) if asked.scenario == number]
+            for number in range(len(self.scenarios))
+        ]
+
+    def worst_ratio(self, informations: NDArray[np.float64]) -> Violation:
+        """The worst violation of all requirements, criteria left out."""
+        found = [
+            violation
+            for asked in self.asked
+            if not isinstance(asked.requirement, Criterion)
+            for violation in asked.requirement.violations(informations[asked.scenario])
+        ]
+        return worst(found)

@@ -1,0 +1,69 @@
+"""What is asked of a design, in raw parameters: requirements are made for the coordinates of the design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from inputdesign_cli.accuracy.calibration import with_alpha
+from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.demands import RequirementFactory, Scenario
+from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
+from inputdesign_cli.design.convex.problem import Goal
+from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.spectrum import Basis
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another plant that the design must serve, in raw parameters; see `Question`."""
+
+    experiment: Experiment
+    requirements: Sequence[RequirementFactory]
+    side: Sequence[RequirementFactory] = ()
+
+    def at(self, coordinates: Experiment) -> Scenario:
+        """Its requirements in the coordinates of this experiment."""
+        required = tuple(make(coordinates) for make in self.requirements)
+        return Scenario(coordinates, required, tuple(make(coordinates) for make in self.side))
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked, in raw parameters: requirements are made for the coordinates of a design.
+
+    `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
+    `side` must hold besides. The other goals meet all of them. All of that is asked of the nominal plant,
+    that of `experiment`, and of each of the `others`; `mean_cost` as in `Problem`.
+    """
+
+    experiment: Experiment
+    basis: Basis
+    goal: Goal
+    requirements: Sequence[RequirementFactory]
+    side: Sequence[RequirementFactory] = ()
+    cost: Mapping[PowerKind, Weight] = field(default_factory=dict)
+    limits: Sequence[PowerLimit] = ()
+    densities: Sequence[DensityLimit] = ()
+    others: Sequence[Alternative] = ()
+    mean_cost: bool = False
+
+    @property
+    def plants(self) -> list[Alternative]:
+        """All that must be served, the nominal plant first."""
+        return [Alternative(self.experiment, self.requirements, self.side), *self.others]
+
+    def at_alpha(self, alpha: float) -> Question:
+        """The same question with another confidence factor of the model errors of the nominal plant."""
+
+        def changed(make: RequirementFactory) -> RequirementFactory:
+            return lambda experiment: with_alpha([make(experiment)], alpha)[0]
+
+        return replace(
+            self, requirements=list(map(changed, self.requirements)), side=list(map(changed, self.side))
+        )
+
+    def of_length(self, samples: int) -> Question:
+        """The same question of experiments with so many samples."""
+        others = [replace(one, experiment=replace(one.experiment, samples=samples)) for one in self.others]
+        return replace(self, experiment=replace(self.experiment, samples=samples), others=others)

@@ -1,0 +1,62 @@
+"""Were samples recorded once and given twice? Then prediction errors of different times follow each other.
+
+Errors of different times are independent if the model is right, and so is every other copy of the noise: only
+the same noise, also where it was rounded, shifted or scaled, comes again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+
+from inputdesign_cli.plant.polynomial import Array
+
+# So many samples in a row have a correlation beyond this at another time by chance in one of 1e10 cases.
+_IN_A_ROW, _FOLLOWS = 30, 0.9
+# Of the lags, those at which most errors follow each other.
+_LAGS = 8
+# Larger errors, in standard deviations, count as much: single spikes say nothing.
+_SPIKE = 3.0
+_NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """Errors from sample `second` on follow those from `first` on, over about `length` samples."""
+
+    first: int
+    second: int
+    length: int
+
+
+def repetition(errors: Array) -> Repetition | None:
+    """The longest stretch of errors (samples, p) that comes again; None where none does."""
+    spread = np.median(np.abs(errors), axis=0) / _NORMAL
+    samples = len(errors)
+    if samples < 2 * _IN_A_ROW or not np.all(spread > 0.0):
+        return None
+    e = np.clip(errors / spread, -_SPIKE, _SPIKE)
+    around = scipy.fft.rfft(e, 2 * samples, axis=0)
+    products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)
+    lags = np.arange(_IN_A_ROW, samples - _IN_A_ROW + 1)
+    strength = np.abs(products[lags]) / np.sqrt(samples - lags)
+    tried = lags[np.argsort(-strength, kind="stable")[:_LAGS]]
+    found = [one for lag in tried.tolist() if (one := _at(e, lag)) is not None]
+    return max(found, key=lambda one: one.length, default=None)
+
+
+def _at(e: Array, lag: int) -> Repetition | None:
+    early, late = e[:-lag], e[lag:]
+    both, own, other = (_in_a_row(np.sum(x, axis=1)) for x in (early * late, early**2, late**2))
+    starts = np.flatnonzero(np.abs(both) > _FOLLOWS * np.sqrt(own * other))
+    if not starts.size:
+        return None
+    first, last = int(starts[0]), int(starts[-1])
+    return Repetition(first, first + lag, last + _IN_A_ROW - first)
+
+
+def _in_a_row(x: Array) -> Array:
+    total = np.concatenate([np.zeros(1), np.cumsum(x)])
+    return np.asarray(total[_IN_A_ROW:] - total[:-_IN_A_ROW])

@@ -1,0 +1,115 @@
+"""Which column of a file is which channel, and in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.files import Sheet
+from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.tables import is_time
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
+TIME_UNITS = tuple(SECONDS)
+_UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
+    unit: unit for unit in TIME_UNITS
+}
+_CHANNEL = re.compile(r"([uy])(\d+)(?![a-z0-9]).*")
+_WITH_UNIT = re.compile(r"(.*\S)\s*[(\[]([^)\]]*)[)\]]")
+
+
+def channel_columns(letter: str, count: int, sheet: Sheet, preparation: Preparation) -> dict[str, str]:
+    """Channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user said."""
+    found = {}
+    for name in (f"{letter}{i + 1}" for i in range(count)):
+        plain = count == 1 and not any(header.startswith(name) for header in sheet.header)
+        found[name] = preparation.columns.get(name, letter if plain else name)
+    return found
+
+
+def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
+    """`time` -> the name of its column, if there is one.
+
+    Raises:
+        DataError: there are several.
+    """
+    if "time" in preparation.columns:
+        return {"time": preparation.columns["time"]}
+    timed = [name for name in sheet.header if is_time(name)]
+    if len(timed) > 1:
+        message = f"{sheet.path.name} has several columns of times: {', '.join(timed)}"
+        hint = f"say which one counts: --columns time={timed[0]}"
+        raise DataError(sheet.error("data-missing-column", message, hint))
+    return {"time": timed[0]} if timed else {}
+
+
+def time_unit_of(name: str) -> str | None:
+    """The unit in the name of a column of times: `time_ms`, `Time (sec)`."""
+    words = re.findall(r"[a-z]+", name.lower())
+    return _UNITS.get(words[-1]) if len(words) > 1 else None
+
+
+def with_names(sheet: Sheet, units: Units, preparation: Preparation) -> Preparation:
+    """Columns that are called as the spec calls a channel are its columns, where nothing else says which."""
+    named = {}
+    for channel, (name, _) in units.channels.items():
+        called = [plain for plain, _ in map(_split, sheet.names) if plain.lower() == name.lower()]
+        taken = channel in preparation.columns or any(
+            re.match(rf"{channel[0]}\d*(?![a-z0-9])", header) for header in sheet.header
+        )
+        if name and len(called) == 1 and not taken:
+            named[channel] = next(header for header in sheet.names if _split(header)[0] == called[0])
+    return replace(preparation, columns={**named, **preparation.columns}) if named else preparation
+
+
+def _split(header: str) -> tuple[str, str]:
+    """The name and the unit of a column: `valve (%)` or `valve [%]`."""
+    match = _WITH_UNIT.fullmatch(header.strip())
+    return (match[1], match[2].strip()) if match else (header.strip(), "")
+
+
+def other_units(sheet: Sheet, units: Units, preparation: Preparation) -> list[str]:
+    """Columns whose header states another unit than the spec does; nothing is converted."""
+    told = []
+    for channel, (_, unit) in units.channels.items():
+        of_letter = units.inputs if channel[0] == "u" else units.outputs
+        plain = [channel, *([channel[0]] if of_letter == 1 else [])]
+        starts = [preparation.columns[channel].strip().lower()] if channel in preparation.columns else plain
+        for header in sheet.names:
+            name, found = _split(header)
+            ours = name.lower().split(" ")[0] in starts or header.strip().lower() in starts
+            if ours and unit and found and found.lower() != unit.lower():
+                told.append(
+                    f"{header.strip()} is in {found}, the spec counts {channel} in {unit}: not converted"
+                )
+    return told
+
+
+def reference_columns(units: Units, header: Sequence[str]) -> Sequence[str]:
+    """The columns of the reference of a loop, if the file has them all: r1, r2, ..; r or r1 of one."""
+    if not units.closed_loop:
+        return []
+    if units.inputs == 1:
+        return [name for name in ("r1", "r") if name in header][:1]
+    return list(units.excitations) if set(units.excitations) <= set(header) else []
+
+
+def unused_columns(sheet: Sheet, units: Units, preparation: Preparation) -> list[str]:
+    """Columns that are called as channels are, of which the plant has fewer."""
+    counts = {"u": units.inputs, "y": units.outputs}
+    found = [(name, _CHANNEL.fullmatch(name)) for name in sheet.header]
+    extra = [
+        name
+        for name, match in found
+        if match and int(match[2]) > counts[match[1]] and name not in preparation.columns.values()
+    ]
+    if not extra:
+        return []
+    verb = "is" if len(extra) == 1 else "are"
+    return [
+        f"{', '.join(extra)} {verb} not used: the plant of the spec has {units.inputs} inputs and "
+        f"{units.outputs} outputs; what such an input causes counts as noise here"
+    ]

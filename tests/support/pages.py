@@ -1,0 +1,43 @@
+"""Pages of reports: the spec that most are of, strict reading, and their words."""
+
+import re
+
+import html5lib
+
+SPEC = """\
+title: "Heat <script>alert(1)</script> & flow"
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 1}
+experiment: {samples: 100%s}
+accuracy: {model_error: {relative: 0.1, confidence: 0.9}}
+spectrum: {type: fir, order: 2}
+signal: {type: multisine, candidates: 1, seed: 5}
+"""
+LOOP = ", controller: {numerator: [0.1], denominator: [1]}"
+XHTML = "{http://www.w3.org/1999/xhtml}"
+
+
+def parse(text):
+    """The page, which must be valid HTML; whatever points out of it is an error."""
+    page = html5lib.HTMLParser(strict=True).parse(text)
+    assert page.findall(f".//{XHTML}script") == []
+    for element in page.iter():
+        for name, value in element.attrib.items():
+            assert not name.startswith("on"), "a script"
+            if name in ("src", "href"):
+                assert value.startswith("data:image/"), value[:80]
+    assert "url(" not in text
+    assert "@import" not in text
+    return page
+
+
+def words(page):
+    return re.sub(r"\s+", " ", "".join(page.itertext()))
+
+
+def rows(page):
+    """The cells of all tables, row by row."""
+    return [
+        [re.sub(r"\s+", " ", "".join(cell.itertext())).strip() for cell in row]
+        for row in page.iter(f"{XHTML}tr")
+    ]

@@ -1,0 +1,64 @@
+"""What a record with a narrow band leaves open about the structure of the model."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import assess, identify, parse_spec, solve
+
+NARROW = """
+sample_time: 10
+plant: {B: [0, 0, 0, 0, 0.04], F: [1, -0.95]}
+noise: {D: [1, -0.8], variance: 0.01}
+experiment: {samples: 600}
+cost: {input_power: 1}
+accuracy: {model_error: {relative: 0.1, band: [0.0005, 0.02]}}
+spectrum: {type: fir, order: 20}
+signal: {type: binary, seed: 1}
+"""
+
+
+@pytest.fixture(scope="module")
+def narrow(tmp_path_factory):
+    """Writes a record with the narrow-band input that is designed for the model, and perhaps a pole more."""
+    u = 1.3 * solve(parse_spec(NARROW)).tables["signal"].columns["u1"]
+
+    def written(seed, pole=0.0):
+        e = 0.1 * np.random.default_rng(seed).standard_normal(u.size + 300)
+        B, F = np.array([0, 0, 0, 0, 0.04]) * (1 - pole), np.convolve([1, -0.95], [1, -pole])
+        y = scipy.signal.lfilter(B, F, u) + scipy.signal.lfilter([1], [1, -0.8], e)[300:]
+        path = tmp_path_factory.mktemp("narrow") / "a.csv"
+        np.savetxt(path, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+        return path
+
+    return written
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow):
+    found = assess(parse_spec(NARROW), narrow(seed, 0.5))
+    assert found.verdict == "undecided"
+    reasons = found.results.result["assessment"]["undecided"]
+    assert "one more " in reasons[-1]
+    assert set(reasons) <= set(found.results.result["notes"])
+    assert "(f2)" in " ".join(found.results.result["notes"])
+
+
+def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
+    path = narrow(1)
+    found = assess(parse_spec(NARROW), path)
+    assert found.verdict == "met"
+    entries = {e["parameter"]: e for e in found.results.result["assessment"]["neglected"]}
+    worst = max(entries.values(), key=lambda e: e["may_move"])
+    assert worst["may_move"] > max(1.0, worst["moves"])
+    assert "rests on the structure" in " ".join(found.results.result["notes"])
+    fine = np.linspace(0.005, 0.2, 2000)
+
+    def plant(overrides):
+        entry = identify(parse_spec(NARROW, overrides=overrides), path).result["identification"]["theta"]
+        B = [0, 0, 0, entry.get("b3", 0.0), entry["b4"]]
+        return scipy.signal.freqz(B, [1, entry["f1"]], fine)[1]
+
+    own, more = plant([]), plant(["plant.B=[0, 0, 0, 0.001, 0.04]"])
+    to_first_order = np.max(np.abs(more - own) / np.abs(own)) / 0.1
+    assert entries["b3"]["moves"] == pytest.approx(to_first_order, rel=0.05)

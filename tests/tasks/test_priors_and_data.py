@@ -1,0 +1,64 @@
+"""What was known before a record: whether it counts beside it, and contradicts it or not."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+from inputdesign_cli import assess, identify, parse_spec, solve
+from inputdesign_cli.errors import SpecError
+from tests.support.heater import HEATER
+
+
+def test_a_prior_without_its_estimate_does_not_count(heater_record):
+    path = heater_record("a.csv", 300, 1, power=0.02)
+    spec = parse_spec(HEATER)
+    plain = assess(spec, path).results.result
+    prior = yaml.safe_dump({"information": (1e9 * np.eye(5)).tolist()}, default_flow_style=True)
+    with_prior = assess(parse_spec(HEATER, overrides=[f"experiment.prior={prior}"]), path).results.result
+    assert with_prior["assessment"]["requirements"] == plain["assessment"]["requirements"]
+    assert "experiment.prior does not count" in " ".join(with_prior["notes"])
+
+
+def test_a_prior_with_its_estimate_counts_as_its_record_does(heater_record, tmp_path):
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.1"], folder=tmp_path)
+    first = heater_record("a.csv", 700, 1, power=0.5, level=(40.0, 52.3), warm=1.0)
+    second = heater_record("b.csv", 700, 2, power=0.5, level=(41.0, 50.0), warm=-2.0)
+    (tmp_path / "model.yaml").write_bytes(identify(spec, first).files["model.yaml"])
+    alone, both = assess(spec, second), assess(spec, [first, second])
+    named = ["accuracy.model_error.relative=0.1", "experiment.prior.information=model.yaml"]
+    known = assess(parse_spec(HEATER, overrides=named, folder=tmp_path), second)
+    ratio, joint, single = (
+        found.results.result["assessment"]["requirements"][0]["worst_ratio"] for found in (known, both, alone)
+    )
+    assert ratio == pytest.approx(joint, rel=0.1)
+    assert ratio < 0.9 * single
+    result = known.results.result
+    assert result["model_error"]["worst_ratio"] == pytest.approx(ratio)
+    assert "experiment.prior counts" in " ".join(result["notes"])
+    assert result["identification"]["prior"]["probability"] > 1e-3
+
+
+def test_a_prior_of_another_system_decides_nothing(heater_record):
+    path = heater_record("a.csv", 700, 1, power=0.5)
+    found = identify(parse_spec(HEATER), path).result
+    values = {name: 1.01 * value for name, value in found["identification"]["theta"].items()}
+    prior = json.dumps({"information": found["information"]["matrix"].tolist(), "parameters": values})
+    verdict = assess(parse_spec(HEATER, overrides=[f"experiment.prior={prior}"]), path)
+    assert verdict.verdict == "undecided"
+    assert "contradict each other" in " ".join(verdict.results.result["assessment"]["undecided"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "secret: [", "- 1", "plant: {B: [0, 1]}", "estimate: {parameters: {b1: 1}, covariance: [[1, 0]]}"],
+)
+def test_what_is_no_model_file_is_refused_and_not_shown(tmp_path, text):
+    (tmp_path / "model.yaml").write_text(text)
+    spec = parse_spec(HEATER, overrides=["experiment.prior.information=model.yaml"], folder=tmp_path)
+    with pytest.raises(SpecError) as caught:
+        solve(spec)
+    (diagnostic,) = caught.value.diagnostics
+    assert (diagnostic.code, diagnostic.key) == ("bad-model-file", "experiment.prior.information")
+    assert "secret" not in str(caught.value)

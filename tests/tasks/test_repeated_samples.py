@@ -1,0 +1,55 @@
+"""A record that is given twice, in part, rounded, or inside one file, is no reason to say "met"."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli import assess, parse_spec
+
+SPEC = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.5], variance: 1.0}
+experiment: {samples: 500}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: fir, order: 8}
+"""
+
+
+def rows_of(seed, samples=500):
+    rng = np.random.default_rng(seed)
+    u = 0.3 * np.sign(rng.standard_normal(samples))
+    y = scipy.signal.lfilter([0, 3.6], [1, -0.7], u)
+    return np.column_stack([u, y + scipy.signal.lfilter([1, -0.5], [1], rng.standard_normal(samples))])
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def save(name, rows):
+        np.savetxt(tmp_path / name, rows, delimiter=",", header="u,y", comments="", fmt="%.12g")
+        return tmp_path / name
+
+    return save
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        (lambda x: (x[:450], x[50:]), "b.csv are those of a.csv"),
+        (lambda x: (x, np.column_stack([x[:, 0], np.round(x[:, 1], 1)])), "b.csv are those of a.csv"),
+        (lambda x: (np.concatenate([x, x]),), "a.csv repeat"),
+    ],
+    ids=["overlap", "rounded", "twice"],
+)
+def test_samples_given_twice_leave_the_verdict_open(parts, told, saved):
+    files = [saved(f"{name}.csv", part) for name, part in zip("ab", parts(rows_of(3)), strict=False)]
+    found = assess(parse_spec(SPEC), files)
+    assert found.verdict == "undecided"
+    assert any(told in reason for reason in found.results.result["assessment"]["undecided"])
+
+
+def test_the_same_input_applied_twice_counts_twice(saved):
+    first, second = rows_of(3), rows_of(4)
+    second[:, 1] += scipy.signal.lfilter([0, 3.6], [1, -0.7], first[:, 0] - second[:, 0])
+    second[:, 0] = first[:, 0]
+    found = assess(parse_spec(SPEC), [saved("a.csv", first), saved("b.csv", second)])
+    assert found.verdict == "met"

@@ -1,0 +1,119 @@
+"""What follows an estimate: another experiment, or none, about the operating point of the record."""
+
+import html
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
+from inputdesign_cli.cli import app
+from tests.support.heater import HEATER, STRUCTURE, said
+
+
+def test_what_a_top_up_within_limits_leaves_is_told(heater_record):
+    path = heater_record("a.csv", 300, 1, power=0.02)
+    limits = ["objective=best_accuracy", "limits.input_power=0.005", "accuracy.model_error.relative=0.05"]
+    found = assess(parse_spec(HEATER, overrides=limits), path)
+    result = found.results.result
+    left, times = result["assessment"]["left"], result["assessment"]["experiments"]
+    assert left > 1.5
+    assert f"still {left:.4g} times" in said(found.results)
+    assert "makes up for it" not in said(found.results)
+    # So many of them, one after the other, are enough, and one fewer is not.
+    one = np.asarray(result["information"]["matrix"])
+    data = np.asarray(identify(parse_spec(HEATER), path).result["information"]["matrix"])
+    theta = list(result["identification"]["theta"].values())
+    w = np.linspace(1e-6, 0.02 * 5, 400)
+    z = np.exp(-1j * w)[:, None]
+    B, F = theta[0] * z**6 + theta[1] * z**7, 1 + theta[4] * z
+    gradient = np.concatenate([z**6 / F, z**7 / F, 0 * z, 0 * z, -B * z / F**2], axis=1)
+    T = np.stack([gradient.real, gradient.imag], axis=1)
+
+    def ratio(n):
+        P = np.linalg.inv(data + n * (one - data))
+        r_u = result["model_error"]["alpha"] * np.sqrt(np.linalg.eigvalsh(T @ P @ T.swapaxes(1, 2))[:, -1])
+        return np.max(r_u / (0.05 * np.abs(B / F)[:, 0]))
+
+    assert ratio(times) < 1.001 < 1.002 * ratio(times - 1)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "verdict", "why"),
+    [
+        (["limits.input_power=0.0001"], "missed", "cannot be met within the limits"),
+        (["experiment.controller={numerator: [9], denominator: [1]}"], "undecided", "unstable"),
+    ],
+)
+def test_the_estimate_is_kept_when_no_design_follows(overrides, verdict, why, heater_record):
+    path = heater_record("a.csv", 300, 1, power=0.02)
+    spec = parse_spec(HEATER, overrides=["accuracy.model_error.relative=0.05", *overrides])
+    found = assess(spec, path)
+    assert found.verdict == verdict
+    assert why in json.dumps(found.results.result["assessment"])
+    plain = identify(parse_spec(STRUCTURE, design=False), path)
+    assert found.results.result["identification"]["theta"] == pytest.approx(
+        plain.result["identification"]["theta"]
+    )
+    assert {"fit", "residuals"} <= set(found.results.tables)
+    assert "model.yaml" in found.results.files
+    assert ("no experiment is designed" in said(found.results)) == (verdict == "missed")
+
+
+def test_a_spec_without_a_question_is_enough_to_identify(heater_record, tmp_path):
+    spec, path = tmp_path / "structure.yaml", heater_record("a.csv", 300, 1)
+    spec.write_text(STRUCTURE)
+    out = tmp_path / "run"
+    run = CliRunner().invoke(
+        app, ["identify", str(path), "--spec", str(spec), "-o", str(out), "--no-figures"]
+    )
+    assert run.exit_code == 0, run.output
+    run = CliRunner().invoke(app, ["report", str(out)])
+    assert run.exit_code == 0, run.output
+    assert identify(load_spec(spec, design=False), path).result["status"] == "identified"
+    with pytest.raises(Exception, match="nothing is asked"):
+        solve(load_spec(spec))
+
+
+def test_the_operating_point_of_the_command_line(heater_record, tmp_path):
+    spec, path = tmp_path / "spec.yaml", heater_record("a.csv", 300, 2, level=(40.0, 52.3))
+    spec.write_text(STRUCTURE)
+    call = ["identify", str(path), "--spec", str(spec), "-o", str(tmp_path / "run"), "--no-figures", "--json"]
+    known = CliRunner().invoke(app, [*call, "--operating-point", "u1=40,y=52.3"])
+    assert not json.loads(known.stdout)["identification"]["free_start"]
+    unknown = CliRunner().invoke(app, call)
+    assert json.loads(unknown.stdout)["identification"]["free_start"]
+    assert CliRunner().invoke(app, [*call, "--operating-point", "u1:40"]).exit_code == 2
+
+
+def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_command(
+    heater_record, tmp_path
+):
+    spec, path = tmp_path / "spec.yaml", heater_record("first run.csv", 300, 2, level=(40.0, 52.3))
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    spec.write_text(STRUCTURE + asked)
+    out = tmp_path / "run"
+    call = [
+        "assess",
+        str(spec),
+        str(path),
+        "-o",
+        str(out),
+        "--no-figures",
+        "--operating-point",
+        "u1=40,y1=52.3",
+    ]
+    run = CliRunner().invoke(app, call)
+    assert run.exit_code == 1, run.output
+    result = json.loads((out / "result.json").read_text())
+    assert result["identification"]["operating_point"] == {"u1": 40.0, "y1": 52.3}
+    assert result["signal"]["operating_point"] == [40.0]
+    assert any("varies about the operating point, u1 = 40" in note for note in result["notes"])
+    u = np.loadtxt(out / "signal.csv", delimiter=",", skiprows=1)[:, 1]
+    assert np.mean(u) == pytest.approx(40.0, abs=3 * np.std(u))
+    assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
+    page = html.unescape((out / "report.html").read_text())
+    assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page
