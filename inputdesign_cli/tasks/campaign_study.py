@@ -84,7 +84,7 @@ def studied(study: CampaignStudy, results: Results, executor: Executor | None) -
         oracle = study.planner.cheapest(study.true.model)
     except IdesignError:  # the true system cannot be asked what the spec asks
         oracle = None
-    ways = {name: _ended(study, rules, executor) for name, rules in ways_of(study).items()}
+    ways = {name: tried(study, rules, executor) for name, rules in ways_of(study).items()}
     result = dict(results.result)
     result["simulation"] = campaigns_entry(study.true, ways, oracle, runs=study.runs, seed=study.seed)
     result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}
@@ -107,7 +107,8 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
     return ways | ({"white": replace(one, white=True)} if study.white else {})
 
 
-def _ended(study: CampaignStudy, rules: Rules, executor: Executor | None) -> Sequence[Ended]:
+def tried(study: CampaignStudy, rules: Rules, executor: Executor | None = None) -> Sequence[Ended]:
+    """The runs of one way of experimenting."""
     job = CampaignJob(study.planner, rules, study.true, study.step, study.cost)
     # One run a batch: all ways meet the same noise in the same run.
     parts = run_batches(run_campaigns, job, runs=study.runs, size=1, seed=study.seed, executor=executor)

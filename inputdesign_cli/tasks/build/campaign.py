@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -14,26 +15,27 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models.campaign import Campaign, Pilot
 from inputdesign_cli.specification.models.uncertainty import SOURCES
 from inputdesign_cli.tasks.build.convex import build_convex
-from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.identification import ask, build_identification, restated
 from inputdesign_cli.tasks.build.simulation import build_simulation
 from inputdesign_cli.tasks.build.system import build_experiment, build_loop, record_step
 from inputdesign_cli.tasks.build.uncertainty import farthest_radius
-from inputdesign_cli.tasks.campaign import Kind, Planned, Rules, Schedule, Standing
+from inputdesign_cli.tasks.campaign import REACHED, Kind, Planned, Rules, Schedule, Standing
 from inputdesign_cli.tasks.campaign_rounds import Rounds
 from inputdesign_cli.tasks.campaign_study import CampaignStudy, CampaignTask
-from inputdesign_cli.tasks.convex import ConvexTask
 from inputdesign_cli.tasks.identification import ModelQuestion
-from inputdesign_cli.tasks.record import design_cost
+from inputdesign_cli.tasks.record import RecordRequest, design_cost
 from inputdesign_cli.tasks.record_search import fitting_record
+from inputdesign_cli.tasks.result.design import Designed
 
 _TENTH, _LONGEST = 10, 3
-_INSIDE = 1.0 + 1e-9
+# A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
+_CLOSE, _MOSTLY = 1.1, 0.5
+_LONGER = 4.0  # by which a length grows at once
 _SOURCE = "plan"
 # What says how well the plant is known before any data.
 _PRIOR = {*SOURCES, "parameters"}
@@ -114,12 +116,6 @@ def _check(spec: Spec, stated: Campaign) -> None:
         what, hint = "an experiment in continuous time", "write plant.sample: zoh"
     elif spec.experiment.samples < 2:
         what, hint, key = "an experiment without a length", "state experiment.samples", "experiment.samples"
-    elif stated.power_cap is not None and spec.limits.excitation_power is not None:
-        what, hint, key = (
-            "a power_cap beside limits.excitation_power",
-            "keep one of them",
-            "campaign.power_cap",
-        )
     if what:
         raise spec.complain("not-supported", f"a campaign does not go with {what}", hint=hint, key=key)
 
@@ -200,17 +196,19 @@ class SpecPlanner:
         take = rules.schedule.take(done)
         if known is None and done == 0 and rules.pilot_power is not None:
             return self._pilot(rules.pilot_power, take, seed)
-        rest, last = rules.schedule.rest(done), rules.schedule.last(done)
-        robust, on = rules.robust_last and last, rules.stops or not last
-        changes = self._changes(known, rest, seed, white=rules.white, robust=robust, goes_on=on)
-        try:
-            return self._planned(changes, known, take, rules.power_cap, first)
-        except IdesignError:
-            if not robust or known is None:
-                raise
-        # Some plant that the data leave open asks for what cannot be done; the estimate itself may not.
-        changes = self._changes(known, rest, seed, white=rules.white, robust=False, goes_on=on)
-        return self._planned(changes, known, take, rules.power_cap, first)
+        cap = np.inf if rules.power_cap is None or first is None else rules.power_cap * first
+        last = rules.schedule.last(done)
+        on = rules.stops or not last
+        rest, longest = rules.schedule.rest(done), rules.end - done
+        if rules.robust_last and last and known is not None:
+            changes = self._changes(known, rest, seed, white=rules.white, robust=True, goes_on=on)
+            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
+            with suppress(IdesignError):
+                found = self._designed(changes, known)
+                if found.cost <= cap * REACHED:
+                    return found.planned.cut(take)
+        changes = self._changes(known, rest, seed, white=rules.white, goes_on=on)
+        return self._affordable(changes, known, cap, longest).cut(take)
 
     def cheapest(self, model: Model) -> float:
         """Cost, summed over the samples, of the design that knows the plant: the oracle."""
@@ -221,43 +219,47 @@ class SpecPlanner:
         done, _ = build_convex(parse_spec(spec, _SOURCE, overrides, folder=folder)).designed()
         return done.experiment.samples * design_cost(done.design, done.cost)
 
-    def _planned(
-        self,
-        changes: Mapping[str, Json],
-        known: Standing | None,
-        take: int,
-        cap: float | None,
-        first: float | None,
+    def _affordable(
+        self, changes: Mapping[str, Json], known: Standing | None, cap: float, longest: int
     ) -> Planned:
-        """The cheapest experiment; where the cap forbids it, the best that it leaves."""
-        most = None if cap is None or first is None else cap * first
-        try:
-            plan = self._designed(changes, known, take, capped=False)
-            if most is None or plan.power <= most * _INSIDE:
-                return plan
-        except InfeasibleError:
-            if most is None:
-                raise
-        limited = {**changes, "objective": "best_accuracy", "limits.excitation_power": most}
-        return self._designed(limited, known, take, capped=True)
+        """The cheapest experiment; where a sample of it costs more than the cap, the shortest that does not.
 
-    def _designed(
-        self, changes: Mapping[str, Json], known: Standing | None, take: int, *, capped: bool
-    ) -> Planned:
-        quick = self._task({**changes, "solver.any_spectrum": False}, known)
-        done, _ = quick.designed()
-        made = fitting_record(quick.record, done.question, done.design, done.experiment).record
-        rest, cost = done.experiment.samples, design_cost(done.design, done.cost)
-        record = np.zeros((rest, done.experiment.inputs)) if made is None else made.samples
-        kind: Kind = "white" if "spectrum" in changes else "nominal" if quick.plants is None else "robust"
-        solved = partial(self._solved, changes, known)
-        return Planned(record, take, _power(record), cost, kind, capped=capped, solved=solved)
+        Where the longest still does, that at the cap; where limits leave none, the best within them.
+        """
 
-    def _task(self, changes: Mapping[str, Json], known: Standing | None) -> ConvexTask:
-        return build_convex(self._spec(changes, known))
+        def tried(samples: int) -> _Found | None:
+            try:
+                return self._designed({**changes, "experiment.samples": samples}, known)
+            except InfeasibleError:
+                return None
 
-    def _solved(self, changes: Mapping[str, Json], known: Standing | None) -> Results:
-        return self._task(changes, known).solve()
+        rest = int(changes["experiment.samples"])
+        short, found = rest, tried(rest)
+        fits = found is not None and found.cost <= cap * REACHED
+        while not fits and rest < longest:
+            more = 2.0 if found is None else min(found.cost / cap, _LONGER)
+            short, rest = rest, int(min(np.ceil(max(more, 1.1) * rest), longest))
+            found = tried(rest)
+            fits = found is not None and found.cost <= cap * REACHED
+        if found is None:
+            if not self.spec.limits.bounds_power:
+                return self._designed(changes, known).planned  # says what is infeasible
+            best = self._designed({**changes, "objective": "best_accuracy"}, known)
+            return replace(best.planned, capped=True)
+        while fits and rest > _CLOSE * short and found.cost < _MOSTLY * cap:
+            middle = int(np.sqrt(short * rest))
+            between = tried(middle)
+            if between is not None and between.cost <= cap * REACHED:
+                found, rest = between, middle
+            else:
+                short = middle
+        return found.planned.at_most(cap)
+
+    def _designed(self, changes: Mapping[str, Json], known: Standing | None) -> _Found:
+        task = build_convex(self._spec({**changes, "solver.any_spectrum": False}, known))
+        done, _ = task.designed()
+        kind: Kind = "white" if "spectrum" in changes else "nominal" if task.plants is None else "robust"
+        return _Found(task.record, done, kind)
 
     def _pilot(self, power: float, take: int, seed: int) -> Planned:
         """White noise of this power, even over the inputs."""
@@ -265,16 +267,7 @@ class SpecPlanner:
         powers = np.full(nominal.inputs, power / nominal.inputs)
         drawn = Redrawn.flat("pilot", "white", powers, nominal.band, take, step)
         record = drawn.draw(1, take, np.random.default_rng(seed))[0]
-        changes: dict[str, Json] = {
-            **self._changes(None, take, seed),
-            "spectrum": {"given": {"type": "white", "power": power}},
-            "objective": None,
-        }
-
-        def solved() -> Results:
-            return build_given(self._spec(changes, None)).solve()
-
-        return Planned(record, take, _power(record), 0.0, "pilot", capped=False, solved=solved)
+        return Planned(record, take, _power(record), 0.0, "pilot")
 
     def _spec(self, changes: Mapping[str, Json], known: Standing | None) -> Spec:
         spec = self.spec if known is None else restated(self.spec, known.model, _SOURCE)
@@ -320,6 +313,29 @@ class SpecPlanner:
         elif white:
             changes["uncertainty"] = None
         return changes
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A design, of which the record is made when it is wanted."""
+
+    request: RecordRequest
+    done: Designed
+    kind: Kind
+
+    @cached_property
+    def cost(self) -> float:
+        """Of a sample."""
+        return design_cost(self.done.design, self.done.cost)
+
+    @property
+    def planned(self) -> Planned:
+        """With its record; zero where nothing needs to be applied."""
+        done = self.done
+        made = fitting_record(self.request, done.question, done.design, done.experiment).record
+        silent = np.zeros((done.experiment.samples, done.experiment.inputs))
+        record = silent if made is None else made.samples
+        return Planned(record, len(record), _power(record), self.cost, self.kind)
 
 
 def _power(record: Array) -> float:
