@@ -58,6 +58,13 @@ def identify(
     detrend: DetrendWord = "none",
     skip: Skip = 0,
     span: Span = "",
+    frequency_response: Annotated[
+        bool,
+        typer.Option(
+            "--frequency-response",
+            help="Measure the frequency response without a model instead, at the lines of the spec.",
+        ),
+    ] = False,
     figures: Figures = True,
     json_output: Json = False,
     quiet: Quiet = False,
@@ -77,6 +84,7 @@ def identify(
             remove_means=remove_means,
             operating_point=levels(operating_point),
             preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
+            frequency_response=frequency_response,
         )
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)

@@ -11,6 +11,8 @@ from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, log_axes, marked
 from inputdesign_cli.runs.results import Array, BoundCurves, BoundPanel
 
+_BELOW = 0.3  # of the smallest error, what is shown
+
 
 def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
     """|G|, r_u, r_adm and white excitation's r_u over frequency, with the active frequencies marked."""
@@ -36,6 +38,11 @@ def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
         handles += marked(axes, curves.active, height, color=BLUE, label="active")
+    # A zero of G is no reason to show decades of nothing.
+    errors = [x for x in (curves.r_u, curves.r_adm, curves.r_u_record, curves.r_u_white) if x is not None]
+    least = min(float(np.min(x[x > 0.0], initial=np.inf)) for x in errors)
+    low, high = axes.get_ylim()
+    axes.set_ylim(max(low, _BELOW * least), high)
     if curves.r_adm is not None:
         low, high = axes.get_ylim()
         axes.fill_between(w, _positive(curves.r_adm), high, color=ORANGE, alpha=0.07, linewidth=0)

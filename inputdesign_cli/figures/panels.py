@@ -25,6 +25,10 @@ class Panel(Protocol):
     def entry(self) -> tuple[int, int] | None:
         """Output and input from zero; None: the only entry, or all of them together."""
 
+    @property
+    def names(self) -> str:
+        """Of its input and output; empty where there are none."""
+
 
 P = TypeVar("P", bound=Panel)
 
@@ -54,8 +58,8 @@ def draw_panels(
         handles = plot(axes, panel)
         frequency_axis(axes, panel.frequency, time_unit)
         axes.set_ylabel(magnitude)
-        if title:
-            axes.set_title(title, loc="right", color=GREY)
+        if title or panel.names:
+            axes.set_title(title or panel.names, loc="right", color=GREY)
         legend_above(axes, handles)
         return
     places = [panel.entry or (0, 0) for panel in panels]
@@ -67,7 +71,7 @@ def draw_panels(
         longest = max(longest, plot(axes, panel), key=len)
         log_axes(axes, "x")
         axes.set_xlim(float(panel.frequency.min()), float(panel.frequency.max()))
-        axes.set_title(f"$G_{{{i + 1}{j + 1}}}$", loc="left", color=GREY)
+        axes.set_title(f"$G_{{{i + 1}{j + 1}}}$ {panel.names}".strip(), loc="left", color=GREY)
     for i, j in product(range(rows), range(columns)):
         if (i, j) not in places:
             grid[i, j].set_axis_off()

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.bound import draw_bound
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
+from inputdesign_cli.figures.deviations import draw_deviations
 from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.exploration import draw_orders
 from inputdesign_cli.figures.fan import draw_fan
@@ -25,6 +26,7 @@ from inputdesign_cli.runs.results import Curves, Results
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.BoundCurves: draw_bound,
     of.CloudCurves: draw_cloud,
+    of.DeviationCurves: draw_deviations,
     of.DirectionCurves: draw_directions,
     of.EllipseCurves: draw_ellipses,
     of.ErrorBandCurves: draw_error_bands,

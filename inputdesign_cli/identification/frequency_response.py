@@ -16,13 +16,18 @@ import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.periodic_response import (
+    PeriodicResponse,
+    Periods,
+    excited_harmonics,
+    periodic_response,
+)
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 CONFIDENCE = 0.95
 _MOST_FREQUENCIES = 200
 _FREEDOM = 8
 _PARABOLA = 3
-_EXCITED = 1e-6
 _REPEATS, _BEGINNING, _TRIED = 1e-9, 16, 20
 _DEPENDENT = 1e-7
 
@@ -83,28 +88,20 @@ def _period(x: Array) -> int:
 
 def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | None:
     """One input whose signals repeat; the first of three periods or more is left to the transient."""
-    periods = len(y) // period
-    kept = periods - (periods > 2)
+    times = len(y) // period
+    periods = Periods(period, skip=int(times > 2))
+    found = periodic_response(u, y, periods, excited_harmonics(x, periods))
+    return None if found is None else of_periods(found, period)
 
-    def transforms(signal: Array) -> ComplexArray:
-        parts = signal[len(signal) - kept * period :].reshape(kept, period, -1)
-        return np.fft.rfft(parts, axis=1)[:, 1 : (period + 1) // 2] / period
 
-    size = np.abs(transforms(x)[:, :, 0]).mean(axis=0)
-    lines = np.flatnonzero(size > _EXCITED * size.max(initial=0.0))
-    if not lines.size:
-        return None
-    U, Y = transforms(u)[:, lines], transforms(y)[:, lines]
-    mean = U.mean(axis=0)
-    G = Y.mean(axis=0) / mean
-    scatter = np.sum(np.abs(Y - G * U) ** 2, axis=0) / (kept - 1)
-    radius = _radius(scatter / (kept * np.abs(mean) ** 2), kept - 1)
+def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:
+    """What periods of so many samples gave, with discs of confidence."""
     return FrequencyResponse(
-        2.0 * np.pi * (lines + 1) / period,
-        G[:, :, None],
-        radius[:, :, None],
-        period * scatter,
-        _coherence(np.abs(G * mean) ** 2, scatter),
+        2.0 * np.pi * found.harmonics / period,
+        found.G,
+        _radius(found.deviation**2, found.freedom),
+        found.noise,
+        _coherence(found.explained, found.noise / period),
         "lines",
     )
 

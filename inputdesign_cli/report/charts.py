@@ -30,6 +30,8 @@ Drawn = tuple[Curves, str, str]
 
 _CAPTIONS = {
     "bound": "The error that the model may have (r_u) against the error that is admitted (r_adm).",
+    "deviations": "The standard deviation of the measured frequency response at every line, against what is "
+    "admitted.",
     "fan": "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at "
     "each, those that bind in colour. The plants are those that the uncertainty of the spec describes; "
     "nothing is said of the true plant.",

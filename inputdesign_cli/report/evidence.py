@@ -13,7 +13,7 @@ _SPREAD = "{:.4g} ± {:.2g}"
 def estimate_table(result: Result) -> Rows | None:
     """The estimated parameters with their standard deviations."""
     found = result.get("identification")
-    if found is None:
+    if found is None or "theta" not in found:
         return None
     deviations = found["standard_deviation"]
     rows = tuple((name, f"{v:.6g}", f"{deviations[name]:.2g}") for name, v in found["theta"].items())
@@ -55,6 +55,9 @@ def _per_cent(fit: Json) -> str:
 def estimate_answer(result: Result) -> str:
     """What the data amount to."""
     assessment = result.get("assessment")
+    if assessment is None and "theta" not in result["identification"]:
+        number = result["frequency_response"]["frequencies"]
+        return f"The frequency response was measured at {number} frequencies."
     if assessment is None:
         return f"The model was estimated from {result['samples']} samples."
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in verdict(result))
@@ -115,6 +118,8 @@ def simulation_table(result: Result) -> Rows | None:
         "mean squared error": _squared_error,
         "theory": lambda entry: _theory(entry.get("theory", {})),
         "mean estimate": lambda entry: listed(entry.get("mean_estimate", [])) if "mse" in entry else "",
+        "deviations over theory": lambda entry: _range(entry.get("deviation_ratio"), entry.get("chance")),
+        "worst over admitted": lambda entry: shown(entry["worst_ratio"]) if "worst_ratio" in entry else "",
         "within r_adm": lambda entry: _share(entry, "within_r_adm"),
         "were the design model true": lambda entry: _share(entry.get("on_design_model", {}), "within_r_adm"),
         "within r_u": lambda entry: _share(entry, "within_r_u"),
@@ -142,6 +147,13 @@ def _share(entry: Result, key: str) -> str:
         return ""
     low, high = (100 * limit for limit in entry[f"{key}_limits"])
     return f"{100 * entry[key]:.1f} %{BREAK}95 % limits {low:.1f} to {high:.1f}"
+
+
+def _range(found: Result | None, chance: Json) -> str:
+    if found is None:
+        return ""
+    low, high = chance
+    return f"{found['least']:.4g} to {found['largest']:.4g}{BREAK}chance {low:.3g} to {high:.3g}"
 
 
 def _mean(entry: Result | None) -> str:

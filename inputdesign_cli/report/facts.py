@@ -35,6 +35,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
         yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+    if "worst_ratio" in result.get("frequency_response", {}):
+        yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
         told = error["confidence"]
         low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
@@ -59,6 +61,17 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "improvement" in result.get("simulation", {}):
         measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
+    """How the lines of a frequency response are measured, and how well."""
+    counted = found["periods"] - found["transient"]
+    blocks = "" if found["blocks"] == 1 else f" in each of {found['blocks']} blocks"
+    text = (
+        f"{found['lines']} lines, {counted} of {found['periods']} periods of {found['period']} samples "
+        f"count{blocks}; standard deviations at most {found['worst_ratio']:.6g} of those admitted"
+    )
+    return "response", text, f"worst at {found['worst_frequency']:.4g} rad/{time_unit}"
 
 
 def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
@@ -107,6 +120,8 @@ def proofs(result: Result) -> Iterator[str]:
     """What is proved of other experiments."""
     found = result.get("objective", {})
     family = f"no {result.get('spectrum', {}).get('type', 'such')} spectrum gets"
+    if "frequency_response" in result and "objective" in result:
+        family = "no powers of these lines get"
     if "moments" in result:
         family = f"no {result['moments']['structure']} moments get"
     for key, side in (("lower_bound", "below"), ("upper_bound", "above")):

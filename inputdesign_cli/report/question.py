@@ -159,6 +159,14 @@ def _accuracy(spec: Spec) -> list[str]:
         if error.calibrated is not None:
             what = f"the error of {100 * (error.calibrated.exact or 0):g} % of the estimates"
         sentences.append(f"At {band}, {what} must not exceed the admissible error r_adm: {bound}.")
+    lines = accuracy.frequency_response
+    if lines is not None:
+        most = "what the table admits" if lines.absolute is None else f"{lines.absolute:g}"
+        most = most if lines.relative is None else f"{100 * lines.relative:g} % of |G|"
+        sentences.append(
+            "The frequency response is measured line by line, without a model, by an input that repeats: its "
+            f"standard deviation must not exceed {most} at any line."
+        )
     others = {
         "information": "The information matrix must exceed a given matrix.",
         "application": "The confidence region of the model must lie where the application tolerates it.",

@@ -28,7 +28,7 @@ from inputdesign_cli.runs.run_directory import read_run
 
 # Headings and the charts that belong under them; those of data and of simulated runs have their own.
 _SECTIONS = (
-    ("Accuracy", ("bound", "fan")),
+    ("Accuracy", ("bound", "deviations", "fan")),
     ("Spectrum", ("spectrum",)),
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),
@@ -150,6 +150,8 @@ def _command(verb: str, result: Result) -> str:
         return f"idesign {verb} spec.yaml"
     data, found = _data_files(result) or ["DATA"], result["identification"]
     words = [verb, "spec.yaml", *data] if verb == "assess" else [verb, *data, "--spec", "spec.yaml"]
+    if verb == "identify" and "theta" not in found:
+        words.append("--frequency-response")
     if found.get("means_removed"):
         words.append("--remove-means")
     elif found.get("operating_point"):

@@ -31,6 +31,10 @@ _SCENARIOS = (
     "M. C. Campi and S. Garatti, Wait-and-judge scenario optimization, Mathematical Programming 167 (2018) "
     "155-189.",
 )
+_FREQUENCY_RESPONSE = (
+    "R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, second edition, "
+    "Wiley, 2012: frequency responses from periodic excitation."
+)
 _PREDICTION_ERROR = (
     "L. Ljung, System Identification: Theory for the User, second edition, Prentice Hall, 1999: prediction "
     "errors and their asymptotic covariance."
@@ -40,7 +44,11 @@ _PREDICTION_ERROR = (
 def assumptions(question: Question, result: Result) -> list[str]:
     """What the numbers rest on, beyond the arithmetic."""
     rests = "The design is best" if "objective" in result else "The figures hold"
-    if "identification" in result:
+    if result.get("frequency_response", {}).get("method"):
+        said = [
+            "The plant is linear and in steady state; the noise is that which the scatter of the data tells."
+        ]
+    elif "identification" in result:
         from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."
         chosen = "Orders and delays were chosen by what the model simulates of data that it has not seen."
         said = [chosen if "exploration" in result else from_spec]
@@ -86,7 +94,10 @@ def citations(question: Question, result: Result) -> list[str]:
     """The sources of the methods that were used."""
     kind = result.get("objective", {}).get("kind")
     cited = []
-    if kind in ("least_cost", "shortest_experiment") and not question.regression:
+    lines = "frequency_response" in question.asked
+    if lines:
+        cited.append(_FREQUENCY_RESPONSE)
+    if kind in ("least_cost", "shortest_experiment") and not question.regression and not lines:
         cited.append(_LEAST_COSTLY)
     if "closed_loop_error" in question.asked:
         cited.append(_ASYMPTOTIC)
@@ -98,6 +109,6 @@ def citations(question: Question, result: Result) -> list[str]:
         cited += _SCENARIOS
     if "any_spectrum_bound" in result.get("objective", {}):
         cited.append(_EQUIVALENCE)
-    if not question.regression:
+    if not question.regression and not lines:
         cited.append(_PREDICTION_ERROR)
     return cited

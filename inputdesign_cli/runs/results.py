@@ -78,6 +78,7 @@ class BoundPanel:
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
     entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
+    names: str = ""  # of the input and the output, where the user gave them
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,8 @@ class ResponsePanel:
     G: NDArray[np.complex128]
     radius: Array
     model: NDArray[np.complex128]
-    entry: tuple[int, int] | None = None  # as of `BoundPanel`
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,26 @@ class ResponseCurves(Curves):
     """The frequency response without a model beside that of a model, entry by entry."""
 
     panels: tuple[ResponsePanel, ...]
+
+
+@dataclass(frozen=True)
+class DeviationPanel:
+    """Standard deviations of an entry of a frequency response, and what is admitted, at lines; all (n,)."""
+
+    frequency: Array
+    G_abs: Array
+    r_adm: Array
+    deviation: Array
+    found: Array | None = None  # of data, or of simulated experiments
+    label: str = ""  # what gave them
+    entry: tuple[int, int] | None = None  # as of `BoundPanel`
+
+
+@dataclass(frozen=True)
+class DeviationCurves(Curves):
+    """Standard deviations of a frequency response, entry by entry."""
+
+    panels: tuple[DeviationPanel, ...]
 
 
 @dataclass(frozen=True)
@@ -162,7 +184,8 @@ class ErrorBandPanel:
     quantiles: Mapping[float, Array]  # probability -> (n,)
     r_u: Array | None = None
     r_adm: Array | None = None
-    entry: tuple[int, int] | None = None  # as in `BoundPanel`
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
 
 
 @dataclass(frozen=True)

@@ -83,6 +83,15 @@ class Units:
         """The same as the header of a column, which begins with the channel."""
         return f"{channel} {self.label(channel)}".strip()
 
+    def passage(self, entry: tuple[int, int] | None) -> str:
+        """Of an entry of G, counted from zero, what the user calls its input and output: `valve → level`.
+
+        Empty where not both have names, and for all entries together (None) unless there is one alone.
+        """
+        output, input = (0, 0) if entry is None and self.single else entry or (-1, -1)
+        ends = [self.channels.get(f"{x}{i + 1}", ("", ""))[0] for x, i in (("u", input), ("y", output))]
+        return " → ".join(ends) if all(ends) else ""
+
     @property
     def single(self) -> bool:
         """One input and one output."""

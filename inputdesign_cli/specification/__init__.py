@@ -2,7 +2,7 @@
 
 from inputdesign_cli.specification.loading import load_spec, parse_spec
 from inputdesign_cli.specification.model_file import load_estimate
-from inputdesign_cli.specification.models.accuracy import ModelError
+from inputdesign_cli.specification.models.accuracy import FrequencyResponse, ModelError
 from inputdesign_cli.specification.models.control import ClosedLoopError
 from inputdesign_cli.specification.models.experiment import Noise, SimulationNoise
 from inputdesign_cli.specification.models.plant import PolynomialPlant
@@ -15,6 +15,7 @@ from inputdesign_cli.specification.template import SpecTemplate, read_template, 
 
 __all__ = [
     "ClosedLoopError",
+    "FrequencyResponse",
     "ModelError",
     "Noise",
     "PolynomialPlant",

@@ -224,7 +224,8 @@ def _with_defaults(spec: Spec) -> Spec:
     if "cost" not in spec.model_fields_set and spec.closed_loop:
         update["cost"] = Cost(input_power=1.0, output_power=1.0)
     single = (spec.plant.inputs, spec.plant.outputs) == (1, 1)
-    if spec.spectrum is None and spec.goal == "least_cost" and spec.plant.sampled and single:
+    lines = spec.accuracy.frequency_response is not None  # which are the spectrum
+    if spec.spectrum is None and not lines and spec.goal == "least_cost" and spec.plant.sampled and single:
         update["spectrum"] = FirSpectrum(type="fir")
     return spec.model_copy(update=update) if update else spec
 

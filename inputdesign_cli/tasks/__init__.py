@@ -19,15 +19,16 @@ from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
 from inputdesign_cli.tasks.build.exploration import model_to_judge
-from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.response import build_measurement
 from inputdesign_cli.tasks.build.system import build_model
-from inputdesign_cli.tasks.build.task import build_task
+from inputdesign_cli.tasks.build.task import build_analysis, build_task
 from inputdesign_cli.tasks.control_systems import system_of
 from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
+from inputdesign_cli.tasks.measured_response import measure
 
 if TYPE_CHECKING:
     import control
@@ -54,7 +55,7 @@ def analyse(spec: Spec) -> Results:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
     with _placed(spec), time_limit(spec.solver.time_limit):
-        return finite(build_given(spec).solve(), most_extreme(spec.content))
+        return finite(build_analysis(spec).solve(), most_extreme(spec.content))
 
 
 def validate(spec: Spec) -> None:
@@ -84,6 +85,7 @@ def identify(
     remove_means: bool = False,
     operating_point: Mapping[str, float] | None = None,
     preparation: Preparation | None = None,
+    frequency_response: bool = False,
 ) -> Results:
     """Estimate the model whose structure `plant` and `noise` give from recorded experiments.
 
@@ -93,6 +95,8 @@ def identify(
         remove_means: whether to take the means of u and y away, file by file.
         operating_point: what to take away from a channel, by name: {"u1": 40, "y1": 52.3}.
         preparation: what else to do to the records before.
+        frequency_response: whether to measure the frequency response without a model instead, at the lines of
+            `accuracy.frequency_response` where the spec has it.
 
     Raises:
         SpecError: the plant is not supported.
@@ -100,6 +104,9 @@ def identify(
     """
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
+        if frequency_response:
+            measured, _ = measure(build_measurement(spec), _paths(data), known)
+            return finite(measured, most_extreme(spec.content))
         found = identify_records(build_identification(spec), _paths(data), known)
         return finite(found, most_extreme(spec.content))
 
@@ -124,6 +131,10 @@ def assess(
     """
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
+        if spec.accuracy.frequency_response is not None:
+            results, judged = measure(build_measurement(spec), _paths(data), known, assess=True)
+            assert judged is not None  # the spec has lines
+            return Assessment(judged.verdict, finite(results, most_extreme(spec.content)))
         return assess_records(build_identification(spec), _paths(data), known)
 
 

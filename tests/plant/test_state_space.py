@@ -85,32 +85,59 @@ def test_responses_and_gradients(sample_time):
     np.testing.assert_allclose(found.input_gradient(w), by_input, atol=5e-7)
 
 
-def test_gradients_by_complex_steps():
-    """Every entry of a discrete model, by steps along the imaginary axis of a plain resolvent."""
-    found = model(sample_time=None, delay=0.0, places=PLACES)
-    found = found.at(0.3 * found.theta)
+def through_states(A, B, C, z):
+    """C (z I - A)^-1 B, as its real and its imaginary part, each analytic in A, B (a pair of parts) and C."""
+    shifted, turn = z.real * np.eye(len(A)) - A, z.imag * np.eye(len(A))
+    x = np.linalg.solve(np.block([[shifted, -turn], [turn, shifted]]), np.concatenate(B))
+    return C @ x[: len(A)], C @ x[len(A) :]
+
+
+def parts(matrix, factor):
+    return matrix * factor.real, matrix * factor.imag
+
+
+def analytic(m, delay, z, sample_time):
+    """G and C (z I - A)^-1 K by an exponential of the states and the input, analytic in every entry."""
+    n, inputs = m["B"].shape
+    lag, direct, Ad, held = 0, 0, m["A"], parts(m["B"], np.complex128(1))
+    if sample_time is not None:
+        lag = int(delay.real // sample_time)
+        left = delay - lag * sample_time
+        direct = lag + (left.real > 0)
+        system = np.zeros((n + inputs, n + inputs), dtype=complex)
+        system[:n] = np.concatenate([m["A"], m["B"]], axis=1)
+        whole, early = (scipy.linalg.expm(system * t)[:n] for t in (sample_time, sample_time - left))
+        Ad, early, late = whole[:, :n], early[:, n:], whole[:, n:] - early[:, n:]
+        pairs = (parts(early, z**-lag), parts(late, z ** -(lag + 1)))
+        held = tuple(a + b for a, b in zip(*pairs, strict=True))
+    G = through_states(Ad, held, m["C"], z)
+    G = [a + b for a, b in zip(G, parts(m["D"], z ** -float(direct)), strict=True)]
+    return G, through_states(Ad, (m["K"], 0 * m["K"]), m["C"], z)
+
+
+@pytest.mark.parametrize("sample_time", [H, None], ids=["held", "discrete"])
+def test_gradients_by_complex_steps(sample_time):
+    """Every entry and the dead time, by steps along the imaginary axis."""
+    places = (*PLACES, *([("delay", 0, 0)] if sample_time else []))
+    found = model(sample_time=sample_time, delay=0.4 if sample_time else 0.0, places=places)
+    found = found if sample_time else found.at(0.3 * found.theta)
     w, step = W[:4], 1e-30
-
-    def entry(matrices, z):
-        real, imaginary = z.real, z.imag
-        n = len(matrices["A"])
-        # (z I - A)^-1 as a real system of twice the size, analytic in A
-        big = np.block(
-            [
-                [real * np.eye(n) - matrices["A"], -imaginary * np.eye(n)],
-                [imaginary * np.eye(n), real * np.eye(n) - matrices["A"]],
-            ]
-        )
-        x = np.linalg.solve(big, np.concatenate([matrices["B"], 0 * matrices["B"]]))
-        return matrices["C"] @ x[:n] + matrices["D"], matrices["C"] @ x[n:]
-
-    for index, (letter, i, j) in enumerate(PLACES[:16]):
-        for at, z in zip(found.plant_gradient(w)[:, index], np.exp(1j * w), strict=True):
-            moved = {k: v.astype(complex) for k, v in zip("ABCDK", found.matrices[:5], strict=True)}
+    exact = found.plant_gradient(w), found.noise_gradient(w)
+    for index, (letter, i, j) in enumerate(places):
+        moved = {k: v.astype(complex) for k, v in zip("ABCDK", found.matrices[:5], strict=True)}
+        delay = complex(found.matrices.delay)
+        if letter == "delay":
+            delay += 1j * step
+        else:
             moved[letter][i, j] += 1j * step
-            real, imaginary = entry(moved, z)
-            expected = real.imag / step + 1j * imaginary.imag / step
-            np.testing.assert_allclose(at, expected, rtol=1e-8, atol=1e-11)
+        for n, z in enumerate(np.exp(1j * w)):
+            ways = analytic(moved, delay, z, sample_time)
+            expected, in_noise = (x[0].imag / step + 1j * x[1].imag / step for x in ways)
+            at_rest = np.eye(2) + ways[1][0].real + 1j * ways[1][1].real
+            np.testing.assert_allclose(exact[0][n, index], expected, rtol=1e-8, atol=1e-11)
+            np.testing.assert_allclose(
+                exact[1][n, index], np.linalg.solve(at_rest, in_noise), rtol=1e-8, atol=1e-11
+            )
 
 
 def simulated(found, r, e):

@@ -33,6 +33,7 @@ _BANDS = (
     ("limits", "band"),
     ("accuracy", "model_error", "band"),
     ("accuracy", "weighted_variance", "band"),
+    ("accuracy", "frequency_response", "band"),
     ("spectrum", "band"),
 )
 

@@ -19,6 +19,8 @@ from inputdesign_cli.specification.models.fields import (
     FileName,
     Flag,
     Fraction,
+    Frequencies,
+    Index,
     Names,
     NonNegative,
     Numbers,
@@ -202,6 +204,49 @@ class MeanSquaredError(Section):
     )
 
 
+class FrequencyResponse(Section):
+    """The standard deviation of a nonparametric frequency response, line by line, for periodic excitation."""
+
+    relative: Positive | None = Field(default=None, description="r_adm = this fraction of |G|.")
+    absolute: Positive | None = Field(default=None, description="r_adm = this value at every line.")
+    table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
+    frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = Field(
+        default=None, description="The lines, increasing; each moves to the nearest harmonic of the period."
+    )
+    band: Band | None = Field(
+        default=None, description="In place of frequencies: lines in [low, high], even in the logarithm."
+    )
+    lines: Annotated[Count, SIZES["accuracy.frequency_response.lines"]] | None = Field(
+        default=None, description="Number of lines in the band (default: every harmonic of the period)."
+    )
+    period: Annotated[Count, SIZES["signal.samples"]] | None = Field(
+        default=None,
+        description="Samples of a period (default: the record in signal.periods equal ones, or in five).",
+    )
+    transient: Annotated[Index, SIZES["signal.samples"]] = Field(
+        default=1, description="Periods that are left to the transient and not counted (default 1)."
+    )
+    detection: Annotated[Count, Field(ge=2), SIZES["accuracy.frequency_response.lines"]] | None = Field(
+        default=None,
+        description="Odd harmonics only are excited, and in a band one at random of each group of so many is "
+        "left out: what appears at the others tells nonlinearity.",
+    )
+    noise: FileName | None = Field(
+        default=None,
+        description="CSV file with columns frequency and noise_spectrum (of explore) in place of the model.",
+    )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """r_adm and the lines are given once."""
+        yield from self.exactly_one("relative", "absolute", "table")
+        yield from self.exactly_one("frequencies", "band")
+        if self.lines is not None and self.band is None:
+            message = "{key} is the number of lines in a band, and there is none"
+            yield PathDiagnostic(
+                "unsuitable-key", message, "add band: [low, high], or remove lines", ("lines",)
+            )
+
+
 class Accuracy(Section):
     """Requirements on the model; several may stand together. A criterion asks for the best instead."""
 
@@ -217,6 +262,9 @@ class Accuracy(Section):
     )
     standard_deviation: Deviations | None = Field(
         default=None, description="Largest standard deviation of each named parameter."
+    )
+    frequency_response: FrequencyResponse | None = Field(
+        default=None, description="Bound on the standard deviation of a nonparametric frequency response."
     )
     criterion: Literal["D", "A", "E", "T"] | None = Field(
         default=None,

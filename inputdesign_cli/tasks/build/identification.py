@@ -47,14 +47,14 @@ def build_identification(spec: Spec) -> Identification:
         header=build_header(spec),
         nominal=nominal,
         assessable=bool(spec.accuracy.requirements),
-        operating_point=_operating_point(spec),
+        operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
         at=lambda model, samples, factor, source: _question(_restated(spec, model, source), samples, factor),
     )
 
 
-def _operating_point(spec: Spec) -> dict[str, float]:
+def operating_point(spec: Spec) -> dict[str, float]:
     """`signal.offset`, about which u varies; in closed loop r does, and nothing is known of u."""
     if spec.closed_loop or spec.signal.offset is None:
         return {}

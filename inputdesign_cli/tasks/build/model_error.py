@@ -230,17 +230,17 @@ def _admissible(
         path = spec.resolve_path(error.table)
         if entry is not None and not units.single and has_column(path, "r_adm_", key=f"{_KEY}.table"):
             column += units.suffix(*entry)
-        return _table(spec, error.table, band, column)
+        return positive_table(spec, error.table, band, column, f"{_KEY}.table")
     return _sensitivity(spec, error, model)
 
 
-def _table(spec: Spec, name: str, band: tuple[float, float], column: str) -> Table:
-    """r_adm of one column of a file, over the whole `band`.
+def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> Table:
+    """One column of a file, positive over the whole `band` of the section that has `key`.
 
     Raises:
-        DataError: the file cannot be read, or does not bound the error on the whole band (`bad-table`).
+        DataError: the file cannot be read, or does not tell the column on the whole band (`bad-table`).
     """
-    key, units = f"{_KEY}.table", build_units(spec)
+    units = build_units(spec)
     columns = read_frequency_table(spec, name, [column], key)
     frequency, value = columns["frequency"], columns[column]
     if np.any(value <= 0):
@@ -254,7 +254,8 @@ def _table(spec: Spec, name: str, band: tuple[float, float], column: str) -> Tab
             for lo, hi in ((frequency[0], frequency[-1]), band)
         )
         message = f"it covers {covered}, but the band is {asked}"
-        raise bad_table(spec, name, message, f"extend the table, or restrict {_KEY}.band", key)
+        hint = f"extend the table, or restrict {key.rpartition('.')[0]}.band"
+        raise bad_table(spec, name, message, hint, key)
     return Table(frequency, value)
 
 

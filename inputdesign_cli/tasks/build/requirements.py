@@ -207,5 +207,6 @@ BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "application": _application,
     "weighted_variance": _weighted_variances,
     "standard_deviation": _standard_deviations,
+    "frequency_response": lambda spec, experiment: [],  # of lines, not of a model: `build_measurement`
 }
 """What makes the requirement of each key of `accuracy`; a new requirement adds its own."""

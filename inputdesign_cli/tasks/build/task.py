@@ -11,6 +11,7 @@ from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
 from inputdesign_cli.tasks.build.regression import build_regression_task
+from inputdesign_cli.tasks.build.response import build_response_task
 
 
 class Task(Protocol):
@@ -33,10 +34,9 @@ class Task(Protocol):
 
 def _check_uncertainty(spec: Spec) -> None:
     """Raise `SpecError` (`not-supported`) where no convex design is asked that could be made robust."""
-    closed_loop_error = spec.accuracy.closed_loop_error is not None
-    if spec.uncertainty is None or not (
-        closed_loop_error or not spec.designs or spec.plant.kind == "regression"
-    ):
+    accuracy = spec.accuracy
+    elsewhere = accuracy.closed_loop_error is not None or accuracy.frequency_response is not None
+    if spec.uncertainty is None or not (elsewhere or not spec.designs or spec.plant.kind == "regression"):
         return
     what = "a given excitation" if not spec.designs else "this kind of design"
     raise spec.complain(
@@ -47,6 +47,17 @@ def _check_uncertainty(spec: Spec) -> None:
     )
 
 
+def build_analysis(spec: Spec) -> Task:
+    """The task of a given excitation, whatever is asked of it.
+
+    Raises:
+        SpecError, DataError: the spec or a file that it names cannot be used.
+    """
+    if spec.accuracy.frequency_response is not None and not spec.designs:
+        return build_response_task(spec)
+    return build_given(spec)
+
+
 def build_task(spec: Spec) -> Task:
     """The task of a spec; everything that can be wrong with the spec comes to light here.
 
@@ -55,7 +66,9 @@ def build_task(spec: Spec) -> Task:
     """
     _check_uncertainty(spec)
     if not spec.designs:
-        return build_given(spec)
+        return build_analysis(spec)
+    if spec.accuracy.frequency_response is not None:
+        return build_response_task(spec)
     if spec.plant.kind == "regression":
         return build_regression_task(spec)
     if spec.accuracy.closed_loop_error is not None:

@@ -53,6 +53,7 @@ def bound_curves(
             r_u_record=None if record is None else error.error_bound(record, w),
             label=label,
             entry=None if units.single else error.entry,
+            names=units.passage(error.entry),
         )
         suffix = "" if error.entry is None else units.suffix(*error.entry)
         listed = {

@@ -43,7 +43,7 @@ def response_of_data(
             listed["model_abs"] = np.abs(modelled)
             columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
             entry = None if units.single else (i, j)
-            panels.append(ResponsePanel(w, own, radius, modelled, entry))
+            panels.append(ResponsePanel(w, own, radius, modelled, entry, units.passage((i, j))))
             outside |= np.abs(own - modelled) > radius
         number = "" if units.single else f"_{i + 1}"
         columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}

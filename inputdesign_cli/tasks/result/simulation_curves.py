@@ -29,6 +29,7 @@ def error_bands(units: Units, predicted: PredictedError, errors: Array, name: st
             r_u=None if r_u is None else r_u[own],
             r_adm=None if predicted.r_adm is None else predicted.r_adm[own],
             entry=entry,
+            names=units.passage(entry),
         )
 
     entries = predicted.entries

@@ -1,0 +1,28 @@
+"""deviations.png: standard deviations of a frequency response, line by line, against what is admitted."""
+
+from __future__ import annotations
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from inputdesign_cli.figures.panels import draw_panels
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREEN, ORANGE, log_axes
+from inputdesign_cli.runs.results import DeviationCurves, DeviationPanel
+
+
+def draw_deviations(page: Figure, curves: DeviationCurves, time_unit: str) -> None:
+    """|G|, the standard deviations and r_adm at every line."""
+    draw_panels(page, curves.panels, _plot, time_unit, magnitude="magnitude")
+
+
+def _plot(axes: Axes, panel: DeviationPanel) -> list[Artist]:
+    w = panel.frequency
+    log_axes(axes, "y")
+    handles: list[Artist] = []
+    handles += axes.plot(w, panel.G_abs, ".-", color=BLACK, linewidth=1.0, markersize=4, label="|G|")
+    handles += axes.plot(w, panel.r_adm, color=ORANGE, linestyle=DASHED, label="r_adm")
+    handles += axes.plot(w, panel.deviation, "o", color=BLUE, markersize=5, label="standard deviation")
+    if panel.found is not None:
+        handles += axes.plot(w, panel.found, "x", color=GREEN, markersize=6, label=panel.label)
+    return handles

@@ -1,0 +1,119 @@
+"""The frequency response from inputs that repeat, line by line: means of the periods, and their scatter.
+
+[pintelon-schoukens-2012], Section 2.5. With r inputs the record has r blocks of periods whose lines differ in
+their phases, so that the matrix U of inputs by blocks has an inverse at every line: G = Y U^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_EXCITED = 1e-6
+
+
+@dataclass(frozen=True)
+class Periods:
+    """How a record repeats: equal blocks of whole periods, of which the first few are transient.
+
+    Attributes:
+        period: samples.
+        blocks: as many as inputs.
+        skip: periods at the start of each block that do not count.
+    """
+
+    period: int
+    blocks: int = 1
+    skip: int = 0
+
+    def each(self, samples: int) -> int:
+        """Whole periods a block of a record of so many samples."""
+        return samples // (self.period * self.blocks)
+
+    def kept(self, samples: int) -> int:
+        """Periods a block that count."""
+        return self.each(samples) - self.skip
+
+    def transforms(self, signal: NDArray[np.float64]) -> ComplexArray:
+        """(.., blocks, kept, harmonics, channels) of signals (.., N, channels): of exp(jwt) its amplitude."""
+        return np.asarray(np.fft.rfft(self._parts(signal), axis=-2) / self.period)
+
+    def means(self, signal: NDArray[np.float64], harmonics: NDArray[np.int_]) -> ComplexArray:
+        """(.., L, channels, blocks): the means over the periods that count."""
+        found = np.fft.rfft(self._parts(signal).mean(axis=-3), axis=-2)[..., harmonics, :] / self.period
+        return np.asarray(np.moveaxis(found, -3, -1))
+
+    def _parts(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(.., blocks, kept, period, channels): what counts of signals, cut into periods; the end fits."""
+        *runs, samples, channels = signal.shape
+        each = self.each(samples)
+        used = signal[..., samples - self.blocks * each * self.period :, :]
+        parts = used.reshape(*runs, self.blocks, each, self.period, channels)
+        return parts[..., self.skip :, :, :]
+
+
+@dataclass(frozen=True)
+class PeriodicResponse:
+    """G (L, p, r) at harmonics, and what the scatter of the periods says of it.
+
+    Attributes:
+        deviation: (L, p, r): standard deviations of the entries, |error|^2 being their variance.
+        noise: (L, p): the spectrum of the noise; that of white noise is its variance.
+        explained: (L, p): mean squares of what the inputs explain, a line.
+        freedom: degrees of freedom of each variance, counted as complex numbers.
+    """
+
+    harmonics: NDArray[np.int_]
+    G: ComplexArray
+    deviation: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    explained: NDArray[np.float64]
+    freedom: int
+
+
+def excited_harmonics(x: Array, periods: Periods) -> NDArray[np.int_]:
+    """The harmonics between 0 and pi at which some channel of x (N, r) has power."""
+    size = np.abs(periods.transforms(x)).mean(axis=(0, 1)).max(axis=1)
+    size = size[: (periods.period + 1) // 2]
+    size[0] = 0.0
+    return np.flatnonzero(size > _EXCITED * size.max(initial=0.0))
+
+
+def response_at(U: ComplexArray, Y: ComplexArray) -> ComplexArray:
+    """G (.., L, p, r) from the means of inputs (L, r, r) and outputs (.., L, p, r), inputs by blocks."""
+    return np.asarray(Y @ np.linalg.inv(U))
+
+
+def periodic_response(
+    u: Array, y: Array, periods: Periods, harmonics: NDArray[np.int_], *, repeats: int = 1
+) -> PeriodicResponse | None:
+    """From a record (N, r) and (N, p) with as many blocks as inputs; None where lines cannot be told apart.
+
+    Two periods or more count.
+
+    Args:
+        repeats: how many records of equal length with the same input follow each other.
+    """
+    U, Y = (
+        np.concatenate(
+            [periods.transforms(one)[:, :, harmonics] for one in np.split(signal, repeats)], axis=1
+        )
+        for signal in (u, y)
+    )
+    kept = U.shape[1]
+    inputs, outputs = (np.moveaxis(part.mean(axis=1), 0, -1) for part in (U, Y))
+    if not harmonics.size or np.any(np.linalg.cond(inputs) > 1.0 / _EXCITED):
+        return None
+    G = response_at(inputs, outputs)
+    left = Y - np.einsum("lpr,bklr->bklp", G, U)
+    freedom = periods.blocks * (kept - 1)
+    scatter = np.sum(np.abs(left) ** 2, axis=(0, 1)) / freedom
+    inverse = np.linalg.inv(inputs)
+    spread = np.sum(np.abs(inverse) ** 2, axis=1) / kept
+    variance = scatter[:, :, None] * spread[:, None, :]
+    explained = np.mean(np.abs(G @ inputs) ** 2, axis=2)
+    return PeriodicResponse(harmonics, G, np.sqrt(variance), periods.period * scatter, explained, freedom)

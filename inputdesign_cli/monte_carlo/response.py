@@ -1,0 +1,74 @@
+"""Monte Carlo of a nonparametric frequency response: how far estimates scatter at each line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.compute.executor import Executor
+from inputdesign_cli.identification.periodic_response import Periods, response_at
+from inputdesign_cli.monte_carlo.batches import Seed, run_batches
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_BATCH_SAMPLES = 1_000_000
+
+
+@dataclass(frozen=True)
+class ResponseStudy:
+    """Means and standard deviations (L, p, r) of estimates of G over `runs` experiments."""
+
+    mean: ComplexArray
+    deviation: NDArray[np.float64]
+    runs: int
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What all batches share: the system, its input, what the input alone causes, and the lines."""
+
+    model: Model
+    u: Array
+    answer: Array
+    periods: Periods
+    harmonics: NDArray[np.int_]
+
+
+def study_response(
+    model: Model,
+    u: Array,
+    periods: Periods,
+    harmonics: NDArray[np.int_],
+    *,
+    runs: int,
+    seed: Seed,
+    executor: Executor | None = None,
+) -> ResponseStudy:
+    """Estimates from `runs` experiments with the input u (N, r), each from rest with noise of its own.
+
+    Args:
+        executor: where batches of the runs are computed (default: in this process).
+    """
+    silent = np.zeros((1, 1, model.outputs))
+    trial = _Trial(model, u, model.simulate(u[None], silent, 1.0)[0][0], periods, harmonics)
+    size = max(1, _BATCH_SAMPLES // len(u))
+    parts: Sequence[tuple[ComplexArray, NDArray[np.float64]]] = run_batches(
+        _sums, trial, runs=runs, size=size, seed=seed, executor=executor
+    )
+    U, Y = (periods.means(signal, harmonics) for signal in (u, trial.answer))
+    quiet, total = response_at(U, Y), sum(part[0] for part in parts)
+    squares = sum(part[1] for part in parts) - np.abs(total) ** 2 / runs
+    return ResponseStudy(quiet + total / runs, np.sqrt(squares / max(runs - 1, 1)), runs)
+
+
+def _sums(trial: _Trial, runs: int, rng: np.random.Generator) -> tuple[ComplexArray, NDArray[np.float64]]:
+    """(L, p, r): sums over the runs of what noise adds to the estimates, and of its squared moduli."""
+    model, samples = trial.model, len(trial.u)
+    e = rng.standard_normal((runs, samples, model.outputs)) @ np.linalg.cholesky(model.covariance).T
+    noise = model.simulate(np.zeros((1, 1, model.inputs)), e, 1.0)[1]
+    U, V = (trial.periods.means(signal, trial.harmonics) for signal in (trial.u, noise))
+    errors = response_at(U, V)
+    return np.sum(errors, axis=0), np.sum(np.abs(errors) ** 2, axis=0)

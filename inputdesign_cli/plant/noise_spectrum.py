@@ -1,0 +1,76 @@
+"""The spectrum of the noise at the outputs, at the harmonics of a period, of any model in discrete time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import InaccurateError
+from inputdesign_cli.plant.model import Model
+from inputdesign_cli.plant.polynomial import Array
+
+_FIRST, _LONGEST = 1024, 2**20
+# What the second half of an impulse response may hold of its energy.
+_FORGOTTEN = 1e-24
+
+
+@dataclass(frozen=True)
+class NoiseSpectrum:
+    """Responses (p, n, p) of the outputs to impulses of independent unit sources, as long as they last."""
+
+    impulses: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, model: Model) -> NoiseSpectrum:
+        """That of H e of a model in discrete time.
+
+        Raises:
+            InaccurateError: `integral-inaccurate` for noise that hardly forgets.
+        """
+        p, length = model.outputs, _FIRST
+        root = np.linalg.cholesky(model.covariance)
+        while length <= _LONGEST:
+            e = np.zeros((p, length, p))
+            e[:, 0] = root.T
+            found = model.simulate(np.zeros((p, length, model.inputs)), e, 1.0)[1]
+            late, all_ = np.sum(found[:, length // 2 :] ** 2), np.sum(found**2)
+            if late <= _FORGOTTEN * all_:
+                return cls(found)
+            length *= 4
+        raise InaccurateError.because(
+            "integral-inaccurate",
+            "the noise hardly forgets: its spectrum at the lines depends on how long it has run",
+            hint="move roots of D away from the unit circle; noise that drifts has no such spectrum",
+            key="noise",
+        )
+
+    def at(self, period: int, harmonics: NDArray[np.int_]) -> Array:
+        """Phi_v (L, p) at harmonics of a period of so many samples."""
+        return _power(self._folded(self.impulses, period)[:, harmonics])
+
+    def averaged(self, period: int, harmonics: NDArray[np.int_], periods: int) -> Array:
+        """(L, p): what N times the mean square of the transform of N = `periods` periods is on average.
+
+        Phi_v seen through the window of a finite record, which Fejer's kernel describes.
+        """
+        n, samples = self.impulses.shape[1], period * periods
+        length = 2 ** int(np.ceil(np.log2(2 * n)))
+        r = np.fft.irfft(_power(np.fft.rfft(self.impulses, length, axis=1)), length, axis=0)[:n]
+        weighted = r * np.maximum(1.0 - np.arange(n) / samples, 0.0)[:, None]
+        found = self._folded(weighted[None], samples)[0, harmonics * periods]
+        return np.asarray(2.0 * found.real - r[0])
+
+    @staticmethod
+    def _folded(sequence: NDArray[np.float64], period: int) -> NDArray[np.complex128]:
+        """(.., period // 2 + 1, p): transforms at the harmonics of a period of sequences (.., n, p)."""
+        *several, n, p = sequence.shape
+        padded = np.zeros((*several, -(-n // period) * period, p))
+        padded[..., :n, :] = sequence
+        return np.fft.rfft(padded.reshape(*several, -1, period, p).sum(axis=-3), axis=-2)
+
+
+def _power(transforms: NDArray[np.complex128]) -> Array:
+    """(L, p): of outputs, over independent sources, which come first."""
+    return np.asarray(np.sum(np.abs(transforms) ** 2, axis=0))

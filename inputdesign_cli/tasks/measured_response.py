@@ -1,0 +1,202 @@
+"""Records -> the frequency response without a model, beside what the spec designed, and whether it is met."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification.frequency_response import of_periods
+from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.units import Header
+from inputdesign_cli.tasks.build.data import Data, read_data
+from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.response import ResponseTask
+from inputdesign_cli.tasks.result.measured_response import Judged, SilentLines, measured_results
+from inputdesign_cli.tasks.result.responses import response_of_data
+
+# Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
+_FREEDOM = 60
+_SURE = 0.95
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How a frequency response is measured: by the lines of `task`, or without it by what data excite.
+
+    Attributes:
+        model: the nominal plant, which the response is drawn beside.
+        operating_point: by channel, what the spec says that signals vary about.
+    """
+
+    header: Header
+    model: Model
+    task: ResponseTask | None
+    operating_point: Mapping[str, float]
+
+
+def measure(
+    question: Measurement, paths: Sequence[Path], preparation: Preparation, *, assess: bool = False
+) -> tuple[Results, Judged | None]:
+    """The response with its confidence; with lines of a spec also how it compares with what is asked.
+
+    Args:
+        assess: whether the result is a verdict.
+
+    Raises:
+        DataError: a file cannot be used, or does not repeat as the spec says.
+    """
+    started = time.perf_counter()
+    units = question.header.units
+    known = {**question.operating_point, **preparation.operating_point}
+    data = read_data(paths, units, replace(preparation, operating_point=known))
+    task, judged, silent = question.task, None, None
+    if task is None:
+        found = frequency_response(data.u, data.y, data.r, lengths=data.lengths)
+        if found is None:
+            raise DataError.because(
+                "too-few-samples",
+                f"{paths[0].name} excites no frequency enough for a response without a model",
+                hint="record longer, or excite more frequencies",
+            )
+    else:
+        periods, repeats = _periods(task, data, paths[0].name)
+        by_lines = periodic_response(data.u, data.y, periods, task.grid.excited, repeats=repeats)
+        if by_lines is None:
+            raise DataError.because(
+                "not-exciting",
+                f"the inputs in {paths[0].name} do not excite all lines of the spec, or not apart",
+                hint="apply the signal.csv of the spec, and record u as it was applied",
+            )
+        found = of_periods(by_lines, periods.period)
+        judged = _judged(task, by_lines, data, periods, repeats)
+        silent = _silent(task, data, periods, repeats)
+    shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
+    results = measured_results(
+        question.header, found, shown, judged, silent, data, time.perf_counter() - started, assess=assess
+    )
+    return results, judged
+
+
+def _periods(task: ResponseTask, data: Data, name: str) -> tuple[Periods, int]:
+    """How the data repeat, and how many records of equal length there are.
+
+    Raises:
+        DataError: `bad-period`.
+    """
+    stated, lengths = task.periods, set(data.lengths)
+    length, whole = data.lengths[0], stated.blocks * stated.period
+    fits = len(lengths) == 1 and (stated.blocks == 1 or length % whole == 0)
+    if not fits:
+        what = " and ".join(str(one) for one in sorted(lengths))
+        raise DataError.because(
+            "bad-period",
+            f"{name} has stretches of {what} samples, and the design has {stated.blocks} blocks of "
+            f"whole periods of {stated.period}",
+            hint="cut every record to the length of signal.csv (--skip, --range), and close gaps",
+        )
+    if stated.kept(length) < 1 or stated.kept(length) * len(data.lengths) < 2:
+        raise DataError.because(
+            "too-few-samples",
+            f"{name} has {stated.each(length)} periods of {stated.period} samples, {stated.skip} of them "
+            "transient: the scatter of two that count is needed to tell the noise",
+            hint="record more periods, or give several records",
+        )
+    return stated, len(data.lengths)
+
+
+def _judged(
+    task: ResponseTask, found: PeriodicResponse, data: Data, periods: Periods, repeats: int
+) -> Judged:
+    """The deviations of the data against r_adm at the measured G, with noise averaged along the lines.
+
+    The scatter of a few periods tells the noise of one line badly: what it is over the noise of the spec is
+    averaged over neighbouring lines.
+    """
+    if np.any(found.noise <= 0.0):
+        raise DataError.because(
+            "noise-free-data",
+            "the periods do not differ at all, so that they tell nothing of the noise",
+            hint="give records of a real plant, not of one period that was repeated",
+        )
+    lines = task.lines.at(found.G)
+    counted = repeats * periods.blocks * periods.kept(data.lengths[0]) * periods.period
+    expected = found.deviation * np.sqrt(lines.noise / found.noise)[:, :, None]
+    window = min(max(-(-_FREEDOM // found.freedom), 1), len(found.harmonics))
+    excess = _averaged(found.noise / lines.noise, window)
+    smooth = expected * np.sqrt(excess)[:, :, None]
+    freedom = 2 * found.freedom * window
+    tests = max(len(found.harmonics) // window, 1) * found.noise.shape[1]
+    rare = 0.5 * (1.0 - _SURE) / tests
+    low, high = (float(np.sqrt(freedom / scipy.stats.chi2.ppf(p, freedom))) for p in (1.0 - rare, rare))
+    # Where r_adm is a share of |G|, it is known as well as |G| is.
+    away = scipy.stats.norm.isf(0.25 * (1.0 - _SURE) / smooth.size) * smooth * np.sqrt(0.5)
+    at_least = lines.at(np.maximum(np.abs(found.G) - away, 1e-9 * away))
+    at_most = lines.at(np.abs(found.G) + away)
+    return Judged(
+        grid=task.grid,
+        periods=periods,
+        lines=lines,
+        expected=expected,
+        found=smooth,
+        ratios=lines.ratios(smooth),
+        least=low * at_most.ratios(smooth),
+        largest=high * at_least.ratios(smooth),
+        counted=counted,
+    )
+
+
+def _averaged(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+    """(L, p): means over `window` neighbours, at the ends over the nearest so many."""
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    first = np.clip(np.arange(len(values)) - window // 2, 0, len(values) - window)
+    return np.asarray((sums[first + window] - sums[first]) / window)
+
+
+def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> SilentLines | None:
+    """What the outputs have at lines that are not excited, over their noise."""
+    grid = task.grid
+    if not grid.even.size:
+        return None
+    found: dict[str, Json] = {}
+    for kind, harmonics in (("odd", grid.odd), ("even", grid.even)):
+        if not harmonics.size:
+            continue
+        # Over the noise of the spec, so that lines count alike.
+        shape = _between(grid.at(harmonics), grid.frequencies, task.lines.noise)
+        records = [periods.transforms(one)[:, :, harmonics] for one in np.split(data.y, repeats)]
+        Y = np.concatenate(records, axis=1) / np.sqrt(shape)
+        kept = Y.shape[1]
+        mean = Y.mean(axis=1, keepdims=True)
+        noise = np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (len(Y) * (kept - 1))
+        level = kept * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
+        # Of noise alone the ratio is of the F distribution, line by line and over all of them.
+        ratio = np.mean(level / noise, axis=0)
+        freedom = 2 * len(Y) * harmonics.size
+        probability = scipy.stats.f.sf(
+            np.sum(level, axis=0) / np.sum(noise, axis=0), freedom, freedom * (kept - 1)
+        )
+        excess = np.maximum(np.sum((level - noise) * shape, axis=0) / kept, 0.0)
+        found[kind] = {
+            "lines": int(harmonics.size),
+            "over_noise": ratio.tolist(),
+            "probability": np.asarray(probability).tolist(),
+            "rms": np.sqrt(2.0 * excess).tolist(),
+        }
+    return SilentLines(found)
+
+
+def _between(w: Array, lines: Array, values: Array) -> Array:
+    """(n, p): values (L, p) at lines (L,), at frequencies between, linear in both logarithms."""
+    logs = [np.interp(np.log(w), np.log(lines), np.log(column)) for column in values.T]
+    return np.exp(np.stack(logs, axis=1))

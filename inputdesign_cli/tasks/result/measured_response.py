@@ -1,0 +1,183 @@
+"""A measured frequency response -> `result.json`, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.design.response import ResponseLines
+from inputdesign_cli.identification import FrequencyResponse
+from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.runs.results import (
+    Array,
+    Curves,
+    DeviationCurves,
+    DeviationPanel,
+    Json,
+    ResponseCurves,
+    Results,
+    Table,
+)
+from inputdesign_cli.runs.units import Header
+from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
+from inputdesign_cli.tasks.build.data import Data
+
+Verdict = Literal["met", "missed", "undecided"]
+# Silent lines whose probability is below this speak.
+_SPEAKS = 0.01
+
+
+@dataclass(frozen=True)
+class SilentLines:
+    """By kind, odd or even: how much the outputs have at lines that the input does not excite."""
+
+    found: Mapping[str, Json]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The deviations (L, p, r) that data leave: with the noise of the spec, and with that of the data.
+
+    Attributes:
+        lines: with the measured G.
+        ratios: (L,) of the latter over r_adm, the largest entry.
+        least, largest: (L,), between which the true ratios lie, with 95 % all of them.
+        counted: samples that count.
+    """
+
+    grid: HarmonicGrid
+    periods: Periods
+    lines: ResponseLines
+    expected: NDArray[np.float64]
+    found: NDArray[np.float64]
+    ratios: Array
+    least: Array
+    largest: Array
+    counted: int
+
+    @property
+    def worst(self) -> int:
+        """The line of the largest ratio."""
+        return int(np.argmax(self.ratios))
+
+    @property
+    def verdict(self) -> Verdict:
+        """Met or missed where chance does not decide."""
+        if np.all(self.largest <= 1.0):
+            return "met"
+        return "missed" if np.any(self.least > 1.0) else "undecided"
+
+
+def measured_results(
+    header: Header,
+    found: FrequencyResponse,
+    shown: tuple[Table, ResponseCurves, dict[str, Json]],
+    judged: Judged | None,
+    silent: SilentLines | None,
+    data: Data,
+    seconds: float,
+    *,
+    assess: bool,
+) -> Results:
+    """The result, frequency_response.csv and its figure; with lines of a spec also their deviations.
+
+    Args:
+        shown: of the response beside the nominal plant, see `response_of_data`.
+        assess: whether the result is a verdict.
+    """
+    units, (table, curves, told) = header.units, shown
+    entry: dict[str, Json] = {**told, "blocks": 1}
+    notes = list(data.notes)
+    tables: dict[str, Table] = {"frequency_response": table}
+    drawn: dict[str, Curves] = {"frequency_response": curves}
+    result: dict[str, Json] = {
+        "format": 1, "title": header.title, "status": "measured", "samples": len(data.y),
+        "identification": {"method": found.method}, "frequency_response": entry,
+    }  # fmt: skip
+    if judged is not None:
+        w = judged.grid.frequencies / units.frequency
+        entry |= {
+            "lines": int(w.size),
+            "period": judged.periods.period,
+            "periods": judged.periods.each(data.lengths[0]),
+            "records": len(data.lengths),
+            "blocks": judged.periods.blocks,
+            "transient": judged.periods.skip,
+            "counted": judged.counted,
+            "worst_ratio": float(judged.ratios[judged.worst]),
+            "worst_frequency": float(w[judged.worst]),
+            "worst_ratio_limits": [float(judged.least.max()), float(judged.largest.max())],
+        }
+        columns, panels = _deviations(header, judged, w)
+        tables["deviations"], drawn["deviations"] = Table(columns), DeviationCurves(panels)
+    if silent is not None:
+        entry["nonlinearity"] = dict(silent.found)
+        notes += _spoken(silent)
+    if assess and judged is not None:
+        assessment = _assessment(header, judged, w)
+        result |= {"status": judged.verdict, "assessment": assessment}
+        notes += assessment.get("undecided", [])
+    result |= {"notes": notes} if notes else {}
+    result["timing_s"] = {"measurement": seconds}
+    return Results(result, header.resolved_spec, units.time_unit, tables, drawn)
+
+
+def _deviations(
+    header: Header, judged: Judged, w: Array
+) -> tuple[dict[str, Array], tuple[DeviationPanel, ...]]:
+    """Columns and panels of the entries that are bounded: by the noise of the spec, by that of the data."""
+    units, columns, panels = header.units, {header.units.frequency_header: w}, []
+    for i, j in np.ndindex(judged.found.shape[1:]):
+        admitted = judged.lines.admitted[:, i, j]
+        if not np.all(np.isfinite(admitted)):
+            continue
+        size, expected = np.abs(judged.lines.G[:, i, j]), judged.expected[:, i, j]
+        found = judged.found[:, i, j]
+        listed = {"G_abs": size, "r_adm": admitted, "deviation": expected, "deviation_data": found}
+        columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
+        entry = None if units.single else (i, j)
+        panels.append(DeviationPanel(w, size, admitted, expected, found, "these data", entry))
+    return columns, tuple(panels)
+
+
+def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
+    """The verdict, and how many times as many periods would settle it."""
+    verdict, worst = judged.verdict, judged.worst
+    ratio, low, high = float(judged.ratios[worst]), float(judged.least.max()), float(judged.largest.max())
+    entry: dict[str, Json] = {
+        "met": verdict == "met",
+        "requirements": [{"name": "frequency_response", "worst_ratio": ratio, "frequency": float(w[worst])}],
+    }
+    times = high**2
+    if verdict != "met":
+        counted = int(np.ceil(times * judged.counted / judged.grid.period))
+        entry["periods"] = counted
+        enough = f"about {counted} periods that count would do"
+        if verdict == "undecided":
+            entry["undecided"] = [
+                f"the largest deviation is {ratio:.4g} of what is admitted, at {w[worst]:.4g} "
+                f"{header.units.per_time}, and by chance anything between {low:.3g} and {high:.3g} may stand "
+                f"behind that: {enough}"
+            ]
+        else:
+            entry["no_top_up"] = f"repeat the record: {enough}"
+    return entry
+
+
+def _spoken(silent: SilentLines) -> list[str]:
+    """What silent lines say of the plant, in sentences."""
+    notes = []
+    for kind, entry in silent.found.items():
+        chance = min(np.atleast_1d(entry["probability"]))
+        if chance < _SPEAKS:
+            level = ", ".join(f"{value:.3g}" for value in np.atleast_1d(entry["rms"]))
+            notes.append(
+                f"the outputs answer at {kind} lines that are not excited (rms {level}, probability of "
+                f"chance {chance:.2g}): a nonlinearity of {kind} degree, or an input that was not applied as "
+                "recorded"
+            )
+    return notes

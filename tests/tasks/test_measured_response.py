@@ -1,0 +1,165 @@
+"""Frequency responses from data: how sure they are, whether they meet the spec, what silent lines say."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import assess, identify, parse_spec, solve
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.identification.periodic_response import periodic_response
+from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.tasks.build.response import build_measurement
+from inputdesign_cli.tasks.measured_response import _judged, _silent
+
+TEXT = """
+plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
+noise: {D: [1, -0.7], variance: 0.01}
+experiment: {samples: 3000}
+accuracy: {frequency_response: {relative: 0.05, band: [0.1, 2], lines: 12, detection: 3}}
+signal: {periods: 6}
+"""
+TWO = """
+plant: {B: [[[0, 0.4], [0, 0, 0.3]]], F: [[[1, -0.8], [1, -0.5]]]}
+noise: {variance: 0.01}
+experiment: {samples: 3200}
+accuracy: {frequency_response: {absolute: 0.05, band: [0.1, 2], lines: 6}}
+"""
+
+
+def recorded(text, seed, *, square=0.0, cube=0.0):
+    """The record of a spec, and what a plant that may be nonlinear at its input answers."""
+    spec = parse_spec(text)
+    model = build_measurement(spec).model
+    u = solve(spec).signal
+    rng = np.random.default_rng(seed)
+    e = np.sqrt(0.01) * rng.standard_normal((1, len(u), 1))
+    answer, noise = model.simulate((u + square * u**2 + cube * u**3)[None], e, 1.0)
+    return spec, u, (answer + noise)[0]
+
+
+def table(u, y):
+    columns = {"time_s": np.arange(float(len(u)))}
+    columns |= {f"u{j + 1}": column for j, column in enumerate(u.T)}
+    return columns | {"y1": y[:, 0]}
+
+
+@pytest.mark.parametrize("text", [TEXT, TWO], ids=["one input", "two inputs"])
+def test_the_discs_hold_the_true_response(write, text):
+    spec, u, y = recorded(text, 1)
+    results = identify(spec, write(table(u, y)), frequency_response=True)
+    model, columns = build_measurement(spec).model, results.tables["frequency_response"].columns
+    G = model.plant_at(columns["frequency_rad_per_s"])
+    names = [""] if model.inputs == 1 else ["_11", "_12"]
+    for j, name in enumerate(names):
+        error = np.abs(columns[f"G_re{name}"] + 1j * columns[f"G_im{name}"] - G[:, 0, j])
+        assert np.mean(error <= columns[f"radius{name}"]) >= 0.7
+        assert np.median(error / columns[f"radius{name}"]) < 0.7
+    response = results.result["frequency_response"]
+    assert response["worst_ratio_limits"][0] < 1.0 < response["worst_ratio_limits"][1]
+    assert results.result["status"] == "measured"
+
+
+def test_without_lines_in_the_spec_the_data_say_which_they_are(write):
+    _, u, y = recorded(TEXT, 1)
+    plain = parse_spec(TEXT.replace("accuracy", "# accuracy").replace("signal", "# signal"), design=False)
+    results = identify(plain, write(table(u, y)), frequency_response=True)
+    assert results.result["frequency_response"]["frequencies"] == 12
+    assert "deviations" not in results.tables
+
+
+def test_records_that_repeat_count_together(write):
+    spec, u, first = recorded(TEXT, 1)
+    _, _, second = recorded(TEXT, 2)
+    files = [write(table(u, first), "1.csv"), write(table(u, second), "2.csv")]
+    response = identify(spec, files, frequency_response=True).result["frequency_response"]
+    assert response["counted"] == 5000
+    assert response["records"] == 2
+
+
+def verdicts(admitted, number):
+    """Of data of the design for 5 %, judged as if so much were admitted."""
+    spec, u, _ = recorded(TEXT, 0)
+    task = build_measurement(spec.with_(**{"accuracy.frequency_response.relative": admitted})).task
+    found = []
+    for seed in range(number):
+        _, _, y = recorded_again(spec, u, seed)
+        data = Data(u, y, None, (len(u),), (), ())
+        by_lines = periodic_response(u, y, task.periods, task.grid.excited)
+        found.append(_judged(task, by_lines, data, task.periods, 1).verdict)
+    return found
+
+
+def recorded_again(spec, u, seed):
+    model = build_measurement(spec).model
+    e = 0.1 * np.random.default_rng(100 + seed).standard_normal((1, len(u), 1))
+    answer, noise = model.simulate(u[None], e, 1.0)
+    return spec, u, (answer + noise)[0]
+
+
+def test_a_verdict_is_hardly_ever_wrong():
+    # The record leaves 5 % but for rounding: with 4.9 % admitted it misses, with 5.1 % it meets.
+    assert verdicts(0.049, 40).count("met") <= 4
+    assert verdicts(0.051, 40).count("missed") <= 4
+
+
+def test_a_clear_case_is_decided():
+    assert set(verdicts(0.025, 10)) == {"missed"}
+    assert set(verdicts(0.1, 10)) == {"met"}
+
+
+def test_assess_tells_how_many_periods_would_do(write):
+    spec, u, y = recorded(TEXT, 3)
+    path = write(table(u, y))
+    met = assess(spec.with_(**{"accuracy.frequency_response.relative": 0.1}), path)
+    assert met.verdict == "met"
+    assert met.results.result["assessment"]["met"]
+    missed = assess(spec.with_(**{"accuracy.frequency_response.relative": 0.02}), path)
+    assert missed.verdict == "missed"
+    assert missed.results.result["assessment"]["periods"] > 5 * (0.05 / 0.02) ** 2
+    open_ = assess(spec, path)
+    assert open_.verdict == "undecided"
+    assert "by chance" in open_.results.result["notes"][-1]
+
+
+@pytest.mark.parametrize(
+    ("square", "cube", "speaks"), [(0.1, 0.0, "even"), (0.0, 0.5, "odd"), (0.0, 0.0, "")]
+)
+def test_silent_lines_tell_the_degree_of_a_nonlinearity(write, square, cube, speaks):
+    spec, u, y = recorded(TEXT, 5, square=square, cube=cube)
+    results = identify(spec, write(table(u, y)), frequency_response=True)
+    told = results.result["frequency_response"]["nonlinearity"]
+    assert {kind for kind, entry in told.items() if entry["probability"][0] < 0.01} == ({speaks} - {""})
+    notes = " ".join(results.result.get("notes", []))
+    assert (f"{speaks} lines that are not excited" in notes) if speaks else "not excited" not in notes
+
+
+def test_of_noise_alone_the_probability_is_uniform():
+    spec, u, _ = recorded(TEXT, 0)
+    task = build_measurement(spec).task
+    found = []
+    for seed in range(100):
+        _, _, y = recorded_again(spec, u, seed)
+        silent = _silent(task, Data(u, y, None, (len(u),), (), ()), task.periods, 1)
+        found.append(silent.found["even"]["probability"][0])
+    assert np.mean(found) == pytest.approx(0.5, abs=0.1)
+    assert 0.02 < np.mean(np.array(found) < 0.1) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        (lambda u, y: (u[:900], y[:900]), "too-few-samples"),
+        (lambda u, y: (np.zeros_like(u) + 1.0, y), "not-exciting"),
+        (lambda u, y: (u, np.tile(y[500:1000], (6, 1))), "noise-free-data"),
+    ],
+)
+def test_data_that_tell_nothing_are_refused(write, change, code):
+    spec, u, y = recorded(TEXT, 1)
+    with pytest.raises(DataError) as caught:
+        identify(spec, write(table(*change(u, y))), frequency_response=True)
+    assert caught.value.diagnostics[0].code == code
+
+
+def test_blocks_that_are_cut_are_refused(write):
+    spec, u, y = recorded(TWO, 1)
+    with pytest.raises(DataError, match="blocks of whole periods"):
+        identify(spec, write(table(u[:-7], y[:-7])), frequency_response=True)
