@@ -117,7 +117,8 @@ class DeviationPanel:
     deviation: Array
     found: Array | None = None  # of data, or of simulated experiments
     label: str = ""  # what gave them
-    entry: tuple[int, int] | None = None  # as of `BoundPanel`
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
 
 
 @dataclass(frozen=True)

@@ -140,7 +140,8 @@ def _deviations(
         listed = {"G_abs": size, "r_adm": admitted, "deviation": expected, "deviation_data": found}
         columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
         entry = None if units.single else (i, j)
-        panels.append(DeviationPanel(w, size, admitted, expected, found, "these data", entry))
+        shown = (w, size, admitted, expected, found, "these data")
+        panels.append(DeviationPanel(*shown, entry, units.passage(entry)))
     return columns, tuple(panels)
 
 

@@ -214,7 +214,8 @@ def _deviations(
             listed["deviation_simulated"] = found
         columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
         entry = None if units.single else (i, j)
-        panels.append(DeviationPanel(terms.frequency, size, admitted, designed[:, i, j], found, label, entry))
+        shown = (terms.frequency, size, admitted, designed[:, i, j], found, label)
+        panels.append(DeviationPanel(*shown, entry, units.passage(entry)))
     return columns, DeviationCurves(tuple(panels))
 
 
