@@ -21,7 +21,7 @@ ORDER = [
     {"runs"},
     {"monte_carlo"},
     {"tasks"},
-    {"sweep", "figures"},
+    {"sweep", "campaign", "figures"},
     {"report"},
     {"cli", "__main__"},
 ]

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from inputdesign_cli.cli.campaign import campaign, proceed, status
 from inputdesign_cli.cli.check import check
 from inputdesign_cli.cli.data import assess, identify
 from inputdesign_cli.cli.designs import analyse, simulate, solve
@@ -61,6 +62,9 @@ COMMANDS = (
     explore,
     identify,
     assess,
+    campaign,
+    proceed,
+    status,
     sweep,
     report,
     validate,
@@ -70,8 +74,10 @@ COMMANDS = (
     explain,
     schema,
 )
+# A word of Python is no name of a function.
+_NAMES = {"proceed": "next"}
 for command in COMMANDS:
-    app.command()(guarded(command))
+    app.command(_NAMES.get(command.__name__))(guarded(command))
 
 
 def main() -> None:

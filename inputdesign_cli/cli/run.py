@@ -43,7 +43,7 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
         OutputError: as `write_run`, and `output-is-the-spec`.
     """
     if place.nowhere:
-        _show(results, [], json_output=json_output, quiet=quiet)
+        show(results, [], json_output=json_output, quiet=quiet)
         return
     directory = place.directory
     with status(f"{directory}: writing ...", quiet=quiet):
@@ -56,10 +56,10 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
 
             drawings = draw_all(results)
         files = write_run(results, directory, drawings, sources=place.sources, overwrite=place.overwrite)
-    _show(results, files, json_output=json_output, quiet=quiet)
+    show(results, files, json_output=json_output, quiet=quiet)
 
 
-def _show(results: Results, files: Sequence[Path], *, json_output: bool, quiet: bool) -> None:
+def show(results: Results, files: Sequence[Path], *, json_output: bool, quiet: bool) -> None:
     """Print the result as it was written, if it was, or its summary."""
     if json_output and files:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from inputdesign_cli.cli.terminal import aligned
 from inputdesign_cli.report.evidence import (
+    campaign_facts,
     estimate_facts,
     estimate_table,
     requirement_table,
@@ -28,6 +29,7 @@ def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
     Lines whose numbers the result does not have are left out.
     """
     lines = [
+        *campaign_facts(result),
         *_data(result, time_unit),
         *_asked(result),
         *((name, f"{text}   ({note})" if note else text) for name, text, note in facts(result, time_unit)),

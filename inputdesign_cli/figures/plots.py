@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.bound import draw_bound
+from inputdesign_cli.figures.campaign import draw_campaign, draw_estimates, draw_trade, draw_true_ratio
 from inputdesign_cli.figures.data import draw_fit, draw_residuals
 from inputdesign_cli.figures.deviations import draw_deviations
 from inputdesign_cli.figures.ellipses import draw_ellipses
@@ -25,10 +26,12 @@ from inputdesign_cli.runs.results import Curves, Results
 # Each draws its curves on an empty page; the text is the unit of time.
 _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.BoundCurves: draw_bound,
+    of.CampaignCurves: draw_campaign,
     of.CloudCurves: draw_cloud,
     of.DeviationCurves: draw_deviations,
     of.DirectionCurves: draw_directions,
     of.EllipseCurves: draw_ellipses,
+    of.EstimateCurves: draw_estimates,
     of.ErrorBandCurves: draw_error_bands,
     of.ErrorCurves: draw_error,
     of.FanCurves: draw_fan,
@@ -37,10 +40,12 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.MomentsCurves: draw_moments,
     of.OptimalityCurves: draw_optimality,
     of.OrderCurves: draw_orders,
+    of.RatioCurves: draw_true_ratio,
     of.ResidualCurves: draw_residuals,
     of.ResponseCurves: draw_response,
     of.SignalCurves: draw_signal,
     of.SpectrumCurves: draw_spectrum,
+    of.TradeCurves: draw_trade,
 }
 
 

@@ -4,7 +4,11 @@ from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
 from inputdesign_cli.identification.directed import Directed as Directed
 from inputdesign_cli.identification.earlier import Earlier as Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
-from inputdesign_cli.identification.estimators import fit_batch as fit_batch, identify as identify
+from inputdesign_cli.identification.estimators import (
+    fit_batch as fit_batch,
+    identify as identify,
+    information_of_data as information_of_data,
+)
 from inputdesign_cli.identification.extensions import Extension as Extension
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,

@@ -11,9 +11,11 @@ import numpy as np
 
 from inputdesign_cli.identification.coloured import ColouredKind
 from inputdesign_cli.identification.earlier import Earlier
-from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
+from inputdesign_cli.identification.estimate import BatchEstimate, Estimate, information_of
 from inputdesign_cli.identification.kind import Kind, fit_batches, identify_records
 from inputdesign_cli.identification.polynomials import PolynomialKind, fit_polynomials
+from inputdesign_cli.identification.record_problem import evaluate
+from inputdesign_cli.identification.records import Records, centred, split
 from inputdesign_cli.identification.reparametrised import ReparametrisedKind
 from inputdesign_cli.identification.state_space import StateSpaceKind
 from inputdesign_cli.identification.structure import Structure
@@ -163,3 +165,26 @@ def fit_batch(model: Model, u: Array, y: Array, step: float = 1.0, *, start: Arr
         start: (k,) for all runs, or (runs, k).
     """
     return estimator(model, step).fit_batch(u, y, start)
+
+
+def information_of_data(
+    model: Model,
+    u: Array,
+    y: Array,
+    step: float = 1.0,
+    *,
+    lengths: Lengths = None,
+    free: bool = False,
+    earlier: Earlier | None = None,
+) -> Array:
+    """(k, k): what records tell of a model at its own parameters and noise, whether or not they fit best.
+
+    Args:
+        model, u, y, step, lengths, earlier: see `identify`.
+        free: whether starts and levels of the records are unknown.
+    """
+    kind, parts = estimator(model, step).kind, split(u, y, lengths)
+    made = tuple(kind.record(*part) for part in (centred(parts) if free else parts))
+    records = Records(made, free=free)
+    told = information_of(records, evaluate(records, model.theta), model.covariance)
+    return told if earlier is None else told + earlier.information

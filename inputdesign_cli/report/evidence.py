@@ -66,7 +66,7 @@ def estimate_answer(result: Result) -> str:
 def verdict(result: Result) -> Iterator[str]:
     """What an assessment comes to, and what is left to do."""
     assessment = result.get("assessment")
-    if assessment is None:
+    if assessment is None or result.get("status") == "running":
         return
     if "undecided" in assessment:
         yield (
@@ -108,6 +108,28 @@ def requirement_table(result: Result, time_unit: str) -> Rows | None:
         for entry in assessment["requirements"]
     )
     return Rows(("requirement", "of what is admitted", f"at (rad/{time_unit})", "verdict"), rows)
+
+
+def campaign_facts(result: Result) -> Iterator[tuple[str, str]]:
+    """How a campaign stands: its parts so far, what has been reached, and what comes next."""
+    campaign = result.get("campaign")
+    if campaign is None:
+        return
+    now, parts = campaign["rounds"][-1], len(campaign["records"])
+    state = {"running": "goes on", "stopped": "has ended: the data meet what is asked"}
+    ended = {"missed": "without meeting what is asked", "undecided": "undecided: see the notes"}
+    told = state.get(campaign["state"]) or f"has ended {ended[campaign['state']]}"
+    yield "campaign", f"{told}, after {parts} part{'' if parts == 1 else 's'} and {now['samples']} samples"
+    gone = [str(n + 1) for n, record in enumerate(campaign["records"]) if record["withdrawn"]]
+    if gone:
+        yield "", f"withdrawn: record {', '.join(gone)}"
+    if "worst_ratio" in now:
+        yield "reached", f"{now['worst_ratio']:.4g} of what is admitted, at the estimate"
+    plan = now.get("plan")
+    if plan is not None:
+        whole = plan["planned_samples"]
+        of = f", the first of {whole} that are planned" if whole > plan["samples"] else ""
+        yield "next", f"apply {plan['samples']} samples of power {plan['power']:.4g} (signal.csv{of})"
 
 
 def simulation_table(result: Result) -> Rows | None:

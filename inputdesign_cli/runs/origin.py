@@ -34,13 +34,22 @@ def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -
         shown: how the user calls it.
 
     Raises:
-        OutputError: `output-other-run`; `output-spec-changed`, the user has worked on `spec.yaml` there.
+        OutputError: `output-other-run`; `output-spec-changed`, the user has worked on `spec.yaml` there;
+            `campaign-exists`, its records would be lost.
     """
     try:
         result = load_result(target)
         written = read_regular(target / SPEC)
     except (DataError, OSError):
         return
+    campaign = result.get("campaign")
+    records = campaign.get("records") if isinstance(campaign, dict) else None
+    if isinstance(records, list) and records:
+        raise OutputError.because(
+            "campaign-exists",
+            f"{shown} holds a campaign with {len(records)} record{'' if len(records) == 1 else 's'}",
+            "go on with it by idesign next, choose another directory with -o, or give it up with --overwrite",
+        )
     hint = "choose another directory with -o, or replace the run with --overwrite"
     same = written == spec.encode(errors="backslashreplace")
     if not same and hashlib.sha256(written).hexdigest() != result.get("spec_sha256"):

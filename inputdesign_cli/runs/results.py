@@ -148,6 +148,42 @@ class FanCurves(Curves):
 
 
 @dataclass(frozen=True)
+class CampaignCurves(Curves):
+    """The worst ratio at the estimate and the energy applied after so many samples; all arrays (n,)."""
+
+    samples: Array
+    ratio: Array
+    energy: Array
+    end: int  # samples after which the campaign is over
+
+
+@dataclass(frozen=True)
+class EstimateCurves(Curves):
+    """Estimates and their standard deviations after so many samples, by name; all arrays (n,)."""
+
+    samples: Array
+    estimates: Mapping[str, Array]
+    deviations: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class RatioCurves(Curves):
+    """The largest r_u / r_adm of the true plant in many runs, way by way of experimenting: (runs,)."""
+
+    ratios: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class TradeCurves(Curves):
+    """Cost over that of the design that knows the plant, against the share of runs within r_adm.
+
+    Of each way: mean, 5 % and 95 % of the cost; the share and its 95 % limits.
+    """
+
+    points: Mapping[str, tuple[float, float, float, float, float, float]]
+
+
+@dataclass(frozen=True)
 class Ellipse:
     """The predicted confidence region of a pair of parameters: their values and (2, 2) covariances."""
 

@@ -18,6 +18,7 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
+from inputdesign_cli.tasks.build.campaign import build_rounds
 from inputdesign_cli.tasks.build.exploration import model_to_judge
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.identification import build_identification
@@ -25,6 +26,7 @@ from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.response import build_measurement
 from inputdesign_cli.tasks.build.system import build_model
 from inputdesign_cli.tasks.build.task import build_analysis, build_task
+from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past, decide, read_part
 from inputdesign_cli.tasks.control_systems import system_of
 from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
 from inputdesign_cli.tasks.identification import identify as identify_records
@@ -136,6 +138,28 @@ def assess(
             assert judged is not None  # the spec has lines
             return Assessment(judged.verdict, finite(results, most_extreme(spec.content)))
         return assess_records(build_identification(spec), _paths(data), known)
+
+
+def next_round(spec: Spec, past: Past) -> Decision:
+    """What comes next in a campaign after what has been done: the next part, or the end.
+
+    Raises:
+        SpecError: the spec has no campaign, or one that this version cannot do.
+        DataError: a record cannot be used.
+        InfeasibleError, InaccurateError: nothing can be planned.
+    """
+    with _placed(spec), time_limit(spec.solver.time_limit):
+        return decide(build_rounds(spec), past)
+
+
+def recorded_part(spec: Spec, path: Path, preparation: Preparation) -> Part:
+    """A record of a part of a campaign, as it is kept.
+
+    Raises:
+        DataError: the file cannot be used.
+    """
+    with _placed(spec):
+        return read_part(build_rounds(spec), path, preparation)
 
 
 def explore(data: Files, preparation: Preparation | None = None, *, model: Spec | None = None) -> Exploration:

@@ -77,6 +77,23 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
         SpecError: nothing is asked that data could meet.
         DataError: a file cannot be used.
     """
+    check_assessable(task)
+    started = time.perf_counter()
+    found = identified(task, paths, preparation)
+    assessment = judge(task, found, started)
+    if assessment.verdict != "missed" or found.question is None or found.question.top_up is None:
+        return assessment
+    try:
+        levels = found.preparation.levels
+        topped = _about(found.question.top_up(levels), levels)
+    except IdesignError as error:
+        return replace(assessment, results=_without_top_up(assessment.results, told(error)))
+    needed = partial(_experiments, found.question)
+    return Assessment(assessment.verdict, _topped_up(assessment.results, topped, needed))
+
+
+def check_assessable(task: Identification) -> None:
+    """Raise `SpecError` (`nothing-to-assess`) where no accuracy is asked for."""
     if not task.assessable:
         raise bad_spec(
             "nothing-to-assess",
@@ -84,8 +101,14 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
             hint="state one, such as accuracy: {model_error: {relative: 0.05}}",
             key="accuracy",
         )
-    started = time.perf_counter()
-    found = identified(task, paths, preparation)
+
+
+def judge(task: Identification, found: Identified, started: float) -> Assessment:
+    """What an estimate and its data say of what is asked, without a top-up.
+
+    Args:
+        started: `time.perf_counter()` when the work began.
+    """
     identification = identification_results(task, found, started)
     listed: list[dict[str, Json]] = []
     if found.question is not None:
@@ -121,15 +144,12 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     judged = _with_notes(_judged(identification, verdict, assessment), notes)
     if verdict == "undecided":
         judged = _without_model(judged, task.header.units, found)
-    if verdict != "missed" or found.question is None or found.question.top_up is None:
-        return Assessment(verdict, judged)
-    try:
-        levels = found.preparation.levels
-        topped = _about(found.question.top_up(levels), levels)
-    except IdesignError as error:
-        return Assessment(verdict, _judged(identification, verdict, {**assessment, "no_top_up": told(error)}))
-    needed = partial(_experiments, found.question)
-    return Assessment(verdict, _topped_up(judged, topped, needed))
+    return Assessment(verdict, judged)
+
+
+def _without_top_up(judged: Results, why: str) -> Results:
+    was = judged.result
+    return replace(judged, result={**was, "assessment": {**was["assessment"], "no_top_up": why}})
 
 
 def _rivals(units: Units, found: Identified, question: ModelQuestion) -> list[str]:

@@ -65,10 +65,14 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
+    times = np.concatenate([log.step * np.arange(length) for length in lengths])
     heard = exploration_notes(log, found, loops, order_of_excitation(log.parts))
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
-        task, Identified(found.estimate, found.model, Data(u, y, None, lengths, (), notes), preparation, None)
+        task,
+        Identified(
+            found.estimate, found.model, Data(u, y, None, times, lengths, (), notes), preparation, None
+        ),
     )
     results = identification_results(task, identified, started)
     result = {

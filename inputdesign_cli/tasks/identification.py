@@ -97,11 +97,23 @@ def identified(task: Identification, paths: Sequence[Path], preparation: Prepara
     Raises:
         DataError: a file cannot be used, or the data do not determine the parameters.
     """
-    units, nominal = task.header.units, task.nominal
     known = {**task.operating_point, **preparation.operating_point}
     taken = replace(preparation, operating_point=known)
-    data = read_data(paths, units, taken)
-    with blaming_columns(paths[0]):
+    return estimated(task, read_data(paths, task.header.units, taken), paths[0], taken)
+
+
+def estimated(task: Identification, data: Data, first: Path, taken: Preparation) -> Identified:
+    """The same from data that have been read.
+
+    Args:
+        first: the file that an objection to the data names.
+        taken: how they were prepared.
+
+    Raises:
+        DataError: the data do not determine the parameters.
+    """
+    units, nominal = task.header.units, task.nominal
+    with blaming_columns(first):
         estimate = estimate_model(
             nominal,
             data.u,
@@ -115,7 +127,7 @@ def identified(task: Identification, paths: Sequence[Path], preparation: Prepara
         )
     model = nominal.at(estimate.theta, estimate.noise)
     try:
-        question = task.at(model, len(data.y), estimate.factor, f"{paths[0].name} (estimate)")
+        question = task.at(model, len(data.y), estimate.factor, f"{first.name} (estimate)")
     except IdesignError as error:
         return Identified(estimate, model, data, taken, None, told(error))
     return Identified(estimate, model, data, taken, question)

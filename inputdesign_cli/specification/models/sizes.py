@@ -82,6 +82,7 @@ SIZES = {
     "accuracy.frequency_response.lines": Size(100_000, "every line has a power and a deviation of its own"),
     "uncertainty.scenarios": Size(2000, "every plant has integrals and peaks of its own"),
     "uncertainty.fresh": Size(100_000, "every plant has integrals and peaks of its own"),
+    "campaign.stages": Size(1000, "every stage has an estimate and a plan"),
     "signal.samples": Size(1_000_000, "a record has an entry for each sample and parameter"),
     "signal.lines": Size(1_000_000, "a period has no more harmonics than samples"),
     "signal.candidates": Size(1000, "every candidate takes as long as one record"),

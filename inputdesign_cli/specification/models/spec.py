@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr
 
 from inputdesign_cli.errors import IdesignError, Location, SpecError
 from inputdesign_cli.specification.models.accuracy import Accuracy
+from inputdesign_cli.specification.models.campaign import Campaign
 from inputdesign_cli.specification.models.channels import Channels
 from inputdesign_cli.specification.models.experiment import Cost, Estimated, Experiment, Noise
 from inputdesign_cli.specification.models.fields import Positive, Text
@@ -87,6 +88,9 @@ class Spec(Section):
     )
     uncertainty: Uncertainty | None = Field(
         default=None, description="How well the plant is known: the design is then made for all such plants."
+    )
+    campaign: Campaign | None = Field(
+        default=None, description="The experiment goes in parts, each planned with the data so far."
     )
     signal: Signal = Field(default=Signal(), description="The time series that realises the spectrum.")
     solver: Solver = Field(default=Solver(), description="How the optimum is found.")

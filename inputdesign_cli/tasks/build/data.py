@@ -46,12 +46,14 @@ class Data:
         r: (samples, r), the reference of a loop; None where some file does not have it.
         lengths: the samples of each stretch without gaps.
         files: the name of each file and its samples.
+        time: (samples,), in the unit of the spec; counted from zero in a file that has none.
         notes: what was done to the record and what was seen in it.
     """
 
     u: Array
     y: Array
     r: Array | None
+    time: Array
     lengths: tuple[int, ...]
     files: tuple[tuple[str, int], ...]
     notes: tuple[str, ...]
@@ -86,6 +88,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         np.concatenate([part.u for part in parts]),
         np.concatenate([part.y for part in parts]),
         np.concatenate(references) if len(references) == len(parts) else None,
+        np.concatenate([part.time for part in parts]),
         tuple(length for part in parts for length in part.lengths),
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
@@ -241,6 +244,7 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         inputs[:, : units.inputs],
         np.concatenate([part.y for part in segments]),
         inputs[:, units.inputs :] if references else None,
+        np.concatenate([part.time for part in segments]),
         tuple(len(part.y) for part in segments),
         ((path.name, len(inputs)),),
         tuple(f"{path.name}: {note}" if named else note for note in told),

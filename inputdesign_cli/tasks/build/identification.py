@@ -50,7 +50,7 @@ def build_identification(spec: Spec) -> Identification:
         operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
-        at=lambda model, samples, factor, source: _question(_restated(spec, model, source), samples, factor),
+        at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
     )
 
 
@@ -71,7 +71,7 @@ def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:
     return [f"signal.offset={json.dumps(offsets if len(offsets) > 1 else offsets[0])}"]
 
 
-def _restated(spec: Spec, model: Model, source: str) -> Spec:
+def restated(spec: Spec, model: Model, source: str) -> Spec:
     """The spec with another model in place of its nominal plant and noise."""
     return parse_spec(
         spec.to_yaml(),
@@ -82,7 +82,7 @@ def _restated(spec: Spec, model: Model, source: str) -> Spec:
     )
 
 
-def _question(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
+def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
     """What a spec asks of an experiment of so many samples, of which the information has this factor (k, k).
 
     Raises:

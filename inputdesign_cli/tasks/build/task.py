@@ -7,6 +7,7 @@ from typing import Protocol
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.campaign import build_campaign
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.given import build_given
 from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
@@ -65,6 +66,8 @@ def build_task(spec: Spec) -> Task:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
     _check_uncertainty(spec)
+    if spec.campaign is not None:
+        return build_campaign(spec)
     if not spec.designs:
         return build_analysis(spec)
     if spec.accuracy.frequency_response is not None:

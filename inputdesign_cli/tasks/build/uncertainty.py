@@ -104,6 +104,36 @@ def _unknowns(spec: Spec, basis: Basis) -> int:
     return basis.size + int(spec.goal != "least_cost")
 
 
+def farthest_radius(spec: Spec, experiment: Experiment) -> float:
+    """The radius beyond which poles, in closed loop those of the loop, count as unstable.
+
+    Raises:
+        SpecError: `unsuitable-key`, `no-stable-plant`.
+    """
+    nominal = experiment.model
+    within = None if spec.uncertainty is None else spec.uncertainty.stable_within
+    if nominal.continuous:
+        if within is not None:
+            raise spec.complain(
+                "unsuitable-key",
+                "a radius is one of poles in z, and the plant is not sampled",
+                hint="remove stable_within: unstable plants are not drawn",
+                key=f"{_KEY}.stable_within",
+            )
+        return 1.0
+    own = (experiment.loop or nominal).radius
+    if within is None:
+        return max(_DEFAULT_RADIUS, 0.5 * (1.0 + own))
+    if own > within:
+        raise spec.complain(
+            "no-stable-plant",
+            f"the nominal plant itself has a pole at radius {own:.6g}",
+            hint=f"write {0.5 * (1.0 + own):.6g}, or leave it out",
+            key=f"{_KEY}.stable_within",
+        )
+    return within
+
+
 class _NoPlantError(Exception):
     """Parameters that are none of a stable plant: the code of the error, and what is wrong."""
 
@@ -127,26 +157,7 @@ class _Scenarios:
     @property
     def _radius(self) -> float:
         """Beyond this radius poles are too near to the unit circle, or outside."""
-        if self._nominal.continuous:
-            if self.stated.stable_within is not None:
-                raise self.spec.complain(
-                    "unsuitable-key",
-                    "a radius is one of poles in z, and the plant is not sampled",
-                    hint="remove stable_within: unstable plants are not drawn",
-                    key=f"{_KEY}.stable_within",
-                )
-            return 1.0
-        own = (self.experiment.loop or self._nominal).radius
-        if self.stated.stable_within is None:
-            return max(_DEFAULT_RADIUS, 0.5 * (1.0 + own))
-        if own > self.stated.stable_within:
-            raise self.spec.complain(
-                "no-stable-plant",
-                f"the nominal plant itself has a pole at radius {own:.6g}",
-                hint=f"write {0.5 * (1.0 + own):.6g}, or leave it out",
-                key=f"{_KEY}.stable_within",
-            )
-        return self.stated.stable_within
+        return farthest_radius(self.spec, self.experiment)
 
     def at(self, theta: Array, radius: float) -> Alternative:
         """The plant with these parameters.

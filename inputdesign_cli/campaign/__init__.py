@@ -1,0 +1,1 @@
+"""Campaigns on a real plant: a directory that remembers every plan, record and decision."""

@@ -1,0 +1,145 @@
+"""The directory of a campaign: a run directory that is written whole at every decision.
+
+    spec.yaml              the campaign as it was begun
+    signal.csv             the samples to apply next; gone when the campaign has ended
+    plan_01.csv, ..        what was to be applied in every part
+    record_01.csv, ..      what was recorded; record_01_as_given.csv is the file of the user
+    model_01.yaml, ..      the estimate after so many records
+    result.json            under `campaign` all decisions
+
+A decision replaces the directory as a run replaces another: whatever kills the writer, it holds the state
+before or after.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.runs.record import RESULT, SPEC, load_result, unreadable
+from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.run_directory import output_errors, read_run
+
+VERSION = 1
+_KEPT = re.compile(r"(plan|record|model)_\d\d+(_as_given)?\.[a-z0-9]+")
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a directory says of its campaign: `campaign` of its result, and the bytes of what is kept."""
+
+    directory: Path
+    campaign: Mapping[str, Json]
+    spec: str
+    time_unit: str
+    made_from: tuple[str, ...]
+    files: Mapping[str, bytes]
+
+    @property
+    def state(self) -> str:
+        """`running`, or how it ended."""
+        return str(self.campaign["state"])
+
+    @property
+    def records(self) -> list[dict[str, Json]]:
+        """What was recorded, in order; those that are withdrawn as well."""
+        return [dict(record) for record in self.campaign["records"]]
+
+    @property
+    def counting(self) -> list[Path]:
+        """The files of the records that count."""
+        return [self.directory / record["file"] for record in self.records if not record["withdrawn"]]
+
+    @property
+    def done(self) -> int:
+        """Samples that have been applied."""
+        return sum(int(record["samples"]) for record in self.records)
+
+    @property
+    def plan(self) -> dict[str, Json] | None:
+        """What is to be applied next."""
+        return self.campaign["rounds"][-1].get("plan")
+
+    @property
+    def folder(self) -> Path:
+        """What names of files in the spec start from."""
+        return self.directory / self.campaign["folder"]
+
+
+def read_memory(directory: Path) -> Memory:
+    """What the directory remembers.
+
+    Raises:
+        DataError: `run-missing`, `run-incomplete`, `run-unreadable`; `campaign-missing`, it holds something
+            else; `campaign-version`.
+    """
+    result = read_run(directory)
+    campaign = result.get("campaign")
+    if not isinstance(campaign, dict) or "records" not in campaign:
+        raise DataError.because(
+            "campaign-missing",
+            f"{directory} holds a run, and no campaign",
+            hint="begin one with `idesign campaign SPEC -o DIR`, in a directory of its own",
+        )
+    if campaign.get("version") != VERSION:
+        raise DataError.because(
+            "campaign-version",
+            f"the campaign in {directory} has version {campaign.get('version')}, and this is {VERSION}",
+            hint="go on with the version of idesign that began it, which result.json tells under environment",
+        )
+    if not _whole(campaign):
+        raise unreadable(directory / RESULT, "its campaign is not what idesign writes")
+    with output_errors(directory):
+        names = [name for name in result["files"] if _KEPT.fullmatch(name)]
+        files = {name: read_regular(directory / name) for name in names}
+        spec = read_regular(directory / SPEC).decode("utf-8")
+    origin = tuple(map(str, result.get("made_from", ())))
+    return Memory(directory, campaign, spec, str(campaign["time_unit"]), origin, files)
+
+
+def _whole(campaign: Mapping[str, Json]) -> bool:
+    """Whether everything is there that the next decision goes by."""
+    try:
+        rounds, records = campaign["rounds"], campaign["records"]
+        texts = (campaign["state"], campaign["folder"], campaign["time_unit"], rounds[-1]["state"])
+        told = [(record["file"], record["given"], bool(record["withdrawn"])) for record in records]
+        sizes = [(int(record["samples"]), float(record["energy"])) for record in records]
+        plan = rounds[-1].get("plan")
+        wanted = [] if plan is None else [plan[key] for key in ("file", "samples", "power", "offset")]
+    except (LookupError, TypeError, ValueError, AttributeError):
+        return False
+    return all(isinstance(text, str) for text in texts) and len(told) == len(sizes) and None not in wanted
+
+
+@contextmanager
+def held(directory: Path) -> Iterator[None]:
+    """Nobody else decides in this directory meanwhile.
+
+    Raises:
+        DataError: `run-missing`.
+        OutputError: `output-busy`.
+    """
+    try:
+        handle = os.open(directory / RESULT, os.O_RDONLY | os.O_NOFOLLOW)
+    except OSError:
+        load_result(directory)  # says what is wrong
+        raise
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            current = os.path.samestat(os.fstat(handle), os.stat(directory / RESULT))
+        except OSError:
+            current = False
+        if not current:
+            message = f"another process works on the campaign in {directory}"
+            raise OutputError.because("output-busy", message, "wait for it, and see `idesign status` then")
+        yield
+    finally:
+        os.close(handle)

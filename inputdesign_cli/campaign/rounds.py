@@ -1,0 +1,253 @@
+"""The verbs of a campaign: begin it, take a record and decide, withdraw a record."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.campaign.memory import VERSION, Memory
+from inputdesign_cli.campaign.pictures import history
+from inputdesign_cli.errors import DataError, Diagnostic
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.runs.results import Curves, Json, Results, SignalCurves, Table
+from inputdesign_cli.runs.text_formats import csv_text, read_csv
+from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
+
+Decide = Callable[[Past], Decision]
+# A record at another scale: the plan explains it to this correlation, and its size is off by more than this.
+_LIKE, _OFF, _UNLIKE = 0.9, 0.02, 0.5
+
+
+def begun(decide: Decide, folder: Path, directory: Path) -> Results:
+    """The first plan.
+
+    Args:
+        folder: what names of files in the spec start from.
+        directory: where the campaign will be.
+    """
+    decision = decide(Past((), 0, None, None, 1))
+    campaign: dict[str, Json] = {
+        "version": VERSION,
+        "time_unit": decision.header.units.time_unit,
+        "folder": os.path.relpath(os.path.realpath(folder), os.path.realpath(directory)),
+        "samples": decision.rules.schedule.samples,
+        "max_samples": decision.rules.end,
+        "records": [],
+        "rounds": [],
+    }
+    return _decided(decision, campaign, {}, seed=1)
+
+
+def advanced(
+    decide: Decide, memory: Memory, given: Path | None, part: Part | None, *, unlike: bool = False
+) -> Results:
+    """The next decision, with a new record or with those at hand.
+
+    Args:
+        given: the file of the user, and what was read of it.
+        unlike: whether to take a record that is not at the scale of its plan.
+
+    Raises:
+        DataError: `campaign-over`; `record-too-long`, `record-other-scale`; what is wrong with a record.
+    """
+    records, files = memory.records, dict(memory.files)
+    if given is not None and part is not None:
+        entry = _accepted(memory, given, part, unlike=unlike)
+        name, text = f"record_{len(records) + 1:02d}", csv_text(part.table)
+        _check_new(records, files, given, text)
+        files[f"{name}.csv"] = text.encode()
+        files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
+        records.append({"file": f"{name}.csv", "given": given.name, **entry})
+    return _again(decide, memory, records, files)
+
+
+def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
+    """The decision without a record, whose file stays.
+
+    Raises:
+        DataError: `record-unknown`.
+    """
+    records = memory.records
+    if not 1 <= number <= len(records) or records[number - 1]["withdrawn"]:
+        left = [str(n + 1) for n, record in enumerate(records) if not record["withdrawn"]]
+        raise DataError.because(
+            "record-unknown",
+            f"there is no record {number} that could be withdrawn",
+            hint=f"those that count are {', '.join(left)}" if left else "none counts",
+        )
+    records[number - 1]["withdrawn"] = True
+    return _again(decide, memory, records, dict(memory.files))
+
+
+def _again(
+    decide: Decide, memory: Memory, records: list[dict[str, Json]], files: dict[str, bytes]
+) -> Results:
+    counting = [str(record["file"]) for record in records if not record["withdrawn"]]
+    campaign = {**memory.campaign, "records": records}
+    last, seed = campaign.get("last"), len(campaign["rounds"]) + 1
+    with _on_disc(files, counting) as paths:
+        past = Past(
+            records=paths,
+            done=sum(int(record["samples"]) for record in records),
+            last=None if last is None else np.array(list(last.values()), dtype=float),
+            first_power=campaign.get("first_power"),
+            seed=seed,
+        )
+        decision = decide(past)
+    results = _decided(decision, campaign, files, seed=seed)
+    return replace(results, result={**results.result, "made_from": list(memory.made_from)})
+
+
+@contextmanager
+def _on_disc(files: Mapping[str, bytes], names: Sequence[str]) -> Iterator[list[Path]]:
+    """The records that count as files, the new one as well, which is not in the directory yet."""
+    with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
+        paths = [Path(folder) / name for name in names]
+        for path in paths:
+            path.write_bytes(files[path.name])
+        try:
+            yield paths
+        except DataError as error:
+            raise DataError([_of_the_campaign(one, Path(folder)) for one in error.diagnostics]) from error
+
+
+def _of_the_campaign(diagnostic: Diagnostic, folder: Path) -> Diagnostic:
+    """A diagnostic that names a record by itself, not by where it was read."""
+    place = diagnostic.location
+    if place is None or not Path(place.file).is_relative_to(folder):
+        return diagnostic
+    return replace(diagnostic, location=replace(place, file=Path(place.file).name))
+
+
+def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> dict[str, Json]:
+    """What is noted of a record, compared with its plan.
+
+    Raises:
+        DataError: `campaign-over`, `record-too-long`, `record-other-scale`.
+    """
+    plan = memory.plan
+    if memory.state != "running" or plan is None:
+        raise DataError.because(
+            "campaign-over",
+            f"the campaign in {memory.directory} has ended: {memory.state}",
+            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign",
+        )
+    if part.samples > plan["samples"]:
+        raise DataError.because(
+            "record-too-long",
+            f"{given.name} has {part.samples} samples, and the plan {plan['file']} has {plan['samples']}",
+            hint="give the samples from the start of the plan to its end; is it the record of another part?",
+        )
+    entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
+    if part.excitation is None:
+        return entry | {"energy": part.samples * plan["power"]}
+    offset = np.array(plan["offset"], dtype=float)
+    path = memory.directory / plan["file"]
+    wanted = np.stack(list(read_csv(path).values())[1:], axis=1)[: part.samples] - offset
+    applied = part.excitation - offset
+    scale, likeness = _compared(wanted, applied)
+    if likeness > _LIKE and abs(scale - 1.0) > _OFF and not unlike:
+        raise DataError.because(
+            "record-other-scale",
+            f"{given.name} was applied at {scale:.4g} times the scale of {plan['file']}",
+            hint="mend the column if it is in another unit; if it was really applied so, say "
+            "--as-applied: the estimate goes by what was recorded",
+        )
+    entry |= {"scale": scale} if likeness > _LIKE else {}
+    return entry | {"energy": float(np.sum(applied**2)), "likeness": likeness}
+
+
+def _check_new(
+    records: Sequence[Mapping[str, Json]], files: Mapping[str, bytes], given: Path, text: str
+) -> None:
+    """Raise `DataError` (`data-repeated`) where the same samples have been given before."""
+    for record in records:
+        if files[record["file"]] == text.encode():
+            raise DataError.because(
+                "data-repeated",
+                f"{given.name} holds the samples of {record['file']}, given as {record['given']}",
+                hint="give each record once"
+                + (": it was withdrawn, and stays so" if record["withdrawn"] else ""),
+            )
+
+
+def _compared(plan: Array, applied: Array) -> tuple[float, float]:
+    """The scale at which a plan (n, r) was applied, and the correlation of the two."""
+    size, own = float(np.linalg.norm(plan)), float(np.linalg.norm(applied))
+    if size == 0.0 or own == 0.0:
+        return 1.0, float(size == own)
+    product = float(np.sum(plan * applied))
+    return product / size**2, product / (size * own)
+
+
+def _decided(
+    decision: Decision, campaign: Mapping[str, Json], files: dict[str, bytes], *, seed: int
+) -> Results:
+    """The directory after a decision."""
+    number = len(campaign["records"]) + 1
+    plan, stands = decision.plan, decision.standing
+    done = sum(int(record["samples"]) for record in campaign["records"])
+    energy = sum(float(record["energy"]) for record in campaign["records"])
+    entry: dict[str, Json] = {
+        "samples": done,
+        "energy": energy,
+        "records": [n + 1 for n, record in enumerate(campaign["records"]) if not record["withdrawn"]],
+        "state": decision.state,
+    }
+    assessed = decision.assessed
+    result: dict[str, Json] = {"format": 1, "title": decision.header.title, "timing_s": {}}
+    tables: dict[str, Table] = {}
+    curves: dict[str, Curves] = {}
+    if assessed is not None:
+        result |= assessed.result
+        tables, curves = dict(assessed.tables), dict(assessed.curves)
+        files[f"model_{number - 1:02d}.yaml"] = assessed.files["model.yaml"]
+    more = dict(campaign)
+    if stands is not None:
+        values = dict(zip(stands.model.names, stands.model.theta.tolist(), strict=True))
+        deviation = np.sqrt(np.diag(np.linalg.inv(stands.information)))
+        entry |= {
+            "estimate": values,
+            "standard_deviation": dict(zip(stands.model.names, deviation.tolist(), strict=True)),
+            "worst_ratio": stands.ratio,
+            "share": stands.share,
+        }
+        if stands.share == 1.0:
+            more["last"] = values
+    if plan is not None and decision.part is not None:
+        files[f"plan_{number:02d}.csv"] = csv_text(decision.part).encode()
+        entry["plan"] = {
+            "file": f"plan_{number:02d}.csv",
+            "samples": plan.take,
+            "planned_samples": len(plan.record),
+            "power": plan.power,
+            "cost": plan.cost,
+            "kind": plan.kind,
+            "capped": plan.capped,
+            "seed": seed,
+            "offset": decision.offsets.tolist(),
+        }
+        if plan.kind != "pilot":
+            more.setdefault("first_power", plan.power)
+        time, *signals = decision.part.columns.values()
+        names = list(decision.part.columns)[1:]
+        tables["signal"] = decision.part
+        curves["signal"] = SignalCurves(
+            time, {name.split()[0]: x for name, x in zip(names, signals, strict=True)}
+        )
+    more |= {"rounds": [*campaign["rounds"], entry], "state": decision.state}
+    tables["rounds"], progress = history(more["rounds"], decision.rules.end)
+    curves |= progress
+    notes = [*decision.notes, *result.get("notes", [])]
+    result |= {"status": decision.state, "samples": done, "campaign": more}
+    result |= {"notes": notes} if notes else {}
+    return Results(
+        result, decision.header.resolved_spec, decision.header.units.time_unit, tables, curves, files
+    )

@@ -1,0 +1,158 @@
+"""`idesign campaign`, `idesign next` and `idesign status`: an experiment in parts."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inputdesign_cli.cli.data import levels, named
+from inputdesign_cli.cli.options import (
+    Columns,
+    Confine,
+    Figures,
+    Json,
+    OperatingPoint,
+    Output,
+    Overrides,
+    Overwrite,
+    Quiet,
+    SpecFile,
+)
+from inputdesign_cli.cli.reading import name_of, read_spec
+from inputdesign_cli.cli.terminal import status as told
+from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from inputdesign_cli.runs.results import Results
+
+CampaignDirectory = Annotated[
+    Path, typer.Argument(metavar="DIR", help="The directory that idesign campaign wrote.")
+]
+_EXIT = {"running": EXIT_DONE, "stopped": EXIT_DONE, "missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}
+
+
+def campaign(
+    spec: SpecFile,
+    overrides: Overrides = None,
+    confine: Confine = None,
+    output: Output = None,
+    overwrite: Overwrite = False,
+    figures: Figures = True,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Begin an experiment that goes in parts.
+
+    Plans the first part: signal.csv is ready to apply. Give what was recorded to `idesign next`, which
+    estimates the model, plans the next part with all data so far, and stops as soon as they meet the target.
+    The directory remembers every plan, record and decision.
+    """
+    directory = output or Path("runs") / name_of(spec)
+    with told(f"{spec}: computing ...", quiet=quiet):
+        from inputdesign_cli import tasks
+        from inputdesign_cli.campaign.rounds import begun
+
+        stated = read_spec(spec, overrides, confine)
+        results = begun(partial(tasks.next_round, stated), stated.resolve_path("."), directory)
+    _keep(results, directory, [spec], overwrite, figures=figures, json_output=json_output, quiet=quiet)
+
+
+def proceed(
+    directory: CampaignDirectory,
+    data: Annotated[
+        Path | None,
+        typer.Argument(metavar="DATA", help="What was recorded of the part that signal.csv was for."),
+    ] = None,
+    withdraw: Annotated[
+        int | None,
+        typer.Option(
+            "--withdraw", metavar="N", min=1, help="Leave out record N from now on; its file stays."
+        ),
+    ] = None,
+    as_applied: Annotated[
+        bool,
+        typer.Option("--as-applied", help="Take a record that was applied at another scale than planned."),
+    ] = False,
+    columns: Columns = "",
+    operating_point: OperatingPoint = "",
+    figures: Figures = True,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Take the record of a part, and plan the next or stop.
+
+    All records that count are estimated jointly. Without DATA the decision is made anew. Exits with 0 while
+    the campaign goes on, and when the data meet the target; with 1 where it has ended without that, with 5
+    where the data contradict the model structure.
+    """
+    if data is not None and withdraw is not None:
+        raise typer.BadParameter("give a record, or withdraw one", param_hint="--withdraw")
+    with told(f"{directory}: computing ...", quiet=quiet):
+        from inputdesign_cli import tasks
+        from inputdesign_cli.campaign.memory import held, read_memory
+        from inputdesign_cli.campaign.rounds import advanced, withdrawn
+        from inputdesign_cli.runs.record import SPEC
+        from inputdesign_cli.specification import parse_spec
+        from inputdesign_cli.tasks.build.preparation import Preparation
+
+    with held(directory):
+        with told(f"{directory}: computing ...", quiet=quiet):
+            memory = read_memory(directory)
+            stated = parse_spec(memory.spec, str(directory / SPEC), folder=memory.folder)
+            decide = partial(tasks.next_round, stated)
+            if withdraw is not None:
+                results = withdrawn(decide, memory, withdraw)
+            elif data is None:
+                results = advanced(decide, memory, None, None)
+            else:
+                point = levels(operating_point)
+                taken = Preparation(
+                    columns=named(columns, "--columns", "u1=Heater 1,y1=4"), operating_point=point
+                )
+                part = tasks.recorded_part(stated, data, taken)
+                results = advanced(decide, memory, data, part, unlike=as_applied)
+        _keep(results, directory, None, False, figures=figures, json_output=json_output, quiet=quiet)
+    code = _EXIT[results.result["status"]]
+    if code:
+        raise typer.Exit(code)
+
+
+def status(directory: CampaignDirectory, json_output: Json = False) -> None:
+    """Tell how a campaign stands: what has been reached, and what comes next."""
+    from inputdesign_cli.campaign.memory import read_memory
+    from inputdesign_cli.runs.text_formats import json_text
+
+    memory = read_memory(directory)
+    if json_output:
+        typer.echo(json_text(dict(memory.campaign)), nl=False)
+        return
+    from inputdesign_cli.cli.summary import summary
+    from inputdesign_cli.runs.record import load_result
+
+    typer.echo(summary(load_result(directory), memory.time_unit, []))
+
+
+def _keep(
+    results: Results,
+    directory: Path,
+    sources: Sequence[Path] | None,
+    overwrite: bool,
+    *,
+    figures: bool,
+    json_output: bool,
+    quiet: bool,
+) -> None:
+    """Write the directory and print the decision; a campaign that goes on is not a run of another spec."""
+    from inputdesign_cli.cli.run import show
+    from inputdesign_cli.figures.plots import draw_all
+    from inputdesign_cli.runs.run_directory import write_run
+
+    with told(f"{directory}: writing ...", quiet=quiet):
+        drawn = draw_all(results) if figures else {}
+        files = write_run(results, directory, drawn, sources=sources, overwrite=overwrite)
+    show(results, files, json_output=json_output, quiet=quiet)

@@ -1,0 +1,204 @@
+"""An experiment in parts: after each part all data are estimated jointly, and what is left is planned anew.
+
+A part is an ordinary experiment whose prior is what the data tell by their own samples at the new estimate.
+It stops where that information meets what is asked. Such a rule needs no correction for looking often: what
+it looks at is the information, not the error ([anscombe-1952], [chow-robbins-1965]).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Literal, Protocol
+
+import numpy as np
+
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Results
+from inputdesign_cli.tasks.identification import ModelQuestion
+
+Kind = Literal["pilot", "nominal", "robust", "white"]
+REACHED = 1.0 + 1e-9
+"""A ratio no larger than this meets what is asked."""
+# Of the way from the last estimate that could be built on to one that cannot.
+_SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How an experiment is divided.
+
+    Attributes:
+        parts: samples of the first parts; those that follow have `block`.
+        samples: of the whole experiment as it is planned; `most`: where it ends at the latest.
+    """
+
+    parts: tuple[int, ...]
+    block: int
+    samples: int
+    most: int
+
+    def take(self, done: int) -> int:
+        """Samples of the part that begins after so many; 0 at the end."""
+        ends = [end for end in accumulate(self.parts) if end > done]
+        if ends:
+            part = ends[0] - done
+        else:
+            part = min(self.block, self.samples - done) if done < self.samples else self.block
+        return max(min(part, self.most - done), 0)
+
+    def rest(self, done: int) -> int:
+        """Samples that the plan of that part is for: those of the whole experiment that are left."""
+        return max(min(self.samples, self.most) - done, self.take(done))
+
+    def last(self, done: int) -> bool:
+        """Whether the plan ends with that part."""
+        return self.rest(done) <= self.take(done)
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a campaign may do; see `campaign` of the spec."""
+
+    schedule: Schedule
+    pilot_power: float | None = None
+    power_cap: float | None = None
+    robust_last: bool = True
+    stops: bool = True
+    white: bool = False  # plans have a flat spectrum
+
+    @property
+    def end(self) -> int:
+        """Samples after which the experiment is over, whatever was reached."""
+        return self.schedule.most if self.stops else min(self.schedule.samples, self.schedule.most)
+
+    def over(self, done: int, *, met: bool) -> bool:
+        """Whether nothing more is applied after so many samples."""
+        return done >= self.end or (met and self.stops)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What is known after some data.
+
+    Attributes:
+        model: the estimate that is built on.
+        information: (k, k) of the data by their own samples at that estimate, raw parameters.
+        ratio: the largest r_u / r_adm, or of another requirement, there.
+        share: of the way from the last estimate to the new one: below 1 where the new one has no stable loop,
+            or nothing can be asked of it.
+    """
+
+    model: Model
+    information: Array
+    ratio: float
+    share: float = 1.0
+
+    @property
+    def met(self) -> bool:
+        """Whether the data meet what is asked."""
+        return self.share == 1.0 and self.ratio <= REACHED
+
+
+@dataclass(frozen=True)
+class Planned:
+    """The experiment for what is left.
+
+    Attributes:
+        record: (rest, r) about the operating point, of which `take` samples are applied.
+        power: of the excitation, and the `cost` of the design, per sample.
+        kind: what it was made for.
+        capped: whether the power was limited to what the cap allows.
+        solved: the same design with proof, curves and tables.
+    """
+
+    record: Array
+    take: int
+    power: float
+    cost: float
+    kind: Kind
+    capped: bool
+    solved: Callable[[], Results]
+
+    @property
+    def applied(self) -> Array:
+        """(take, r): the samples of the next part."""
+        return self.record[: self.take]
+
+
+class Planner(Protocol):
+    """Asks and plans at any estimate."""
+
+    @property
+    def nominal(self) -> Experiment:
+        """The experiment on the plant of the spec, in raw parameters."""
+
+    def radius(self, model: Model) -> float:
+        """Of the farthest pole of the plant, or of its loop; infinite where there is no stable loop."""
+
+    @property
+    def farthest(self) -> float:
+        """The radius beyond which an estimate is not built on."""
+
+    def question(self, model: Model, information: Array) -> ModelQuestion:
+        """What is asked, at a model and in coordinates where the information (k, k) of the data is I.
+
+        Raises:
+            IdesignError: nothing can be asked of this model.
+            LinAlgError: the information is singular.
+        """
+
+    def plan(
+        self, rules: Rules, known: Standing | None, done: int, seed: int, first: float | None
+    ) -> Planned:
+        """The experiment after so many samples.
+
+        Args:
+            known: None before any data.
+            seed: of the record.
+            first: power of the first plan, which the cap is relative to.
+
+        Raises:
+            IdesignError: there is none.
+        """
+
+    def cheapest(self, model: Model) -> float:
+        """Cost, summed over the samples, of the design that knows the plant: the oracle.
+
+        Raises:
+            IdesignError: there is none.
+        """
+
+
+def ratio_of(question: ModelQuestion, information: Array) -> float:
+    """The largest ratio of what is asked at an information (k, k) in its coordinates."""
+    return max(requirement.worst(information).ratio for requirement in question.requirements)
+
+
+def standing(
+    planner: Planner, estimate: Model, informed: Callable[[Model], Array], last: Model
+) -> Standing | None:
+    """What can be built on: the estimate, or the nearest to it on the way from the `last` one.
+
+    None where not even that can be told from the data.
+
+    Args:
+        informed: information (k, k) of the data at a model.
+    """
+    for share in _SHARES:
+        model = estimate if share == 1.0 else estimate.at(last.theta + share * (estimate.theta - last.theta))
+        if not planner.radius(model) <= planner.farthest:
+            continue
+        try:
+            information = informed(model)
+            question = planner.question(model, information)
+            ratio = ratio_of(question, question.information)
+        except (IdesignError, np.linalg.LinAlgError):
+            continue
+        if np.isfinite(ratio):
+            return Standing(model, information, ratio, share)
+    return None

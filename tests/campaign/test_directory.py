@@ -1,0 +1,184 @@
+"""`idesign campaign`, `next` and `status`: the directory remembers, refuses and goes on."""
+
+import json
+import os
+import signal
+import sys
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.cli import main
+from inputdesign_cli.runs.run_directory import read_run
+from tests.support.campaigns import SPEC, applied, planned, written
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `idesign` in an empty folder with the spec in it: its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.yaml").write_text(SPEC)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["idesign", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return call
+
+
+@pytest.fixture
+def begun(run, tmp_path):
+    """A campaign with its first plan."""
+    assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
+    return tmp_path / "c"
+
+
+def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
+    assert len(planned(begun)) == 20  # a pilot of a tenth
+    for number in range(1, 12):
+        code, out, _ = run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--json", "--no-figures")
+        result = json.loads(out)
+        assert code == 0
+        if result["status"] != "running":
+            break
+    assert result["status"] == "stopped"
+    assert result["assessment"]["met"]
+    assert not (begun / "signal.csv").exists()
+    campaign = result["campaign"]
+    assert [entry["samples"] for entry in campaign["rounds"]] == [
+        0,
+        *np.cumsum([record["samples"] for record in campaign["records"]]).tolist(),
+    ]
+    # Every plan, record and estimate stays, and the times of the plans follow each other.
+    for number in range(1, len(campaign["records"]) + 1):
+        names = ("plan_{}.csv", "record_{}.csv", "record_{}_as_given.csv", "model_{}.yaml")
+        assert all((begun / name.format(f"{number:02d}")).is_file() for name in names)
+    assert np.array_equal(planned(begun)[:, 0], np.arange(len(planned(begun))))
+    estimate = campaign["rounds"][-1]["estimate"]
+    spread = campaign["rounds"][-1]["standard_deviation"]
+    assert abs(estimate["b1"] - 3.5) < 4 * spread["b1"]
+    assert abs(estimate["f1"] + 0.72) < 4 * spread["f1"]
+    code, _, err = run("next", "c", tmp_path / "r1.csv")
+    assert code == 2
+    assert "campaign-over" in err
+    code, out, _ = run("status", "c")
+    assert code == 0
+    assert "the data meet what is asked" in out
+
+
+def test_a_withdrawn_record_does_not_count_and_stays(run, begun, tmp_path):
+    for number in (1, 2):
+        run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--no-figures")
+    before = read_run(begun)["campaign"]
+    code, out, _ = run("next", "c", "--withdraw", 2, "--json", "--no-figures")
+    after = json.loads(out)["campaign"]
+    assert code == 0
+    assert after["rounds"][-1]["records"] == [1]
+    # It was applied: its samples and its energy are spent.
+    assert after["rounds"][-1]["samples"] == before["rounds"][-1]["samples"]
+    assert after["rounds"][-1]["estimate"] == pytest.approx(before["rounds"][1]["estimate"], rel=1e-6)
+    assert (begun / "record_02.csv").is_file()
+    code, _, err = run("next", "c", "--withdraw", 2)
+    assert code == 2
+    assert "record-unknown" in err
+
+
+@pytest.mark.parametrize("scale", [0.5, 2.0, -1.0])
+def test_a_record_at_another_scale_is_refused(run, begun, tmp_path, scale):
+    record = applied(begun, tmp_path / "r.csv", scale=scale)
+    code, _, err = run("next", "c", record)
+    if scale < 0:  # not the signal that was planned: the estimate goes by what was recorded
+        assert code == 0
+        return
+    assert code == 2
+    assert "record-other-scale" in err
+    assert f"{scale:g} times" in err
+    assert run("next", "c", record, "--as-applied", "--no-figures")[0] == 0
+
+
+def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_path):
+    before = (begun / "result.json").read_bytes()
+    n = len(planned(begun)) + 1
+    long = written(tmp_path / "long.csv", np.arange(n), np.ones(n), np.arange(n) ** 0.5)
+    for arguments, error in [
+        ((long,), "record-too-long"),
+        ((tmp_path / "none.csv",), "data-unreadable"),
+        (("--withdraw", 1), "record-unknown"),
+    ]:
+        code, _, err = run("next", "c", *arguments)
+        assert code == 2
+        assert error in err
+    assert (begun / "result.json").read_bytes() == before
+
+
+def test_the_same_record_does_not_count_twice(run, begun, tmp_path):
+    record = applied(begun, tmp_path / "r.csv")
+    assert run("next", "c", record, "--no-figures")[0] == 0
+    code, _, err = run("next", "c", record)
+    assert code == 2
+    assert "data-repeated" in err
+
+
+def test_records_are_not_lost_to_another_run(run, begun, tmp_path):
+    assert run("next", "c", applied(begun, tmp_path / "r.csv"), "--no-figures")[0] == 0
+    for verb in ("solve", "campaign"):
+        code, _, err = run(verb, "s.yaml", "-o", "c")
+        assert code == 2
+        assert "campaign-exists" in err
+    assert (begun / "record_01.csv").is_file()
+
+
+def test_directories_of_another_kind_and_version_are_refused(run, begun):
+    content = json.loads((begun / "result.json").read_text())
+    content["campaign"]["version"] = 7
+    (begun / "result.json").write_text(json.dumps(content))
+    assert "campaign-version" in run("next", "c")[2]
+    content["campaign"] |= {"version": 1, "rounds": [{}]}
+    (begun / "result.json").write_text(json.dumps(content))
+    assert "run-unreadable" in run("next", "c")[2]
+    del content["campaign"]
+    (begun / "result.json").write_text(json.dumps(content))
+    assert "campaign-missing" in run("next", "c")[2]
+    assert "run-missing" in run("status", "nowhere")[2]
+
+
+def test_data_of_another_plant_are_undecided(run, begun, tmp_path):
+    assert run("next", "c", applied(begun, tmp_path / "a.csv"), "--no-figures")[0] == 0
+    other = applied(begun, tmp_path / "b.csv", gain=-2.0, pole=-0.5)
+    code, out, _ = run("next", "c", other, "--json", "--no-figures")
+    assert code == 5
+    assert json.loads(out)["status"] == "undecided"
+    # Without it the campaign goes on.
+    assert run("next", "c", "--withdraw", 2, "--no-figures")[0] == 0
+
+
+def test_a_killed_round_leaves_the_state_before_or_after(run, begun, tmp_path):
+    record = applied(begun, tmp_path / "r.csv")
+    counted = set()
+    for step in (1, 40, 400, 1200, 2000, 3000):
+        child = os.fork()
+        if child == 0:
+            left = [step]
+
+            def hear(event, _arguments, left=left):
+                if event.startswith(("open", "os.", "shutil.")):
+                    left[0] -= 1
+                    if left[0] == 0:
+                        os.kill(os.getpid(), signal.SIGKILL)
+
+            sys.addaudithook(hear)
+            try:
+                run("next", "c", record, "--no-figures")
+            finally:
+                os._exit(0)
+        os.waitpid(child, 0)
+        campaign = read_run(begun)["campaign"]
+        assert len(campaign["records"]) in (0, 1)
+        assert len(campaign["rounds"]) == len(campaign["records"]) + 1
+        counted.add(len(campaign["records"]))
+        if campaign["records"]:
+            break
+    assert run("status", "c")[0] == 0

@@ -1,0 +1,44 @@
+"""A campaign on a simulated plant, one part after the other, as a user applies them."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import lfilter
+
+SPEC = """
+title: in parts
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {variance: 1.0}
+experiment: {samples: 200}
+accuracy: {model_error: {relative: 0.05, alpha: 2.45}}
+spectrum: {type: fir, order: 4}
+signal: {candidates: 2}
+campaign: {block: 60}
+"""
+GAIN, POLE = 3.5, 0.72
+
+
+def answered(u: np.ndarray, seed: int = 5, gain: float = GAIN, pole: float = POLE) -> np.ndarray:
+    """(n,): what the true plant answers to u (n,) from rest, with white noise of variance one."""
+    e = np.random.default_rng(seed).standard_normal(2000)[: len(u)]
+    return lfilter([0.0, gain], [1.0, -pole], u) + e
+
+
+def planned(directory: Path) -> np.ndarray:
+    """(n, 2): times and samples of all plans so far, one after the other."""
+    parts = sorted(directory.glob("plan_*.csv"))
+    return np.concatenate([np.loadtxt(part, delimiter=",", skiprows=1, ndmin=2) for part in parts])
+
+
+def written(path: Path, times: np.ndarray, u: np.ndarray, y: np.ndarray) -> Path:
+    """A record as a logger writes it."""
+    np.savetxt(path, np.column_stack([times, u, y]), delimiter=",", header="time_s,u,y", comments="")
+    return path
+
+
+def applied(directory: Path, path: Path, scale: float = 1.0, gain: float = GAIN, pole: float = POLE) -> Path:
+    """What is recorded of the part that comes next."""
+    times, u = planned(directory).T
+    n = len(np.loadtxt(directory / "signal.csv", delimiter=",", skiprows=1, ndmin=2))
+    y = answered(scale * u, gain=gain, pole=pole)
+    return written(path, times[-n:], scale * u[-n:], y[-n:])
