@@ -110,3 +110,22 @@ def test_moments_are_delivered_with_the_bound_so_far(slow_solver):
         gaps.append(found["relative_gap"])
     assert np.all(np.diff(gaps) <= 1e-9)
     assert gaps[0] > 1e-3
+
+
+@pytest.mark.parametrize("prices", [[1, 1], [1, 30], [0.03, 1]])
+@pytest.mark.parametrize("gains", [(1, 0.5), (0.02, 3)])
+def test_a_design_of_two_inputs_never_costs_more_than_white_input(prices, gains):
+    """At the first round and at the end."""
+    text = f"""
+plant: {{B: [[[0, {gains[0]}], [0, {gains[1]}]]], F: [[[1, -0.5], [1, -0.9]]]}}
+noise: {{variance: 0.1}}
+experiment: {{samples: 200}}
+cost: {{input_power: {prices}}}
+accuracy: {{model_error: {{relative: 0.1}}}}
+spectrum: {{type: fir, order: 3}}
+"""
+    with stoppable() as stop, watching(lambda done: stop()):
+        early = solve(parse_spec(text)).result
+    best = solve(parse_spec(text)).result
+    white = best["baseline"]["white"]["cost"]
+    assert best["cost"] <= early["cost"] * (1.0 + 1e-7) <= white * (1.0 + 2e-7)

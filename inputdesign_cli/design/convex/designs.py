@@ -94,6 +94,8 @@ def solve_design(
     if problem.others and problem.goal == "cost":
         start, powers = (white_level / power) * start, (white_level / power) * powers
     design = Design(problem, white, white_level, within, _nothing(problem), None)
+    if not limited and np.ptp(powers) > 0.0:
+        start = _cheaper(problem, start, question.basis.spread(np.full(powers.size, powers.mean())))
     try:
         result = without_faint_lines(problem, solve_limited(problem, start, tolerance))
     except UnfinishedError as ended:
@@ -113,6 +115,12 @@ def solve_design(
         found = replace(design, result=result, any_spectrum=proved)
         raise UnfinishedDesignError.of(found) from None
     return replace(design, result=result, any_spectrum=anything)
+
+
+def _cheaper(problem: Problem, start: Array, even: Array) -> Array:
+    """The better of two spectra to begin with: an unfinished design costs no more than even white input."""
+    tried = [scaled_up(problem, _FAR_BELOW * x, 0.0, []) for x in (start, even)]
+    return min(tried, key=lambda candidate: candidate.objective).z
 
 
 def _begins_flat(basis: Basis) -> bool:

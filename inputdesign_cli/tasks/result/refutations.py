@@ -79,10 +79,11 @@ def differences(estimate: Estimate, files: Sequence[str]) -> list[str]:
 
 
 def repetitions(estimate: Estimate, files: Sequence[tuple[str, int]]) -> list[str]:
-    """What to say where samples seem to be given twice; `files` are names and numbers of samples."""
+    """What to say where samples seem to be given twice; `files` are names and samples, if known."""
     found = estimate.repeated
     if found is None:
         return []
+    files = files or [("the record", found.second + found.length)]
     ends = np.cumsum([samples for _, samples in files])
     # By their middle: the ends are not sharp.
     first, second = (
