@@ -1,7 +1,7 @@
 """Campaigns on simulated plants: what the estimates keep, and what that costs against knowing the plant.
 
     python benchmarks/campaigns.py                  # prints a table and writes benchmarks/campaigns.json
-    python benchmarks/campaigns.py --runs 20 --only ill1,oe2
+    python benchmarks/campaigns.py --runs 20 --only 'ill1;oe2'
 
 From a prior: 100 samples of white noise with 3 % of the energy of the oracle, which counts in the cost. Wrong
 models: no data before, a pole or a resonance that is off. Costs are energies on the true plant over those of
@@ -18,7 +18,8 @@ from pathlib import Path
 
 from inputdesign_cli import load_spec, parse_spec
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.campaign import SpecPlanner, build_campaign
+from inputdesign_cli.tasks.build.campaign import build_campaign
+from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
 from inputdesign_cli.tasks.campaign_study import tried, ways_of
 from inputdesign_cli.tasks.result.campaign_study import way_entry
 
@@ -110,10 +111,10 @@ def main() -> None:
     """The table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--only", default="", help="names of cases, or how they begin")
+    parser.add_argument("--only", default="", help="names of cases, a semicolon between them")
     parser.add_argument("--json", default=Path(__file__).with_suffix(".json"))
     asked = parser.parse_args()
-    wanted = tuple(filter(None, asked.only.split(",")))
+    wanted = tuple(filter(None, asked.only.split(";")))
     found = [
         measured(case.name, spec_of(case), asked.runs) for case in CASES if not wanted or case.name in wanted
     ]

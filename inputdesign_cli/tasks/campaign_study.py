@@ -29,6 +29,7 @@ class CampaignStudy:
         step: time between samples in the unit of the experiment's frequencies.
         cost: weights of the powers.
         white: whether to compare with white excitation that suffices at the estimate.
+        uncertain: whether anything says how far the first estimate may be off.
         has_prior: whether the spec states information that runs would have to draw.
     """
 
@@ -40,6 +41,7 @@ class CampaignStudy:
     runs: int
     seed: int
     white: bool
+    uncertain: bool
     has_prior: bool
 
 
@@ -103,7 +105,9 @@ def ways_of(study: CampaignStudy) -> dict[str, Rules]:
     one = replace(
         rules, schedule=Schedule(parts, whole, whole, whole), power_cap=None, stops=False, robust_last=False
     )
-    ways = {"campaign": rules, "one_shot": one, "one_shot_robust": replace(one, robust_last=True)}
+    ways = {"campaign": rules, "one_shot": one}
+    if study.uncertain:
+        ways["one_shot_robust"] = replace(one, robust_last=True)
     return ways | ({"white": replace(one, white=True)} if study.white else {})
 
 

@@ -11,7 +11,8 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.identification import identify, information_of_data
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.build.campaign import SpecPlanner, build_campaign, build_rules
+from inputdesign_cli.tasks.build.campaign import build_campaign, build_rules
+from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.campaign import Schedule, Standing, ratio_of, standing
 from inputdesign_cli.tasks.campaign_rounds import continued
