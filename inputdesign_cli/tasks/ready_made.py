@@ -9,7 +9,8 @@ import numpy as np
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Json, Results, SignalCurves, SpectrumCurves, Table
+from inputdesign_cli.runs.curves import SignalCurves, SpectrumCurves
+from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
 from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
 from inputdesign_cli.signal.shift_register import register_length

@@ -19,4 +19,4 @@ def test_no_probability_is_told_as_zero(probability, told):
 def test_samples_that_come_again_in_a_record_without_a_file_are_told():
     estimate = SimpleNamespace(repeated=Repetition(162, 473, 76))
     (note,) = repetitions(estimate, ())
-    assert note.startswith("about 76 samples of the record repeat:")
+    assert note.startswith("the residuals of about 76 samples of the record follow others there")
