@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -28,19 +29,19 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from inputdesign_cli.compute.threads import use_one_thread
+from inputdesign_cli.compute.threads import ONE_THREAD
 
-use_one_thread()  # as the command line does, before numpy is imported
+os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 
-import cvxpy as cp  # noqa: E402
-import numpy as np  # noqa: E402
+import cvxpy as cp
+import numpy as np
 
-from inputdesign_cli import load_spec  # noqa: E402
-from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem  # noqa: E402
-from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange  # noqa: E402
-from inputdesign_cli.design.convex.problem import Problem  # noqa: E402
-from inputdesign_cli.spectrum import LinesBasis  # noqa: E402
-from inputdesign_cli.tasks.build.task import build_task  # noqa: E402
+from inputdesign_cli import load_spec
+from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
+from inputdesign_cli.design.convex.exchange import ExchangeResult, exchange
+from inputdesign_cli.design.convex.problem import Problem
+from inputdesign_cli.spectrum import LinesBasis
+from inputdesign_cli.tasks.build.task import build_task
 
 T = TypeVar("T")
 GRID = np.geomspace(1e-3, np.pi, 1000)

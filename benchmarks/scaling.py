@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import statistics
 import sys
@@ -30,16 +31,16 @@ import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from inputdesign_cli.compute.threads import use_one_thread
+from inputdesign_cli.compute.threads import ONE_THREAD
 
-use_one_thread()  # as the command line does, before numpy is imported
+os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 
-import cvxpy as cp  # noqa: E402
-import numpy as np  # noqa: E402
+import cvxpy as cp
+import numpy as np
 
-from inputdesign_cli.design.convex.designs import Design, solve_design  # noqa: E402
-from inputdesign_cli.specification import parse_spec  # noqa: E402
-from inputdesign_cli.tasks.build.task import build_task  # noqa: E402
+from inputdesign_cli.design.convex.designs import Design, solve_design
+from inputdesign_cli.specification import parse_spec
+from inputdesign_cli.tasks.build.task import build_task
 
 ROOT = Path(__file__).parent.parent
 TOLERANCE = 1e-7

@@ -23,13 +23,13 @@ from pathlib import Path
 import cvxpy as cp
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent.parent))  # of which the tests are
+
+from inputdesign_cli.spectrum import PolynomialBasis
+from tests.support.plants import paper_experiment
+from tests.support.spectral_oracle import Spectral
+
 ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT / "tests"))
-
-from channel_plants import paper_experiment  # noqa: E402
-from spectral_oracle import Spectral  # noqa: E402
-
-from inputdesign_cli.spectrum import PolynomialBasis  # noqa: E402
 
 TARGET = 8.0
 AGREEMENT = 1e-4

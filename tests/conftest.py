@@ -1,15 +1,16 @@
 """Experiments that several tests share; what they import is in `tests/support`."""
 
+import os
 from pathlib import Path
 
 import pytest
 
-from inputdesign_cli.compute.threads import use_one_thread
+from inputdesign_cli.compute.threads import ONE_THREAD
 
-use_one_thread()  # before anything imports numpy
+os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 
-from inputdesign_cli import load_spec  # noqa: E402
-from inputdesign_cli.tasks.build.system import build_experiment  # noqa: E402
+from inputdesign_cli import load_spec
+from inputdesign_cli.tasks.build.system import build_experiment
 
 SPECS = Path(__file__).parent.parent / "specs"
 

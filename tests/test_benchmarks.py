@@ -14,7 +14,7 @@ def test_what_a_benchmark_takes_from_the_package_is_there(script):
     taken = [
         (node.module, alias.name)
         for node in ast.walk(ast.parse(script.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("inputdesign_cli")
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("inputdesign_cli", "tests."))
         for alias in node.names
     ]
     assert taken

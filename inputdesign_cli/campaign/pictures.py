@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from inputdesign_cli.runs.results import CampaignCurves, Curves, EstimateCurves, Json, Table
+from inputdesign_cli.runs.curves import CampaignCurves, Curves, EstimateCurves
+from inputdesign_cli.runs.results import Json, Table
 
 
 def history(rounds: Sequence[Mapping[str, Json]], end: int) -> tuple[Table, dict[str, Curves]]:

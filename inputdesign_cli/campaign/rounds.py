@@ -16,7 +16,8 @@ from inputdesign_cli.campaign.pictures import history
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.results import Curves, Json, Results, SignalCurves, Table
+from inputdesign_cli.runs.curves import Curves, SignalCurves
+from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.text_formats import csv_text, read_csv
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 

@@ -18,6 +18,7 @@ from inputdesign_cli.cli.explore import explore
 from inputdesign_cli.cli.init import init
 from inputdesign_cli.cli.reference import explain, schema
 from inputdesign_cli.cli.report import report
+from inputdesign_cli.cli.signal import signal
 from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
@@ -69,6 +70,7 @@ COMMANDS = (
     report,
     validate,
     check,
+    signal,
     examples,
     init,
     explain,

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, log_axes, marked
-from inputdesign_cli.runs.results import Array, BoundCurves, BoundPanel
+from inputdesign_cli.runs.curves import BoundCurves, BoundPanel
+from inputdesign_cli.runs.results import Array
 
 _BELOW = 0.3  # of the smallest error, what is shown
 

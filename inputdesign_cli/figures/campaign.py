@@ -19,7 +19,7 @@ from inputdesign_cli.figures.style import (
     log_axes,
     page_of_pairs,
 )
-from inputdesign_cli.runs.results import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
+from inputdesign_cli.runs.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
 
 COLUMNS = 3
 BINS = 40

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import BLACK, BLUE, GREY, ORANGE, legend_above, legend_over_all
-from inputdesign_cli.runs.results import Array, FitCurves, FitPanel, ResidualCurves
+from inputdesign_cli.runs.curves import FitCurves, FitPanel, ResidualCurves
+from inputdesign_cli.runs.results import Array
 
 SHOWN = 400
 

@@ -7,7 +7,7 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import ORANGE, PALETTE, legend_above
-from inputdesign_cli.runs.results import OrderCurves
+from inputdesign_cli.runs.curves import OrderCurves
 
 _LEAST_SHOWN = -20.0
 

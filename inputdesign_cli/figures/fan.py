@@ -14,7 +14,7 @@ from inputdesign_cli.figures.style import (
     legend_above,
     log_axes,
 )
-from inputdesign_cli.runs.results import FanCurves
+from inputdesign_cli.runs.curves import FanCurves
 
 # More lines than these are one grey area.
 _MOST_LINES = 200

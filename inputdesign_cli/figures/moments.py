@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE, legend_above, log_axes
-from inputdesign_cli.runs.results import ErrorCurves, MomentsCurves
+from inputdesign_cli.runs.curves import ErrorCurves, MomentsCurves
 
 NUMBERED = 8  # rows up to which the entries are written into the cells
 

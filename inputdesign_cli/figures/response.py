@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import BLACK, BLUE, legend_above
-from inputdesign_cli.runs.results import ResponseCurves, ResponsePanel
+from inputdesign_cli.runs.curves import ResponseCurves, ResponsePanel
 
 
 def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.style import BLUE, DASHED, GREY, LOWERED, ORANGE
-from inputdesign_cli.runs.results import Array, SignalCurves
+from inputdesign_cli.runs.curves import SignalCurves
+from inputdesign_cli.runs.results import Array
 
 SHOWN = 1000  # samples that a figure of this width can show one by one
 STEPS_TO = 300  # up to here the hold between samples is visible

@@ -25,7 +25,7 @@ from inputdesign_cli.figures.style import (
     log_axes,
     page_of_pairs,
 )
-from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
+from inputdesign_cli.runs.curves import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
 
 COLUMNS = 2
 COLOURS = (BLUE, ORANGE, GREEN, GREY)

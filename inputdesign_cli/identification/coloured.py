@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
+from inputdesign_cli.identification.of_model import OfModel, OverRecord
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.stability import is_stable, reflected
@@ -28,21 +29,10 @@ _STEP = 1e-6
 
 
 @dataclass(frozen=True)
-class ColouredRecord:
+class ColouredRecord(OverRecord):
     """A record of the plant against parameters (k,) of plant, C and D; see `Record`."""
 
-    record: Record
     structure: Coloured
-
-    @property
-    def u(self) -> Array:
-        """(N, r)."""
-        return self.record.u
-
-    @property
-    def y(self) -> Array:
-        """(N, p)."""
-        return self.record.y
 
     @property
     def size(self) -> int:
@@ -133,21 +123,11 @@ class ColouredRecord:
 
 
 @dataclass(frozen=True)
-class ColouredKind:
+class ColouredKind(OfModel):
     """The structure of `model`; that of its plant is `plant`; see `Kind`."""
 
     model: Coloured
     plant: Kind
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """(k,): of the parameters."""
-        return self.model.names
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.model.outputs
 
     @property
     def recent(self) -> int:

@@ -19,10 +19,10 @@ from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.extensions import Extension, larger_polynomials, new_name
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
 from inputdesign_cli.identification.kind import Part, Starts, identify_records
+from inputdesign_cli.identification.of_model import OfModel
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.polynomial_record import PolynomialRecord
 from inputdesign_cli.identification.problem import PredictionErrors, inverses
-from inputdesign_cli.identification.records import split
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.starts import starting_points
 from inputdesign_cli.identification.structure import Structure
@@ -34,21 +34,11 @@ _OUTPUTS_AT_ONCE = 512
 
 
 @dataclass(frozen=True)
-class PolynomialKind:
+class PolynomialKind(OfModel):
     """Polynomials in q^-1; see `Kind`."""
 
     model: PolynomialModel
     structure: Structure
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """(k,): of the parameters."""
-        return self.structure.names
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.model.outputs
 
     @property
     def recent(self) -> int:
@@ -81,10 +71,6 @@ class PolynomialKind:
         points = np.concatenate([p for p, _ in found])
         return Starts(points, np.zeros(len(points), dtype=np.int64), max(tried for _, tried in found))
 
-    def holding(self, known: NDArray[np.bool_]) -> PolynomialKind:
-        """The same: starts come from regressions on all coefficients."""
-        return self
-
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """One more coefficient in any of the polynomials."""
         return tuple(
@@ -98,11 +84,7 @@ class PolynomialKind:
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
         """What the inputs cause in the estimate, and what unknown starts explain."""
-        fitted = self.model.at(found.point.theta)
-        records, begun = found.records, found.point.near.begun
-        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-            caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
-        return np.concatenate(caused) + y - records.y, fitted.stable_outputs
+        return self.caused(found, y, lengths), self.model.at(found.point.theta).stable_outputs
 
 
 def identify_polynomials(

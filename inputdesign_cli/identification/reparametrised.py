@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
+from inputdesign_cli.identification.of_model import OfModel, OverRecord
 from inputdesign_cli.identification.record_problem import Point, evaluate
-from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.plant import Parametrisation, Reparametrised
 from inputdesign_cli.plant.polynomial import Array
@@ -31,21 +32,10 @@ _OUT_OF_BOUNDS = 1e12
 
 
 @dataclass(frozen=True)
-class ReparametrisedRecord:
+class ReparametrisedRecord(OverRecord):
     """A record of the coefficients against parameters (k,); see `Record`."""
 
-    record: Record
     parametrisation: Parametrisation
-
-    @property
-    def u(self) -> Array:
-        """(N, r)."""
-        return self.record.u
-
-    @property
-    def y(self) -> Array:
-        """(N, p)."""
-        return self.record.y
 
     @property
     def size(self) -> int:
@@ -105,21 +95,11 @@ class ReparametrisedRecord:
 
 
 @dataclass(frozen=True)
-class ReparametrisedKind:
+class ReparametrisedKind(OfModel):
     """The structure of `model`, whose coefficients are those of the structure `coefficients`; see `Kind`."""
 
     model: Reparametrised
     coefficients: Kind
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """(k,): of the free parameters."""
-        return self.model.names
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.model.outputs
 
     @property
     def recent(self) -> int:
@@ -184,10 +164,6 @@ class ReparametrisedKind:
             distance, at.theta / unit, jac=slope, x_scale="jac", max_nfev=_MOST_EVALUATIONS
         )
         return np.asarray(found.x * unit, dtype=float)
-
-    def holding(self, known: NDArray[np.bool_]) -> ReparametrisedKind:
-        """The same."""
-        return self
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """Those of the coefficients."""

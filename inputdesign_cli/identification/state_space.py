@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Part, Starts
-from inputdesign_cli.identification.records import shifted, split
+from inputdesign_cli.identification.of_model import OfModel
+from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.polynomial import Array
@@ -120,25 +121,10 @@ class StateSpaceRecord:
 
 
 @dataclass(frozen=True)
-class StateSpaceKind:
+class StateSpaceKind(OfModel):
     """A state-space model; see `Kind`."""
 
     model: StateSpaceModel
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """(k,): of the parameters."""
-        return self.model.names
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.model.outputs
-
-    @property
-    def recent(self) -> int:
-        """No lag but that of the present: all others act through states."""
-        return 0
 
     @property
     def explaining(self) -> NDArray[np.bool_]:
@@ -167,10 +153,6 @@ class StateSpaceKind:
         points = np.array([self.model.theta, *([] if given is None else [given])])
         return Starts(points, np.zeros(len(points), dtype=np.int64), len(points))
 
-    def holding(self, known: NDArray[np.bool_]) -> StateSpaceKind:
-        """The same."""
-        return self
-
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """None: whether the entries that are not free are right is left to the tests of many signals."""
         return ()
@@ -179,9 +161,5 @@ class StateSpaceKind:
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
         """What the inputs cause in the estimate, and what unknown starts explain."""
-        fitted = self.model.at(found.point.theta)
-        records, begun = found.records, found.point.near.begun
-        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
-            caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
-        runs = bool(np.all(np.abs(fitted.poles) < 1.0 + _MARGIN))
-        return np.concatenate(caused) + y - records.y, (runs,) * self.outputs
+        runs = bool(np.all(np.abs(self.model.at(found.point.theta).poles) < 1.0 + _MARGIN))
+        return self.caused(found, y, lengths), (runs,) * self.outputs

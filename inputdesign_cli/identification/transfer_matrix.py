@@ -13,6 +13,7 @@ from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.extensions import Extension, larger_transfer_matrices, new_name
 from inputdesign_cli.identification.kind import Part, Starts, fit_records, identify_records
+from inputdesign_cli.identification.of_model import OfModel
 from inputdesign_cli.identification.record_problem import evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.refined_iv import refine
@@ -30,27 +31,12 @@ _FOLLOWED = 3
 
 
 @dataclass(frozen=True)
-class TransferKind:
+class TransferKind(OfModel):
     """A transfer matrix in s; see `Kind`."""
 
     model: ContinuousModel
     between: Intersample
     held: Mapping[tuple[int, int], float] = field(default_factory=dict)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """(k,): of the parameters."""
-        return self.model.names
-
-    @property
-    def outputs(self) -> int:
-        """Number of outputs p."""
-        return self.model.outputs
-
-    @property
-    def recent(self) -> int:
-        """No lag but that of the present: all others act through poles."""
-        return 0
 
     @property
     def explaining(self) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
 from inputdesign_cli.plant.loop import Loop, close_loop
+from inputdesign_cli.plant.loop_around import LoopAround
 from inputdesign_cli.plant.model import Fraction, Listed, Parameter, Parametrised, row_parameters
 from inputdesign_cli.plant.polynomial import (
     Array,
@@ -236,46 +237,33 @@ class Coloured(Parametrised):
 
 
 @dataclass(frozen=True)
-class ColouredLoop(Loop):
+class ColouredLoop(LoopAround):
     """The loop around the plant, driven by noise that is filtered first."""
 
     model: Coloured
 
     @cached_property
-    def _loop(self) -> Loop:
+    def inner(self) -> Loop:
+        """That of the plant."""
         return close_loop(self.model.plant, self.controller)
-
-    @property
-    def closed_poles(self) -> ComplexArray:
-        """All poles of the loop in z."""
-        return self._loop.closed_poles
 
     @property
     def predictor_poles(self) -> ComplexArray:
         """Poles in z of the filters that make the gradient of the prediction."""
-        return np.concatenate([self._loop.predictor_poles, self.model.estimated_roots])
+        return np.concatenate([self.inner.predictor_poles, self.model.estimated_roots])
 
     @property
     def integrates(self) -> bool:
         """Whether plant or noise do."""
-        return self._loop.integrates or self.model.integrates
-
-    @property
-    def instantaneous(self) -> Array:
-        """(p + r, p + r): what acts without delay."""
-        return self._loop.instantaneous
-
-    def left_at(self, w: ArrayLike) -> ComplexArray:
-        """(n, p + r, p + r): the matrix on the left of `Loop`."""
-        return self._loop.left_at(w)
+        return self.inner.integrates or self.model.integrates
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """R H (n, p, p)."""
-        return self._loop.noise_at(w) * self.model.shape_at(w)[:, None, :]
+        return self.inner.noise_at(w) * self.model.shape_at(w)[:, None, :]
 
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
         """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
-        return self._loop.signals(r, self.model.shaped(e))
+        return self.inner.signals(r, self.model.shaped(e))
 
 
 @close_loop.register

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.loop import Loop, close_loop
+from inputdesign_cli.plant.loop_around import LoopAround
 from inputdesign_cli.plant.model import Fraction, Model
 from inputdesign_cli.plant.parametrisation import Parametrisation
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -159,46 +160,15 @@ class Reparametrised:
 
 
 @dataclass(frozen=True)
-class ReparametrisedLoop(Loop):
+class ReparametrisedLoop(LoopAround):
     """The loop around the model of the coefficients, whatever its kind."""
 
     model: Reparametrised
 
     @cached_property
-    def _loop(self) -> Loop:
+    def inner(self) -> Loop:
+        """That of the coefficients."""
         return close_loop(self.model.coefficients, self.controller)
-
-    @property
-    def closed_poles(self) -> ComplexArray:
-        """All poles of the loop in z."""
-        return self._loop.closed_poles
-
-    @property
-    def predictor_poles(self) -> ComplexArray:
-        """Poles in z of the filters that make the gradient of the prediction."""
-        return self._loop.predictor_poles
-
-    @property
-    def integrates(self) -> bool:
-        """Whether plant or noise do."""
-        return self._loop.integrates
-
-    @property
-    def instantaneous(self) -> Array:
-        """(p + r, p + r): what acts without delay."""
-        return self._loop.instantaneous
-
-    def left_at(self, w: ArrayLike) -> ComplexArray:
-        """(n, p + r, p + r): the matrix on the left of `Loop`."""
-        return self._loop.left_at(w)
-
-    def noise_at(self, w: ArrayLike) -> ComplexArray:
-        """R H (n, p, p)."""
-        return self._loop.noise_at(w)
-
-    def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
-        """y (.., n, p) and u (.., n, r) for samples of r and e, from rest."""
-        return self._loop.signals(r, e)
 
 
 @close_loop.register

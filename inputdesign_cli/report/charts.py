@@ -13,16 +13,15 @@ import numpy as np
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.numbers import spoken
-from inputdesign_cli.runs.results import (
-    Array,
+from inputdesign_cli.runs.curves import (
     BoundCurves,
     BoundPanel,
     Curves,
     OptimalityCurves,
-    Result,
     SignalCurves,
     SpectrumCurves,
 )
+from inputdesign_cli.runs.results import Array, Result
 from inputdesign_cli.runs.text_formats import read_csv
 
 # Curves, what they show in words, and a caption.

@@ -104,6 +104,16 @@ def write_text(path: Path, text: str) -> None:
         _write(path, text)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a single file.
+
+    Raises:
+        OutputError: `output-not-writable`, `output-full`.
+    """
+    with output_errors(path):
+        path.write_bytes(content)
+
+
 def replace_text(path: Path, text: str | Iterable[str]) -> None:
     """Write a text file, or one that comes in pieces, so that it is whole whenever the writer is killed.
 

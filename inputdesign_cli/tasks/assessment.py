@@ -20,7 +20,8 @@ from inputdesign_cli.accuracy import model_errors
 from inputdesign_cli.errors import IdesignError, bad_spec
 from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import (

@@ -21,7 +21,8 @@ from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit import audit

@@ -18,7 +18,8 @@ from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum

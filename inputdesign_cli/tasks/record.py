@@ -47,7 +47,7 @@ class Delivery:
 
     Args:
         operating_points: (r,) what is added to the record of each input; None when nothing was asked.
-        also: files beside signal.csv: "mat", "wav".
+        also: files beside signal.csv: "mat", "npz", "h", "wav".
         full_scale: what full scale stands for in a WAV file; the largest value when None.
         sampling_rate: samples a second.
     """

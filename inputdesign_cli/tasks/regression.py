@@ -21,7 +21,8 @@ from inputdesign_cli.design.regression.limits import SMALLEST_EIGENVALUE
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, bad_spec
 from inputdesign_cli.monte_carlo.regression import Contender, contending_regressors, run_experiments
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, MomentsCurves, Results, Table
+from inputdesign_cli.runs.curves import Curves, MomentsCurves
+from inputdesign_cli.runs.results import Results, Table
 from inputdesign_cli.tasks.regressors import RegressorRecord, RegressorSettings, realise_regressors
 from inputdesign_cli.tasks.result.plain_signal import signal_results
 from inputdesign_cli.tasks.result.regression import (

@@ -24,7 +24,8 @@ from inputdesign_cli.monte_carlo.study import Study, tried_on_model, tried_on_tr
 from inputdesign_cli.monte_carlo.trials import PredictedError
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, Curves, Json, Results, Table
+from inputdesign_cli.runs.curves import BoundCurves, Curves
+from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal.settings import LEVELLED, Method
 from inputdesign_cli.tasks.result.bound import bound_curves

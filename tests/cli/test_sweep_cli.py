@@ -5,38 +5,20 @@ import sys
 
 import pytest
 
-from inputdesign_cli.cli import main
 from inputdesign_cli.cli.completion import error_codes, spec_keys
 from inputdesign_cli.cli.progress import ProgressLine, pace
+from inputdesign_cli.compute.threads import ONE_THREAD
 from inputdesign_cli.sweep.running import Progress
-
-SPEC = """\
-title: A small design
-plant: {B: [0, 1], F: [1, -0.5]}
-noise: {variance: 1}
-experiment: {samples: 100}
-accuracy: {model_error: {relative: 0.1}}
-spectrum: {type: fir, order: 2}
-signal: {type: multisine, candidates: 1, seed: 1}
-"""
+from tests.support.sweep_files import SPEC
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
+def run(run, monkeypatch, tmp_path):
     """Run `idesign` in a folder with a spec: its exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "small.yaml").write_text(SPEC)
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+    for name in ONE_THREAD:
         monkeypatch.setenv(name, "1")
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["idesign", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return call
+    return run
 
 
 def test_a_sweep_and_its_report(run, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from inputdesign_cli.figures.plots import draw
-from inputdesign_cli.runs.results import (
+from inputdesign_cli.runs.curves import (
     BoundCurves,
     BoundPanel,
     DirectionCurves,

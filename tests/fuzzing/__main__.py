@@ -17,16 +17,16 @@ from collections import Counter
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-from inputdesign_cli.compute.threads import use_one_thread
+from inputdesign_cli.compute.threads import ONE_THREAD
 
-use_one_thread()
+os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 
-import cvxpy  # noqa: E402, F401 (once, before the processes divide)
-import yaml  # noqa: E402
+import cvxpy  # noqa: F401 (once, before the processes divide)
+import yaml
 
-from tests.fuzzing.generation import generated  # noqa: E402
-from tests.fuzzing.judge import judged  # noqa: E402
-from tests.fuzzing.mutations import ROOT, mutated  # noqa: E402
+from tests.fuzzing.generation import generated
+from tests.fuzzing.judge import judged
+from tests.fuzzing.mutations import ROOT, mutated
 
 _HANGS = 90.0  # seconds: more than time limits leave
 _MEMORY = 8 * 2**30

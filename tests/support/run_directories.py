@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from inputdesign_cli.runs.results import OptimalityCurves, Results, SignalCurves, Table
+from inputdesign_cli.runs.curves import OptimalityCurves, SignalCurves
+from inputdesign_cli.runs.results import Results, Table
 from inputdesign_cli.runs.run_directory import write_run
 
 

@@ -1,8 +1,11 @@
-"""Probabilities in sentences, down to those below the smallest number."""
+"""Refutations in sentences: probabilities below the smallest number, samples that come again."""
+
+from types import SimpleNamespace
 
 import pytest
 
-from inputdesign_cli.tasks.result.refutations import chance
+from inputdesign_cli.identification.repeated import Repetition
+from inputdesign_cli.tasks.result.refutations import chance, repetitions
 
 
 @pytest.mark.parametrize(
@@ -11,3 +14,9 @@ from inputdesign_cli.tasks.result.refutations import chance
 )
 def test_no_probability_is_told_as_zero(probability, told):
     assert chance(probability) == told
+
+
+def test_samples_that_come_again_in_a_record_without_a_file_are_told():
+    estimate = SimpleNamespace(repeated=Repetition(162, 473, 76))
+    (note,) = repetitions(estimate, ())
+    assert note.startswith("the residuals of about 76 samples of the record follow others there")

@@ -34,9 +34,9 @@ def saved(tmp_path):
 @pytest.mark.parametrize(
     ("parts", "told"),
     [
-        (lambda x: (x[:450], x[50:]), "b.csv are those of a.csv"),
-        (lambda x: (x, np.column_stack([x[:, 0], np.round(x[:, 1], 1)])), "b.csv are those of a.csv"),
-        (lambda x: (np.concatenate([x, x]),), "a.csv repeat"),
+        (lambda x: (x[:450], x[50:]), "of b.csv follow those of a.csv"),
+        (lambda x: (x, np.column_stack([x[:, 0], np.round(x[:, 1], 1)])), "of b.csv follow those of a.csv"),
+        (lambda x: (np.concatenate([x, x]),), "of a.csv follow others there"),
     ],
     ids=["overlap", "rounded", "twice"],
 )

@@ -94,8 +94,9 @@ class Signal(Section):
         description="target: the least power with which the record itself meets the accuracy (default); "
         "design: the power of the design.",
     )
-    also: tuple[Literal["mat", "wav"], ...] | None = Field(
-        default=None, description="Other files of the signal beside signal.csv: mat, wav."
+    also: tuple[Literal["mat", "npz", "h", "wav"], ...] | None = Field(
+        default=None,
+        description="Other files of the signal beside signal.csv: mat (MATLAB), npz (numpy), h (C), wav.",
     )
     candidates: Annotated[Count, SIZES["signal.candidates"]] | None = Field(
         default=None, description="Number of random realisations to choose the best of."

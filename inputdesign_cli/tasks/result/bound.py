@@ -8,7 +8,8 @@ import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, BoundPanel, Table
+from inputdesign_cli.runs.curves import BoundCurves, BoundPanel
+from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.spectrum import axis, distinct
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
-from inputdesign_cli.runs.results import Curves, Json, RatioCurves, Table, TradeCurves
+from inputdesign_cli.runs.curves import Curves, RatioCurves, TradeCurves
+from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.tasks.campaign_trials import Ended, Ending
 
 _WITHIN = {"true": "within_r_adm_true", "estimate": "within_r_adm_estimate", "design": "within_r_adm"}

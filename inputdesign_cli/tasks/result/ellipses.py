@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Ellipse, EllipseCurves
+from inputdesign_cli.runs.curves import Ellipse, EllipseCurves
 
 _PAIRS = 6
 

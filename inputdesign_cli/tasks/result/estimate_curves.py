@@ -9,7 +9,8 @@ import numpy as np
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors, worst
 from inputdesign_cli.identification import Estimate
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import BoundCurves, Curves, FitCurves, FitPanel, Json, ResidualCurves, Table
+from inputdesign_cli.runs.curves import BoundCurves, Curves, FitCurves, FitPanel, ResidualCurves
+from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.bound import bound_curves
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from inputdesign_cli.identification.explore import Candidate, Fits, Found
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, FitCurves, FitPanel, Json, OrderCurves, Table
+from inputdesign_cli.runs.curves import Curves, FitCurves, FitPanel, OrderCurves
+from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.refutations import chance

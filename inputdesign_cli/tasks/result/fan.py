@@ -8,7 +8,8 @@ import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError, model_errors
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import FanCurves, Table
+from inputdesign_cli.runs.curves import FanCurves
+from inputdesign_cli.runs.results import Table
 from inputdesign_cli.tasks.result.design import Designed
 from inputdesign_cli.tasks.result.spectrum import axis
 from inputdesign_cli.tasks.robust import delivered

@@ -14,7 +14,8 @@ from inputdesign_cli.design.loop_error.loss import LossTheory, loss_theory
 from inputdesign_cli.design.loop_error.weight import adjoint
 from inputdesign_cli.plant.frequencies import graded_grid, local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.runs.results import Curves, DirectionCurves, SpectrumCurves, Table
+from inputdesign_cli.runs.curves import Curves, DirectionCurves, SpectrumCurves
+from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.result.spectrum import hermitian_columns
 from inputdesign_cli.tasks.result.status import proof_status

@@ -11,7 +11,7 @@ from inputdesign_cli.design.loop_error.parametric import ParametricCriterion
 from inputdesign_cli.monte_carlo.loop_error import LossStudy
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, LossCurves
+from inputdesign_cli.runs.curves import Curves, LossCurves
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.tasks.result.loop_error import Entry, theory_entry
 

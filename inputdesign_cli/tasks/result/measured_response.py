@@ -12,16 +12,8 @@ from numpy.typing import NDArray
 from inputdesign_cli.design.response import ResponseLines
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.identification.periodic_response import Periods
-from inputdesign_cli.runs.results import (
-    Array,
-    Curves,
-    DeviationCurves,
-    DeviationPanel,
-    Json,
-    ResponseCurves,
-    Results,
-    Table,
-)
+from inputdesign_cli.runs.curves import Curves, DeviationCurves, DeviationPanel, ResponseCurves
+from inputdesign_cli.runs.results import Array, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.tasks.build.data import Data

@@ -79,21 +79,22 @@ def differences(estimate: Estimate, files: Sequence[str]) -> list[str]:
 
 
 def repetitions(estimate: Estimate, files: Sequence[tuple[str, int]]) -> list[str]:
-    """What to say where samples seem to be given twice; `files` are names and numbers of samples."""
+    """What to say where samples seem to be given twice; `files` are names and samples, if known."""
     found = estimate.repeated
     if found is None:
         return []
+    files = files or [("the record", found.second + found.length)]
     ends = np.cumsum([samples for _, samples in files])
     # By their middle: the ends are not sharp.
     first, second = (
         files[int(np.searchsorted(ends, at + found.length // 2, side="right"))][0]
         for at in (found.first, found.second)
     )
-    where = f"{second} repeat" if first == second else f"{second} are those of {first}"
+    where = "others there" if first == second else f"those of {first}"
     return [
-        f"about {found.length} samples of {where}: their residuals follow each other as those of no "
-        "two experiments do, and counted twice they make the estimate look surer than it is; give each "
-        "sample once"
+        f"the residuals of about {found.length} samples of {second} follow {where} as noise does not: either "
+        "samples are given twice, which makes the estimate look surer than it is (give each once), or the "
+        "model lacks something that comes again with the same input (raise its orders)"
     ]
 
 

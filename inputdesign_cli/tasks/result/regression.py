@@ -18,7 +18,7 @@ from inputdesign_cli.design.regression import (
 )
 from inputdesign_cli.monte_carlo.regression import Estimates
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import ErrorCurves
+from inputdesign_cli.runs.curves import ErrorCurves
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.result.status import proof_status
 

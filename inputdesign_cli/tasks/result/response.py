@@ -16,15 +16,8 @@ from inputdesign_cli.design.response import Goal, ResponseDesign, ResponseLines,
 from inputdesign_cli.identification.periodic_response import Periods
 from inputdesign_cli.information import POWER_KINDS, Experiment, PowerKind
 from inputdesign_cli.monte_carlo.response import ResponseStudy
-from inputdesign_cli.runs.results import (
-    Array,
-    DeviationCurves,
-    DeviationPanel,
-    Json,
-    Results,
-    SpectrumCurves,
-    Table,
-)
+from inputdesign_cli.runs.curves import DeviationCurves, DeviationPanel, SpectrumCurves
+from inputdesign_cli.runs.results import Array, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid

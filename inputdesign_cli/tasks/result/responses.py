@@ -8,7 +8,8 @@ import numpy as np
 
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.plant import Model
-from inputdesign_cli.runs.results import Array, Json, ResponseCurves, ResponsePanel, Table
+from inputdesign_cli.runs.curves import ResponseCurves, ResponsePanel
+from inputdesign_cli.runs.results import Array, Json, Table
 from inputdesign_cli.runs.units import Units
 
 _BY_U = (

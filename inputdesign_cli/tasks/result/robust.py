@@ -10,7 +10,8 @@ import numpy as np
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Curves, Json, Table
+from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed
 from inputdesign_cli.tasks.result.fan import fan_curves

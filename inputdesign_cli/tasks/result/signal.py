@@ -11,7 +11,9 @@ from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Json, SignalCurves, Table
+from inputdesign_cli.runs.curves import SignalCurves
+from inputdesign_cli.runs.results import Json, Table
+from inputdesign_cli.runs.signal_files import WRITERS
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import DesignedSpectrum, Lines, Record
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
@@ -105,20 +107,12 @@ def applied(delivery: Delivery, record: Record) -> Array:
 
 
 def other_files(request: RecordRequest, units: Units, record: Record) -> dict[str, bytes]:
-    """signal.mat (time, u1, .. or r1, sample_time) and signal.wav (32-bit float, 1 being full scale)."""
+    """signal.mat, .npz and .h (time, u1 or r1, .., sample_time); signal.wav (32-bit float up to 1)."""
     delivery, files = request.delivery, {}
-    if "mat" in delivery.also:
-        import scipy.io
-
-        table, _ = signal_curves(request, units, record)
-        # Variables of MATLAB have no units in their names.
-        content: dict[str, Json] = {
-            name.split()[0]: values[:, None] for name, values in table.columns.items()
-        }
-        buffer = io.BytesIO()
-        scipy.io.savemat(buffer, content | {"sample_time": units.sample_time})
-        # The first 116 bytes are a text with the date, which would make equal runs differ.
-        files["signal.mat"] = b"MATLAB 5.0 MAT-file".ljust(116) + buffer.getvalue()[116:]
+    for ending, made in WRITERS.items():
+        if ending in delivery.also:
+            table, _ = signal_curves(request, units, record)
+            files[f"signal.{ending}"] = made(table.columns, units.sample_time)
     if "wav" in delivery.also:
         import scipy.io.wavfile
 

@@ -7,7 +7,8 @@ import numpy as np
 from inputdesign_cli.monte_carlo.trials import PredictedError, Trials
 from inputdesign_cli.plant import Loop
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import CloudCurves, ErrorBandCurves, ErrorBandPanel, SignalCurves, Table
+from inputdesign_cli.runs.curves import CloudCurves, ErrorBandCurves, ErrorBandPanel, SignalCurves
+from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units
 
 QUANTILES = (0.05, 0.5, 0.95)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Json, OptimalityCurves, SpectrumCurves, Table
+from inputdesign_cli.runs.curves import OptimalityCurves, SpectrumCurves
+from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import Basis, TabulatedSpectrum, best_directions, matrices
 

@@ -1,0 +1,204 @@
+"""`idesign signal`: ready-made signals, what they excite, and files for hardware."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inputdesign_cli.cli.options import Json, Quiet, path_option
+from inputdesign_cli.cli.terminal import aligned
+from inputdesign_cli.errors import OutputError
+
+if TYPE_CHECKING:
+    from inputdesign_cli.runs.results import Results
+
+_ENDINGS = ("csv", "mat", "npz", "h", "png")
+_ROUNDING = 1e-12
+_TIME_UNITS = ("s", "ms", "us", "min", "h", "d")
+
+
+def signal(
+    prbs: Annotated[
+        int | None,
+        typer.Option(
+            "--prbs", metavar="BITS", min=2, max=32, help="Pseudo-random binary: period 2^BITS - 1 values."
+        ),
+    ] = None,
+    multisine: Annotated[
+        int | None,
+        typer.Option(
+            "--multisine", metavar="LINES", min=1, help="Equal sinusoids in --band, of a low crest factor."
+        ),
+    ] = None,
+    chirp: Annotated[
+        str,
+        typer.Option("--chirp", metavar="LOW:HIGH", help="A sinusoid whose frequency rises over the band."),
+    ] = "",
+    steps: Annotated[
+        int | None,
+        typer.Option("--steps", metavar="N", min=2, help="N levels over the range, in random order."),
+    ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(min=3, max=10_000_000, help="Length. The default is one period of a prbs, or 1000."),
+    ] = None,
+    span: Annotated[
+        str,
+        typer.Option("--range", metavar="LOW:HIGH", help="Least and largest value; several inputs: 0:5,2:3."),
+    ] = "-1:1",
+    inputs: Annotated[int, typer.Option(min=1, max=20, help="Channels that can be told apart.")] = 1,
+    band: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="Of a multisine, in rad per time unit (default: all).")
+    ] = "",
+    odd: Annotated[bool, typer.Option("--odd", help="Of a multisine, odd harmonics only.")] = False,
+    hold: Annotated[int, typer.Option(min=1, help="Samples for which each value of a prbs stands.")] = 1,
+    periods: Annotated[int, typer.Option(min=1, help="Equal periods of a multisine in the record.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random numbers.")] = 0,
+    sample_time: Annotated[float, typer.Option(metavar="T", help="Time between samples.")] = 1.0,
+    time_unit: Annotated[str, typer.Option(metavar="UNIT", help="s, ms, us, min, h or d.")] = "s",
+    output: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Repeatable. The ending tells the kind: .csv, .mat (MATLAB), .npz (numpy), .h (C), .png.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")] = False,
+    json_output: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make a signal without a spec, and tell what it excites.
+
+    Give one of --prbs, --multisine, --chirp and --steps. Prints the peak, the crest factor, the order of
+    persistent excitation and the band of each channel; -o writes the samples, a C header for hardware among
+    the kinds. With several inputs a prbs is shifted, a multisine has a period for each input.
+    """
+    kinds = {"prbs": prbs, "multisine": multisine, "chirp": chirp or None, "steps": steps}
+    chosen = [name for name, value in kinds.items() if value is not None]
+    if len(chosen) != 1:
+        said = "none of them" if not chosen else " and ".join(f"--{name}" for name in chosen)
+        raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
+    (kind,) = chosen
+    files = _files(output or [], overwrite)
+    if not 0.0 < sample_time < math.inf:
+        raise typer.BadParameter("it is a positive number", param_hint="--sample-time")
+    if time_unit not in _TIME_UNITS:
+        raise typer.BadParameter(f"it is one of {', '.join(_TIME_UNITS)}", param_hint="--time-unit")
+    from inputdesign_cli.tasks.ready_made import ReadyMade, make_signal
+
+    swept = _pair(chirp, "--chirp") if chirp else None
+    results = make_signal(
+        ReadyMade(
+            kind,
+            bits=prbs,
+            number=multisine or steps,
+            band=swept or (_pair(band, "--band") if band else None),
+            samples=samples,
+            levels=_levels(span, inputs),
+            hold=hold,
+            periods=periods,
+            odd=odd,
+            seed=seed,
+            sample_time=sample_time,
+            time_unit=time_unit,
+        )
+    )
+    for file in files:
+        _write(file, results)
+    if json_output:
+        from inputdesign_cli.runs.text_formats import json_text
+
+        typer.echo(json_text(results.result), nl=False)
+    elif not quiet:
+        typer.echo(_told(results, files))
+
+
+def _files(names: Sequence[str], overwrite: bool) -> list[Path]:
+    """Where to write; every name is looked at before anything is computed.
+
+    Raises:
+        typer.BadParameter: An ending that stands for no kind of file.
+        OutputError: `output-exists`.
+    """
+    files = [path_option(name) for name in names]
+    for file in files:
+        if file.suffix.removeprefix(".").lower() not in _ENDINGS:
+            listed = ", ".join(f".{ending}" for ending in _ENDINGS)
+            raise typer.BadParameter(f"{file.name} ends with none of {listed}", param_hint="--output")
+        if file.exists() and not overwrite:
+            hint = "choose another name, or replace it with --overwrite"
+            raise OutputError.because("output-exists", f"{file} exists already", hint)
+    return files
+
+
+def _pair(text: str, option: str) -> tuple[float, float]:
+    """Two numbers, the second larger.
+
+    Raises:
+        typer.BadParameter: The text is something else.
+    """
+    low, colon, high = text.partition(":")
+    try:
+        found = float(low), float(high)
+    except ValueError:
+        found = (math.nan, math.nan)
+    negative = option != "--range" and found[0] < 0.0
+    if not colon or not found[0] < found[1] or negative or math.isinf(found[0]) or math.isinf(found[1]):
+        raise typer.BadParameter(f"{text!r} is not of the form LOW:HIGH, as in 0.1:2", param_hint=option)
+    return found
+
+
+def _levels(text: str, inputs: int) -> tuple[tuple[float, float], ...]:
+    found = tuple(_pair(part, "--range") for part in text.split(","))
+    if len(found) not in (1, inputs):
+        message = f"it has {len(found)} ranges, and there are {inputs} inputs"
+        raise typer.BadParameter(message, param_hint="--range")
+    return found * inputs if len(found) == 1 else found
+
+
+def _write(file: Path, results: Results) -> None:
+    """One file of the kind that its ending tells."""
+    from inputdesign_cli.runs.run_directory import write_bytes
+    from inputdesign_cli.runs.signal_files import WRITERS
+    from inputdesign_cli.runs.text_formats import csv_text
+
+    table, ending = results.tables["signal"], file.suffix.removeprefix(".").lower()
+    if ending == "png":
+        from inputdesign_cli.figures.plots import draw
+
+        write_bytes(file, draw(results.curves["signal"], results.time_unit))
+        spectrum = draw(results.curves["spectrum"], results.time_unit)
+        write_bytes(file.with_stem(f"{file.stem}_spectrum"), spectrum)
+        return
+    if ending == "csv":
+        write_bytes(file, csv_text(table).encode())
+        return
+    write_bytes(file, WRITERS[ending](table.columns, results.result["signal"]["sample_time"]))
+
+
+def _told(results: Results, files: Sequence[Path]) -> str:
+    """What was made and what it excites, a line a fact."""
+    entry = results.result["signal"]
+    unit, step = entry["time_unit"], entry["sample_time"]
+    whole = f"{entry['samples']} samples every {step:g} {unit}"
+    if entry["period"] < entry["samples"]:
+        whole += f", a period of {entry['period']}"
+    lines = [("signal", f"{entry['type']}, {whole}")]
+    for name, one in entry["channels"].items():
+        low, high = one["band"]
+        mean = one["mean"] if abs(one["mean"]) > _ROUNDING * one["peak"] else 0.0
+        sizes = f"mean {mean:.4g}, power {one['power']:.4g} about it, peak {one['peak']:.4g}"
+        crest = f"crest factor {one['crest_factor']:.4g}"
+        order = f"persistently exciting of order {one['order_of_excitation']}"
+        lines.append(
+            (name, f"{sizes}, {crest}; {order}; 90 % of the power from {low:.4g} to {high:.4g} rad/{unit}")
+        )
+    if files:
+        lines.append(("files", ", ".join(map(str, files))))
+    return "\n".join(aligned(lines, gap=3, wrap=True))

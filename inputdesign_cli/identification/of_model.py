@@ -1,0 +1,66 @@
+"""What structures and records share, whatever the kind of model: see `Kind` and `Record`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.records import Record, split
+from inputdesign_cli.identification.search import Search
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+
+
+@dataclass(frozen=True)
+class OfModel:
+    """The structure of `model`; its numbers mean nothing."""
+
+    model: Model
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(k,): of the parameters."""
+        return self.model.names
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs p."""
+        return self.model.outputs
+
+    @property
+    def recent(self) -> int:
+        """No lag but that of the present: all others act through poles."""
+        return 0
+
+    def holding(self, known: NDArray[np.bool_]) -> Self:
+        """The same."""
+        return self
+
+    def caused(self, found: Search, y: Array, lengths: Sequence[int] | None) -> Array:
+        """(N, p): what the inputs cause in the estimate, and what unknown starts explain."""
+        fitted = self.model.at(found.point.theta)
+        records, begun = found.records, found.point.near.begun
+        with np.errstate(over="ignore", invalid="ignore"):  # outputs of an unstable plant are not shown
+            caused = [sum(fitted.simulate(*part, 1.0)) for part in split(records.u, begun, lengths)]
+        return np.concatenate(caused) + y - records.y
+
+
+@dataclass(frozen=True)
+class OverRecord:
+    """The samples of another `record`, against other parameters."""
+
+    record: Record
+
+    @property
+    def u(self) -> Array:
+        """(N, r)."""
+        return self.record.u
+
+    @property
+    def y(self) -> Array:
+        """(N, p)."""
+        return self.record.y

@@ -1,0 +1,299 @@
+"""What figures show: plain data, nothing to compute; `figures.plots` draws each kind.
+
+Frequencies are in rad per time unit, spectra in the convention of the contract (power = integral over the
+normalised circle / 2 pi).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Curves:
+    """What one figure shows; `figures.plots` draws each kind."""
+
+
+@dataclass(frozen=True)
+class SpectrumCurves(Curves):
+    """The spectrum of r inputs over frequency: a density, or the powers of sinusoids."""
+
+    frequency: Array  # (n,) rad per time unit
+    spectrum: NDArray[np.complex128]  # (n, r, r), Hermitian; real powers will do
+    white: float | None = None  # the level of the white baseline; of one input's sinusoids its power
+    lines: bool = False
+    symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
+    logarithmic: bool = False  # the axis of frequency; that of one input always is
+    record: Array | None = None  # (n, r), smoothed periodograms of the record
+    band: tuple[float, float] | None = None  # where the sinusoids might be
+
+
+@dataclass(frozen=True)
+class DirectionCurves(Curves):
+    """The plant's gains in its principal directions, and the input's power in each of them."""
+
+    frequency: Array  # (n,)
+    gain: Array  # (n, inputs), singular values of G, largest first
+    power: Array  # (n, inputs), of the input along the right singular vectors
+    white: float | None = None
+    lines: bool = False
+
+
+@dataclass(frozen=True)
+class LossCurves(Curves):
+    """What the runs of a Monte Carlo study lost, input by input."""
+
+    losses: Mapping[str, Array]  # name -> (runs,)
+    theory: Mapping[str, float] = field(default_factory=dict)  # name -> mean
+
+
+@dataclass(frozen=True)
+class BoundPanel:
+    """Model error against admissible error over frequency, of one entry of G; all arrays (n,)."""
+
+    frequency: Array
+    r_u: Array
+    G_abs: Array
+    r_adm: Array | None = None
+    r_u_white: Array | None = None  # of white excitation at the cost that it needs
+    active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
+    r_u_record: Array | None = None  # of the samples of the record
+    label: str = "design"  # what gave r_u
+    entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
+    names: str = ""  # of the input and the output, where the user gave them
+
+
+@dataclass(frozen=True)
+class BoundCurves(Curves):
+    """Model error against admissible error, entry by entry."""
+
+    panels: tuple[BoundPanel, ...]
+
+
+@dataclass(frozen=True)
+class ResponsePanel:
+    """An entry of G from data alone, the radius of its confidence disc, and that of a model; all (n,)."""
+
+    frequency: Array
+    G: NDArray[np.complex128]
+    radius: Array
+    model: NDArray[np.complex128]
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
+
+
+@dataclass(frozen=True)
+class ResponseCurves(Curves):
+    """The frequency response without a model beside that of a model, entry by entry."""
+
+    panels: tuple[ResponsePanel, ...]
+
+
+@dataclass(frozen=True)
+class DeviationPanel:
+    """Standard deviations of an entry of a frequency response, and what is admitted, at lines; all (n,)."""
+
+    frequency: Array
+    G_abs: Array
+    r_adm: Array
+    deviation: Array
+    found: Array | None = None  # of data, or of simulated experiments
+    label: str = ""  # what gave them
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
+
+
+@dataclass(frozen=True)
+class DeviationCurves(Curves):
+    """Standard deviations of a frequency response, entry by entry."""
+
+    panels: tuple[DeviationPanel, ...]
+
+
+@dataclass(frozen=True)
+class OptimalityCurves(Curves):
+    """The equivalence-theorem ratio over frequency: at most one everywhere, one on the support."""
+
+    frequency: Array
+    ratio: Array
+    support: Array
+
+
+@dataclass(frozen=True)
+class FanCurves(Curves):
+    """r_u / r_adm over frequency at many plants; of several entries of G the largest."""
+
+    frequency: Array  # (n,)
+    ratios: Array  # (plants, n)
+    nominal: Array  # (n,)
+    active: Mapping[str, Array]  # the plants that bind, by name -> (n,)
+
+
+@dataclass(frozen=True)
+class CampaignCurves(Curves):
+    """The worst ratio at the estimate and the energy applied after so many samples; all arrays (n,)."""
+
+    samples: Array
+    ratio: Array
+    energy: Array
+    end: int  # samples after which the campaign is over
+
+
+@dataclass(frozen=True)
+class EstimateCurves(Curves):
+    """Estimates and their standard deviations after so many samples, by name; all arrays (n,)."""
+
+    samples: Array
+    estimates: Mapping[str, Array]
+    deviations: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class RatioCurves(Curves):
+    """The largest r_u / r_adm of the true plant in many runs, way by way of experimenting: (runs,)."""
+
+    ratios: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class TradeCurves(Curves):
+    """Cost over that of the design that knows the plant, against the share of runs within r_adm.
+
+    Of each way: mean, 5 % and 95 % of the cost; the share and its 95 % limits.
+    """
+
+    points: Mapping[str, tuple[float, float, float, float, float, float]]
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """The predicted confidence region of a pair of parameters: their values and (2, 2) covariances."""
+
+    names: tuple[str, str]
+    center: Array  # (2,)
+    covariance: Array
+    white: Array | None = None  # of white excitation within the same limits
+
+
+@dataclass(frozen=True)
+class EllipseCurves(Curves):
+    """Confidence ellipses of some pairs, all at one `probability`."""
+
+    pairs: tuple[Ellipse, ...]
+    probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class CloudCurves(Curves):
+    """Estimates of many runs in some planes of the parameters, and what theory predicts."""
+
+    names: tuple[str, ...]
+    pairs: tuple[tuple[int, int], ...]
+    theta: Array  # (runs, k)
+    centre: Array  # (k,) the truth
+    covariance: Array  # (k, k) in theory
+    probability: float = 0.95
+
+
+@dataclass(frozen=True)
+class ErrorBandPanel:
+    """Quantiles over many runs of |G_hat - G_0| over frequency, against what was predicted; arrays (n,)."""
+
+    frequency: Array
+    quantiles: Mapping[float, Array]  # probability -> (n,)
+    r_u: Array | None = None
+    r_adm: Array | None = None
+    entry: tuple[int, int] | None = None  # this and `names` as of `BoundPanel`
+    names: str = ""
+
+
+@dataclass(frozen=True)
+class ErrorBandCurves(Curves):
+    """The errors of the models of `runs` experiments with the input `name`, entry by entry."""
+
+    panels: tuple[ErrorBandPanel, ...]
+    name: str = "design"
+    runs: int = 0
+
+
+@dataclass(frozen=True)
+class FitPanel:
+    """A recorded output, its one-step prediction and its simulation from the input; arrays (n,)."""
+
+    y: Array
+    predicted: Array
+    simulated: Array | None = None
+    fit: float | None = None  # per cent
+    output: int = 0  # from zero
+    label: str = ""  # its name and unit, where there are any
+
+
+@dataclass(frozen=True)
+class FitCurves(Curves):
+    """A model against the data that it was estimated from, output by output, over `time` (n,)."""
+
+    time: Array
+    panels: tuple[FitPanel, ...]
+
+
+@dataclass(frozen=True)
+class ResidualCurves(Curves):
+    """Normalised correlations of p residuals among each other and with r past inputs, over lags (samples).
+
+    `whiteness` and `independence` are the probabilities of the two tests.
+    """
+
+    lags: Array  # (n,)
+    autocorrelation: Array  # (n, p, p)
+    input_lags: Array  # (m,)
+    cross_correlation: Array  # (m, p, r)
+    limit: float
+    whiteness: float
+    independence: float
+
+
+@dataclass(frozen=True)
+class OrderCurves(Curves):
+    """How well structures simulate data that they have not seen: per family the fit over the parameters."""
+
+    fits: Mapping[str, tuple[Array, Array]]  # family -> numbers of parameters, per cent
+    chosen: tuple[float, float]
+    output: int | None = None  # from zero; None: the only one
+
+
+@dataclass(frozen=True)
+class SignalCurves(Curves):
+    """The record to be applied: `time` (n,), one array (n,) a channel."""
+
+    time: Array
+    channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
+    labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
+
+
+@dataclass(frozen=True)
+class ErrorCurves(Curves):
+    """Mean-squared error of a shape of moments over the energy; all arrays (n,)."""
+
+    energy: Array
+    bias_squared: Array
+    variance: Array
+    white: Array  # of white regressors of that energy
+    design: tuple[float, float]  # energy and error of the design
+    target: float | None = None
+
+
+@dataclass(frozen=True)
+class MomentsCurves(Curves):
+    """The moments of regressors, and the lines of the periodic input that has them (if it is one input)."""
+
+    R: Array  # (n, n)
+    estimated: int  # how many of the n are estimated
+    line_frequency: Array | None = None  # (L,) rad per time unit, from 0 on
+    line_power: Array | None = None  # (L,) mean squares
+    nyquist: float = np.pi

@@ -1,0 +1,158 @@
+"""Signals that need no spec, as records with units, and what they excite."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.curves import SignalCurves, SpectrumCurves
+from inputdesign_cli.runs.results import Curves, Json, Results, Table
+from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
+from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
+from inputdesign_cli.signal.shift_register import register_length
+
+_USUAL = 1000
+
+
+@dataclass(frozen=True)
+class ReadyMade:
+    """What signal is asked for.
+
+    Attributes:
+        kind: prbs, multisine, chirp or steps.
+        bits: of the register of a prbs; None: as many as the samples take without repetition.
+        number: lines of a multisine, levels of steps.
+        band: of a multisine or a chirp, in rad per time unit; None: all frequencies.
+        samples: None: one period, or 1000.
+        levels: least and largest value of each input.
+        hold: samples for which each value of a prbs stands.
+        periods: equal ones, of a multisine.
+    """
+
+    kind: str
+    bits: int | None = None
+    number: int | None = None
+    band: tuple[float, float] | None = None
+    samples: int | None = None
+    levels: tuple[tuple[float, float], ...] = ((-1.0, 1.0),)
+    hold: int = 1
+    periods: int = 1
+    odd: bool = False
+    seed: int = 0
+    sample_time: float = 1.0
+    time_unit: str = "s"
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.levels)
+
+
+def make_signal(asked: ReadyMade) -> Results:
+    """The record as signal.csv, its figures, and what it excites.
+
+    Raises:
+        SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.
+    """
+    u, period = _made(asked)
+    record = scaled(u, asked.levels)
+    time = asked.sample_time * np.arange(len(u), dtype=float)
+    channels = {f"u{i + 1}": column for i, column in enumerate(record.T)}
+    entry: dict[str, Json] = {
+        "type": asked.kind,
+        "samples": len(record),
+        "period": period,
+        "sample_time": asked.sample_time,
+        "time_unit": asked.time_unit,
+        "channels": {},
+    }
+    for name, one in zip(channels, excites(record, period), strict=True):
+        entry["channels"][name] = {
+            "mean": one.mean,
+            "power": one.power,
+            "peak": one.peak,
+            "crest_factor": one.crest_factor,
+            "order_of_excitation": one.order,
+            "band": [edge / asked.sample_time for edge in one.band],
+        }
+    return Results(
+        {"format": 1, "status": "made", "signal": entry},
+        "",
+        asked.time_unit,
+        {"signal": Table({f"time_{asked.time_unit}": time, **channels})},
+        {"signal": SignalCurves(time, channels), "spectrum": _lines(asked, record, period)},
+    )
+
+
+def _made(asked: ReadyMade) -> tuple[Array, int]:
+    """The record (N, inputs) from -1 to 1, and its period."""
+    rng, r = np.random.default_rng(asked.seed), asked.inputs
+    if asked.kind == "prbs":
+        bits = asked.bits or register_length(-(-(asked.samples or _USUAL) // asked.hold))
+        period = asked.hold * (2**bits - 1)
+        samples = asked.samples or period
+        values = prbs(bits, -(-samples // asked.hold), r, rng)
+        return np.repeat(values, asked.hold, axis=0)[:samples], min(period, samples)
+    samples = asked.samples or _USUAL
+    if asked.kind == "multisine":
+        return _multisine(asked, samples, rng), samples // asked.periods
+    if asked.kind == "chirp":
+        if r > 1:
+            raise bad_spec(
+                "not-supported",
+                "a chirp has one frequency at a time, so that several inputs would be told apart by nothing",
+                hint="use a multisine for several inputs, or one chirp after the other",
+            )
+        return chirp(samples, _band(asked)), samples
+    return steps(asked.number or 2, samples, r, rng), samples
+
+
+def _multisine(asked: ReadyMade, samples: int, rng: np.random.Generator) -> Array:
+    whole = asked.periods * asked.inputs
+    if samples % whole or samples // whole < 3:
+        each = f" for each of {asked.inputs} inputs" if asked.inputs > 1 else ""
+        raise bad_spec(
+            "bad-period",
+            f"{samples} samples do not make {asked.periods} equal periods{each}",
+            hint=f"write --samples {max(samples // whole, 3) * whole}",
+        )
+    try:
+        one = multisine(samples // whole, asked.inputs, _band(asked), asked.number, rng, odd=asked.odd)
+    except TooFewHarmonicsError as error:
+        raise bad_spec(
+            "too-few-lines",
+            f"a period of {samples // whole} samples has {error.there} harmonics in the band, and "
+            f"{asked.number or 'at least one'} are asked for",
+            hint="take more --samples, a wider --band, or fewer lines",
+        ) from None
+    return np.tile(one, (asked.periods, 1))
+
+
+def _band(asked: ReadyMade) -> tuple[float, float]:
+    """In rad/sample."""
+    lo, hi = asked.band or (0.0, math.inf)
+    nyquist = math.pi / asked.sample_time
+    if asked.band is not None and hi > nyquist * (1 + 1e-4):
+        raise bad_spec(
+            "beyond-nyquist",
+            f"the band reaches {hi:g}, beyond the Nyquist frequency {nyquist:.6g} rad/{asked.time_unit}",
+            hint="frequencies are in rad per time unit and end at pi / sample time",
+        )
+    return lo * asked.sample_time, min(hi, nyquist) * asked.sample_time
+
+
+def _lines(asked: ReadyMade, record: Array, period: int) -> Curves:
+    """The powers of the lines of the first period, means left out."""
+    whole = record[: len(record) // period * period]
+    columns = np.fft.rfft(whole - whole.mean(axis=0), axis=0)[1:] / len(whole)
+    powers = 2.0 * np.abs(columns) ** 2
+    if len(whole) % 2 == 0:
+        powers[-1] *= 0.5
+    kept = np.any(powers > 1e-9 * powers.max(initial=1e-300), axis=1)
+    w = 2.0 * np.pi * np.arange(1, len(powers) + 1) / len(whole) / asked.sample_time
+    diagonal = np.einsum("lr,rs->lrs", powers[kept], np.eye(record.shape[1])).astype(complex)
+    return SpectrumCurves(w[kept], diagonal, lines=True)

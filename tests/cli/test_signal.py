@@ -1,0 +1,89 @@
+"""`idesign signal`: files that other programs read, and refusals."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import scipy.io
+from typer.testing import CliRunner
+
+from inputdesign_cli.cli import app
+
+
+def run(*words):
+    return CliRunner().invoke(app, ["signal", *map(str, words)])
+
+
+def test_every_kind_of_file_holds_the_same_samples(tmp_path):
+    files = [tmp_path / f"u.{ending}" for ending in ("csv", "mat", "npz", "h")]
+    words = [word for file in files for word in ("-o", file)]
+    result = run("--prbs", 5, "--hold", 2, "--range", "20:80", "--sample-time", 0.5, *words)
+    assert result.exit_code == 0, result.output
+    csv, mat, npz, header = files
+    table = np.loadtxt(csv, delimiter=",", skiprows=1)
+    assert csv.read_text().splitlines()[0] == "time_s,u1"
+    assert table[:, 0] == pytest.approx(0.5 * np.arange(62))
+    u = table[:, 1]
+    assert set(np.unique(u)) == {20.0, 80.0}
+    assert scipy.io.loadmat(mat)["u1"][:, 0].tolist() == u.tolist()
+    with np.load(npz) as content:
+        assert content["u1"].tolist() == u.tolist()
+        assert content["sample_time"] == 0.5
+    (listed,) = re.findall(r"u1\[SIGNAL_SAMPLES\] = \{(.*?)\}", header.read_text(), re.DOTALL)
+    assert [float(number) for number in listed.split(",")] == u.tolist()
+    assert "#define SIGNAL_SAMPLES 62" in header.read_text()
+
+
+def test_equal_commands_make_equal_files(tmp_path):
+    for name in ("a", "b"):
+        run(
+            "--multisine", 5, "--samples", 100, "-o", tmp_path / f"{name}.npz", "-o", tmp_path / f"{name}.mat"
+        )
+    for ending in ("npz", "mat"):
+        assert (tmp_path / f"a.{ending}").read_bytes() == (tmp_path / f"b.{ending}").read_bytes()
+
+
+def test_what_it_excites_is_told():
+    found = json.loads(run("--multisine", 8, "--samples", 200, "--json").stdout)["signal"]
+    assert found["channels"]["u1"]["order_of_excitation"] == 16
+    assert "order 16" in run("--multisine", 8, "--samples", 200).stdout
+
+
+def test_pictures_are_drawn(tmp_path):
+    assert run("--chirp", "0.1:1", "-o", tmp_path / "u.png").exit_code == 0
+    assert {file.name for file in tmp_path.iterdir()} == {"u.png", "u_spectrum.png"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "give one of"),
+        (["--prbs", 5, "--steps", 3], "give one of"),
+        (["--prbs", 5, "-o", "u.txt"], "ends with none of"),
+        (["--chirp", "2"], "LOW:HIGH"),
+        (["--chirp", "1:0.1"], "LOW:HIGH"),
+        (["--chirp", "0.1:9"], "Nyquist"),
+        (["--chirp", "0.1:1", "--inputs", 2], "one frequency at a time"),
+        (["--multisine", 5, "--range", "1:0"], "LOW:HIGH"),
+        (["--multisine", 5, "--inputs", 2, "--range", "0:1,0:1,0:1"], "3 ranges"),
+        (["--multisine", 500, "--samples", 100], "49 harmonics"),
+        (["--multisine", 5, "--samples", 100, "--periods", 3], "--samples 99"),
+        (["--steps", 3, "--sample-time", 0], "positive"),
+        (["--steps", 3, "--sample-time", "nan"], "positive"),
+        (["--steps", 3, "--time-unit", "fortnight"], "one of"),
+    ],
+)
+def test_what_cannot_be_made_is_refused(words, said):
+    result = run(*words)
+    assert result.exit_code == 2
+    assert said in result.output
+
+
+def test_files_are_not_replaced_unasked(tmp_path):
+    file = tmp_path / "u.csv"
+    file.write_text("mine")
+    assert run("--steps", 3, "-o", file).exit_code == 2
+    assert file.read_text() == "mine"
+    assert run("--steps", 3, "-o", file, "--overwrite").exit_code == 0
+    assert file.read_text() != "mine"

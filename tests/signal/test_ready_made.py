@@ -1,0 +1,77 @@
+"""Ready-made signals: what the textbooks say of them."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
+
+
+def rng():
+    return np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("bits", [3, 7, 10])
+def test_a_prbs_is_white_over_its_period(bits):
+    period = 2**bits - 1
+    u = prbs(bits, 2 * period, 1, rng())
+    assert set(np.unique(u)) == {-1.0, 1.0}
+    assert np.array_equal(u[:period], u[period:])
+    lag = np.fft.irfft(np.abs(np.fft.rfft(u[:period, 0])) ** 2, period) / period
+    assert lag[1:] == pytest.approx(np.full(period - 1, -1.0 / period), abs=1e-12)
+    (found,) = excites(u, period)
+    assert found.order == period - 1  # every line of the circle but the mean
+    assert abs(found.mean) == pytest.approx(1.0 / period)
+    assert found.power == pytest.approx(1.0 - 1.0 / period**2)
+
+
+def test_inputs_of_a_prbs_are_hardly_correlated():
+    u = prbs(10, 1023, 3, rng())
+    gram = u.T @ u / 1023
+    assert np.abs(gram - np.eye(3)).max() == pytest.approx(1.0 / 1023)
+
+
+@pytest.mark.parametrize("odd", [False, True])
+def test_a_multisine_has_equal_lines_of_a_low_peak(odd):
+    u = multisine(600, 1, (0.1, 2.0), 25, rng(), odd=odd)
+    power = np.abs(np.fft.rfft(u[:, 0])) ** 2
+    lines = np.flatnonzero(power > 1e-9 * power.max())
+    assert lines.size == 25
+    assert not odd or np.all(lines % 2 == 1)
+    assert power[lines] == pytest.approx(np.full(25, power[lines[0]]))
+    (found,) = excites(u, 600)
+    assert found.order == 50
+    assert found.crest_factor < 1.8  # random phases: about 3
+    low, high = found.band
+    assert 0.1 <= low < high <= 2.0
+
+
+def test_inputs_of_a_multisine_are_orthogonal():
+    u = multisine(128, 3, (0.0, np.pi), 10, rng(), odd=False)
+    gram = u.T @ u
+    assert np.abs(gram - np.diag(np.diag(gram))).max() < 1e-9 * gram[0, 0]
+
+
+def test_a_chirp_sweeps_its_band():
+    u = chirp(20000, (0.1, 1.0))
+    assert np.abs(u).max() <= 1.0
+    (found,) = excites(u, 20000)
+    # Power is even over the band, and a twentieth lies on either side.
+    assert found.band == pytest.approx((0.145, 0.955), abs=0.01)
+    assert found.crest_factor == pytest.approx(np.sqrt(2), rel=0.02)
+
+
+def test_steps_take_every_level_once():
+    u = steps(6, 600, 2, rng())
+    for channel in u.T:
+        assert sorted(channel[50::100]) == pytest.approx(np.linspace(-1, 1, 6))
+        assert np.count_nonzero(np.diff(channel)) == 5
+
+
+def test_ranges_are_those_asked_for():
+    found = scaled(np.array([[-1.0, 1.0], [1.0, -1.0]]), [(0.0, 5.0), (2.0, 3.0)])
+    assert found.tolist() == [[0.0, 3.0], [5.0, 2.0]]
+
+
+def test_a_constant_excites_nothing():
+    (found,) = excites(np.ones((10, 1)), 10)
+    assert (found.order, found.power, found.crest_factor) == (0, 0.0, 1.0)
