@@ -98,7 +98,7 @@ def _again(
             records=paths,
             done=sum(int(record["samples"]) for record in records),
             last=None if last is None else np.array(list(last.values()), dtype=float),
-            first_power=campaign.get("first_power"),
+            first_cost=campaign.get("first_cost"),
             seed=seed,
         )
         decision = decide(past)
@@ -236,7 +236,7 @@ def _decided(
             "offset": decision.offsets.tolist(),
         }
         if plan.kind != "pilot":
-            more.setdefault("first_power", plan.power)
+            more.setdefault("first_cost", plan.cost)
         time, *signals = decision.part.columns.values()
         names = list(decision.part.columns)[1:]
         tables["signal"] = decision.part

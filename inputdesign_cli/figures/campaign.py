@@ -16,8 +16,8 @@ from inputdesign_cli.figures.style import (
     PALETTE,
     legend_above,
     legend_over_all,
-    log_axes,
     page_of_pairs,
+    plain_decades,
 )
 from inputdesign_cli.runs.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
 
@@ -31,7 +31,7 @@ def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
     upper, lower = page.subplots(2, 1, sharex=True)
     upper.plot(curves.samples, curves.ratio, "o-", color=BLUE, markersize=4)
     upper.axhline(1.0, color=ORANGE, linestyle=DASHED)
-    log_axes(upper, "y")
+    plain_decades(upper, "y")
     upper.set_ylabel("worst ratio")
     lower.plot(curves.samples, curves.energy, "o-", color=BLUE, markersize=4)
     lower.set_ylim(bottom=0.0)
@@ -87,7 +87,7 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
             histtype="stepfilled" if filled else "step",
             linewidth=1.4,
         )
-        label = f"{name.replace('_', ' ')}: median {np.median(ratios):.3g}"
+        label = name.replace("_", " ")
         handles.append(
             Patch(color=colour, alpha=0.45, label=label)
             if filled
@@ -111,7 +111,7 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
         handles.append(Line2D([], [], color=colour, marker="o", label=name.replace("_", " ")))
     axes.axvline(1.0, color=BLACK, linestyle=DASHED)
     handles.append(Line2D([], [], color=BLACK, linestyle=DASHED, label="knows the plant"))
-    log_axes(axes, "x")
+    plain_decades(axes, "x")
     axes.set_xlabel("cost over that of the design that knows the plant (mean, 5 to 95 %)")
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogFormatterSciNotation
+from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
 
 from inputdesign_cli.runs.results import Array
 
@@ -105,6 +105,15 @@ def log_axes(axes: Axes, which: Literal["x", "y"], nonpositive: Literal["clip", 
     set_scale("log", nonpositive=nonpositive)
     axis.set_major_formatter(_LogTicks())
     axis.set_minor_formatter(_LogTicks())
+
+
+def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Make one axis logarithmic over a few decades about one: 0.5, 1, 2, 5 in place of powers of ten."""
+    log_axes(axes, which)
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Line2D]:

@@ -45,6 +45,12 @@ _CAPTIONS = {
     "frequency_response": "What the data say of G without a model, with the range that holds |G| with 95 % "
     "at each frequency, beside the model: where the model leaves the range, it is wrong there.",
     "loss": "The loss in simulated experiments.",
+    "campaign": "The worst ratio at the estimate and the energy applied, after each part of the campaign.",
+    "estimates": "The estimates after each part of the campaign, with two standard deviations.",
+    "true_ratio": "The largest r_u / r_adm of the true plant in simulated campaigns and in experiments in "
+    "one shot: beyond one what is asked is missed, far below one power was wasted.",
+    "cost_coverage": "What campaigns and experiments in one shot cost, against the share of runs whose model "
+    "is within r_adm of the true plant.",
 }
 
 

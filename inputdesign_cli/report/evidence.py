@@ -146,6 +146,11 @@ def simulation_table(result: Result) -> Rows | None:
         "were the design model true": lambda entry: _share(entry.get("on_design_model", {}), "within_r_adm"),
         "within r_u": lambda entry: _share(entry, "within_r_u"),
         "cost": lambda entry: f"{entry['cost']:.5g}" if "cost" in entry else "",
+        "within r_adm of the truth": lambda entry: _share(entry, "within_r_adm_true"),
+        "over the oracle": lambda entry: _mean_and_tail(entry.get("cost_over_oracle")),
+        "true ratio": lambda entry: _mean_and_tail(entry.get("true_ratio")),
+        "samples": lambda entry: f"{entry['samples']['mean']:.0f}" if "samples" in entry else "",
+        "ended": _endings,
         "not settled": lambda entry: str(entry.get("not_converged") or ""),
     }
     cells = {name: [cell(entry) for entry in inputs.values()] for name, cell in columns.items()}
@@ -176,6 +181,15 @@ def _range(found: Result | None, chance: Json) -> str:
         return ""
     low, high = chance
     return f"{found['least']:.4g} to {found['largest']:.4g}{BREAK}chance {low:.3g} to {high:.3g}"
+
+
+def _mean_and_tail(entry: Result | None) -> str:
+    return "" if entry is None else f"{entry['mean']:.3g}{BREAK}95 % below {entry['quantile_95']:.3g}"
+
+
+def _endings(entry: Result) -> str:
+    ways = ("stopped", "missed", "undecided", "unplanned")
+    return ", ".join(f"{entry[way]} {way}" for way in ways if entry.get(way))
 
 
 def _mean(entry: Result | None) -> str:

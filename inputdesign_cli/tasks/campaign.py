@@ -8,7 +8,7 @@ it looks at is the information, not the error ([anscombe-1952], [chow-robbins-19
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Literal, Protocol
 
@@ -18,7 +18,6 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Results
 from inputdesign_cli.tasks.identification import ModelQuestion
 
 Kind = Literal["pilot", "nominal", "robust", "white"]
@@ -110,10 +109,9 @@ class Planned:
 
     Attributes:
         record: (rest, r) about the operating point, of which `take` samples are applied.
-        power: of the excitation, and the `cost` of the design, per sample.
+        power: of the record, and the `cost` of the design, per sample at the estimate.
         kind: what it was made for.
-        capped: whether the power was limited to what the cap allows.
-        solved: the same design with proof, curves and tables.
+        capped: whether it falls short of what is asked, by the cap or by limits.
     """
 
     record: Array
@@ -121,13 +119,24 @@ class Planned:
     power: float
     cost: float
     kind: Kind
-    capped: bool
-    solved: Callable[[], Results]
+    capped: bool = False
 
     @property
     def applied(self) -> Array:
         """(take, r): the samples of the next part."""
         return self.record[: self.take]
+
+    def cut(self, take: int) -> Planned:
+        """The same, of which so many samples are applied."""
+        return replace(self, take=take)
+
+    def at_most(self, cost: float) -> Planned:
+        """The same at a smaller power, where a sample would cost more."""
+        if self.cost <= cost * REACHED:
+            return self
+        share = cost / self.cost
+        record = self.record * np.sqrt(share)
+        return replace(self, record=record, power=self.power * share, cost=cost, capped=True)
 
 
 class Planner(Protocol):
@@ -160,7 +169,7 @@ class Planner(Protocol):
         Args:
             known: None before any data.
             seed: of the record.
-            first: power of the first plan, which the cap is relative to.
+            first: cost of a sample of the first plan, which the cap is relative to.
 
         Raises:
             IdesignError: there is none.

@@ -53,14 +53,14 @@ class Past:
         records: the files that count, each with u and y of a part.
         done: samples that have been applied, in records that count or not.
         last: (k,) the estimate that was built on before; None before any.
-        first_power: of the excitation of the first plan, None before it.
+        first_cost: of a sample of the first plan, None before it.
         seed: of the next record.
     """
 
     records: Sequence[Path]
     done: int
     last: Array | None
-    first_power: float | None
+    first_cost: float | None
     seed: int
 
 
@@ -139,7 +139,7 @@ def decide(task: Rounds, past: Past) -> Decision:
                 state = _ENDED[assessment.verdict]
     if state != "running":
         return Decision(header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes))
-    plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_power)
+    plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost)
     part = _part(task, plan, past.done)
     more = _of_the_plan(plan, task, past)
     return Decision(header, task.rules, state, stands, assessed, plan, part, task.offsets, (*notes, *more))
@@ -238,7 +238,8 @@ def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
     notes = []
     if plan.capped:
         notes.append(
-            "the power is what campaign.power_cap allows: what is asked takes longer than experiment.samples"
+            "the plan falls short of what is asked: campaign.power_cap or limits leave no more until "
+            "campaign.max_samples"
         )
     wanted = task.rules.robust_last and task.rules.schedule.last(past.done)
     if wanted and plan.kind == "nominal":

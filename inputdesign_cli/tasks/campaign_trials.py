@@ -99,7 +99,7 @@ class _Run:
             except (InfeasibleError, InaccurateError, SpecError):
                 return self._ended("unplanned")
             if self.first is None and plan.kind != "pilot":
-                self.first = plan.power
+                self.first = plan.cost
             self.r = np.concatenate([self.r, plan.applied])
             u, y = self._measured()
             self._estimate(u, y)

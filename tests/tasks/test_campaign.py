@@ -11,7 +11,8 @@ from inputdesign_cli.errors import SpecError
 from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.identification import identify, information_of_data
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.build.campaign import SpecPlanner, build_campaign, build_rules
+from inputdesign_cli.tasks.build.campaign import build_campaign, build_rules
+from inputdesign_cli.tasks.build.campaign_plans import SpecPlanner
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.campaign import Schedule, Standing, ratio_of, standing
 from inputdesign_cli.tasks.campaign_rounds import continued
@@ -63,7 +64,6 @@ def test_a_schedule_ends_at_its_longest():
         (["campaign.block=300"], "conflicting-keys"),
         (["campaign.max_samples=100"], "conflicting-keys"),
         (["campaign.stages=[100, 100]"], "conflicting-keys"),
-        (["campaign.power_cap=0.5", "limits.excitation_power=1"], "not-supported"),
         (["spectrum={given: {type: white, power: 1}}"], "not-supported"),
         (["objective=best_accuracy", "limits.input_power=1"], "not-supported"),
         (["campaign.blok=3"], "unknown-key"),
@@ -110,8 +110,13 @@ def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
     assert plan.cost == pytest.approx(by_hand.result["objective"]["value"], rel=1e-6)
     assert plan.take == 60
     assert len(plan.record) == 120
-    solved = plan.solved()
-    assert np.allclose(solved.signal, plan.record)
+    by_hand = solve(
+        parse_spec(
+            by_hand.resolved_spec,
+            overrides=["signal.seed=5", "signal.scale=design", "solver.any_spectrum=false"],
+        )
+    )
+    assert np.allclose(by_hand.signal, plan.record)
     # The ratio is what the design says of the prior alone.
     question = at.question(model, known.information)
     assert ratio_of(question, question.information) == pytest.approx(known.ratio)
@@ -132,17 +137,23 @@ def test_a_plan_that_ends_with_its_part_is_made_for_what_the_data_leave_open():
     assert costs["robust"] > costs["nominal"]
 
 
-def test_power_is_capped_relative_to_the_first_plan():
+def test_a_plan_beyond_the_cap_is_longer_and_at_last_weaker():
     u, y = record(40)
     at = planner()
     known = standing(at, at.nominal.model, lambda m: 0.01 * information_of_data(m, u, y), at.nominal.model)
     rules = build_rules(parse_spec(SPEC, overrides=["campaign.power_cap=0.5"]))
     free = at.plan(rules, known, 60, 5, None)
-    assert not free.capped
-    capped = at.plan(rules, known, 60, 5, free.power)
-    assert capped.capped
-    assert capped.power <= 0.5 * free.power * (1 + 1e-6)
-    assert not at.plan(rules, known, 60, 5, 10 * free.power).capped
+    assert len(free.record) == 140
+    longer = at.plan(rules, known, 60, 5, free.cost)
+    assert not longer.capped
+    assert longer.cost <= 0.5 * free.cost * (1 + 1e-6)
+    # Of white noise at the output energy alone counts.
+    assert len(longer.record) * longer.cost == pytest.approx(140 * free.cost, rel=0.03)
+    weaker = at.plan(rules, known, 60, 5, 0.1 * free.cost)
+    assert weaker.capped
+    assert len(weaker.record) == 600 - 60
+    assert weaker.cost == pytest.approx(0.05 * free.cost)
+    assert not at.plan(rules, known, 60, 5, 10 * free.cost).capped
 
 
 def test_an_unstable_estimate_is_shrunk_to_the_last_stable_one():

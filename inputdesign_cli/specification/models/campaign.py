@@ -48,7 +48,8 @@ class Campaign(Section):
     )
     power_cap: Positive | None = Field(
         default=None,
-        description="Largest power of the excitation of a part, relative to the first plan (default: none).",
+        description="Largest cost of a sample, relative to the first plan; a plan beyond it is made longer "
+        "(default: none).",
     )
     last: Literal["robust", "nominal"] = Field(
         default="robust",

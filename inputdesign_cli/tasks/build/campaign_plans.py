@@ -1,0 +1,227 @@
+"""The plan of each part of a campaign: an ordinary spec at the estimate, with the data as its prior."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
+from inputdesign_cli.information import Experiment
+from inputdesign_cli.monte_carlo.excitations import Redrawn
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
+from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.specification.models.uncertainty import SOURCES
+from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.build.identification import ask, restated
+from inputdesign_cli.tasks.build.system import build_experiment, build_loop, record_step
+from inputdesign_cli.tasks.build.uncertainty import farthest_radius
+from inputdesign_cli.tasks.campaign import REACHED, Kind, Planned, Rules, Standing
+from inputdesign_cli.tasks.identification import ModelQuestion
+from inputdesign_cli.tasks.record import RecordRequest, design_cost
+from inputdesign_cli.tasks.record_search import fitting_record
+from inputdesign_cli.tasks.result.design import Designed
+
+# A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
+_CLOSE, _MOSTLY = 1.1, 0.5
+_LONGER = 4.0  # by which a length grows at once
+_SOURCE = "plan"
+# What says how well the plant is known before any data.
+_PRIOR = {*SOURCES, "parameters"}
+
+
+@dataclass(frozen=True)
+class SpecPlanner:
+    """Asks and plans by the spec with an estimate in place of its plant; see `tasks.campaign.Planner`."""
+
+    spec: Spec
+
+    @cached_property
+    def nominal(self) -> Experiment:
+        """The experiment on the plant of the spec, in raw parameters."""
+        return build_experiment(self.spec)
+
+    @cached_property
+    def farthest(self) -> float:
+        """The radius beyond which an estimate is not built on."""
+        return farthest_radius(self.spec, self.nominal)
+
+    def radius(self, model: Model) -> float:
+        """Of the farthest pole of the plant, or of its loop."""
+        controller = self.spec.experiment.controller
+        if controller is None:
+            return model.radius
+        try:
+            return build_loop(self.spec, model, controller).radius
+        except SpecError:
+            return np.inf
+
+    def question(self, model: Model, information: Array) -> ModelQuestion:
+        """What is asked, at a model and in coordinates where the information of the data is I."""
+        factor: Array = np.asarray(np.linalg.cholesky(information), dtype=float)
+        return ask(restated(self.spec, model, _SOURCE), self.nominal.samples, factor)
+
+    def plan(
+        self, rules: Rules, known: Standing | None, done: int, seed: int, first: float | None
+    ) -> Planned:
+        """The experiment after so many samples."""
+        take = rules.schedule.take(done)
+        if known is None and done == 0 and rules.pilot_power is not None:
+            return self._pilot(rules.pilot_power, take, seed)
+        cap = np.inf if rules.power_cap is None or first is None else rules.power_cap * first
+        last = rules.schedule.last(done)
+        on = rules.stops or not last
+        rest, longest = rules.schedule.rest(done), rules.end - done
+        if rules.robust_last and last and known is not None:
+            changes = self._changes(known, rest, seed, white=rules.white, robust=True, goes_on=on)
+            # Some plant that the data leave open may ask for what cannot be done; the estimate need not.
+            with suppress(IdesignError):
+                found = self._designed(changes, known)
+                if found.cost <= cap * REACHED:
+                    return found.planned.cut(take)
+        changes = self._changes(known, rest, seed, white=rules.white, goes_on=on)
+        if known is None and rules.robust_last:
+            del changes["uncertainty"]  # what the spec knows of the plant
+        return self._affordable(changes, known, cap, longest).cut(take)
+
+    def cheapest(self, model: Model) -> float:
+        """Cost, summed over the samples, of the design that knows the plant: the oracle."""
+        changes = self._changes(None, self.nominal.samples, 1)
+        spec = restated(self.spec, model, _SOURCE).to_yaml()
+        overrides = _overrides({**changes, "solver.any_spectrum": False})
+        folder = self.spec.resolve_path(".")
+        done, _ = build_convex(parse_spec(spec, _SOURCE, overrides, folder=folder)).designed()
+        return done.experiment.samples * design_cost(done.design, done.cost)
+
+    def _affordable(
+        self, changes: Mapping[str, Json], known: Standing | None, cap: float, longest: int
+    ) -> Planned:
+        """The cheapest experiment; where a sample of it costs more than the cap, the shortest that does not.
+
+        Where the longest still does, that at the cap; where limits leave none, the best within them.
+        """
+
+        def tried(samples: int) -> _Found | None:
+            try:
+                return self._designed({**changes, "experiment.samples": samples}, known)
+            except InfeasibleError:
+                return None
+
+        rest = int(changes["experiment.samples"])
+        short, found = rest, tried(rest)
+        fits = found is not None and found.cost <= cap * REACHED
+        while not fits and rest < longest:
+            more = 2.0 if found is None else min(found.cost / cap, _LONGER)
+            short, rest = rest, int(min(np.ceil(max(more, 1.1) * rest), longest))
+            found = tried(rest)
+            fits = found is not None and found.cost <= cap * REACHED
+        if found is None:
+            if not self.spec.limits.bounds_power:
+                return self._designed(changes, known).planned  # says what is infeasible
+            best = self._designed({**changes, "objective": "best_accuracy"}, known)
+            return replace(best.planned, capped=True)
+        while fits and rest > _CLOSE * short and found.cost < _MOSTLY * cap:
+            middle = int(np.sqrt(short * rest))
+            between = tried(middle)
+            if between is not None and between.cost <= cap * REACHED:
+                found, rest = between, middle
+            else:
+                short = middle
+        return found.planned.at_most(cap)
+
+    def _designed(self, changes: Mapping[str, Json], known: Standing | None) -> _Found:
+        task = build_convex(self._spec({**changes, "solver.any_spectrum": False}, known))
+        done, _ = task.designed()
+        kind: Kind = "white" if "spectrum" in changes else "nominal" if task.plants is None else "robust"
+        return _Found(task.record, done, kind)
+
+    def _pilot(self, power: float, take: int, seed: int) -> Planned:
+        """White noise of this power, even over the inputs."""
+        nominal, step = self.nominal, record_step(self.spec)
+        powers = np.full(nominal.inputs, power / nominal.inputs)
+        drawn = Redrawn.flat("pilot", "white", powers, nominal.band, take, step)
+        record = drawn.draw(1, take, np.random.default_rng(seed))[0]
+        return Planned(record, take, _power(record), 0.0, "pilot")
+
+    def _spec(self, changes: Mapping[str, Json], known: Standing | None) -> Spec:
+        spec = self.spec if known is None else restated(self.spec, known.model, _SOURCE)
+        return parse_spec(
+            spec.to_yaml(), file=_SOURCE, overrides=_overrides(changes), folder=self.spec.resolve_path(".")
+        )
+
+    def _changes(
+        self,
+        known: Standing | None,
+        rest: int,
+        seed: int,
+        *,
+        white: bool = False,
+        robust: bool = False,
+        goes_on: bool = False,
+    ) -> dict[str, Json]:
+        """What the spec of a plan has in place of that of the campaign.
+
+        Args:
+            goes_on: whether another part follows, in which what this one has caused still tells: the record
+                has then the power of the design, and does not make up for its own end.
+        """
+        stated = self.spec.uncertainty
+        own = {} if stated is None else stated.model_dump(mode="json", exclude_unset=True, exclude=_PRIOR)
+        changes: dict[str, Json] = {
+            "campaign": None,
+            "simulation": None,
+            "experiment.samples": rest,
+            "signal.samples": None,
+            "signal.seed": seed,
+            "uncertainty": None,
+        }
+        if self.spec.experiment.duration is not None:
+            changes["experiment.duration"] = None
+        if goes_on and self.spec.signal.scale is None and self.spec.signal.amplitudes is None:
+            changes["signal.scale"] = "design"
+        if white:
+            changes["spectrum"] = {"type": "white"}
+        if known is not None:
+            told = {"parameters": list(known.model.names), "information": known.information.tolist()}
+            changes["experiment.prior"] = told
+            if robust:
+                changes["uncertainty"] = {**own, **told}
+        return changes
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A design, of which the record is made when it is wanted."""
+
+    request: RecordRequest
+    done: Designed
+    kind: Kind
+
+    @cached_property
+    def cost(self) -> float:
+        """Of a sample."""
+        return design_cost(self.done.design, self.done.cost)
+
+    @property
+    def planned(self) -> Planned:
+        """With its record; zero where nothing needs to be applied."""
+        done = self.done
+        made = fitting_record(self.request, done.question, done.design, done.experiment).record
+        silent = np.zeros((done.experiment.samples, done.experiment.inputs))
+        record = silent if made is None else made.samples
+        return Planned(record, len(record), _power(record), self.cost, self.kind)
+
+
+def _power(record: Array) -> float:
+    """Mean square of all channels together."""
+    return float(np.sum(np.mean(record**2, axis=0)))
+
+
+def _overrides(changes: Mapping[str, Json]) -> list[str]:
+    return [f"{key}={json.dumps(value)}" for key, value in changes.items()]
