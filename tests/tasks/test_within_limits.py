@@ -131,3 +131,27 @@ def test_data_of_the_error_reach_the_terminal(tmp_path):
     assert run.exit_code == 3
     (error,) = json.loads(run.stdout)["errors"]
     assert error["details"]["factor"] >= error["details"]["factor_bound"] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("limits", "keys"),
+    [
+        ("amplitude: {}", {"amplitude.input": 0.1}),
+        ("amplitude: {}, input_power: {}", {"amplitude.input": 0.1, "input_power": 0.009}),
+        ("amplitude: {}, output_power: {}", {"amplitude.input": 0.1, "output_power": 0.02}),
+    ],
+)
+def test_the_factor_of_an_amplitude_is_its_own(limits, keys):
+    """Several limits that are exhausted together: who raises each as told has a spectrum, no less does."""
+    text = TWO.replace("input_power: [1.0, 0.02]", "LIMITS").replace("signal: {candidates: 1}\n", "")
+    text += ERROR.format(0.3)
+    message = refused(text.replace("LIMITS", limits.format(*keys.values()))).message
+
+    def raised(share):
+        told = {key: float(message.split(f"limits.{key} ")[1].split(" times")[0]) for key in keys}
+        bounds = [share * bound * told[key] for key, bound in keys.items()]
+        return text.replace("LIMITS", limits.format(*bounds))
+
+    assert "no change of a single limit is enough" in message
+    refused(raised(1.0 + 1e-4), "limits-too-tight")  # a spectrum does; a record takes more, as is told
+    refused(raised(1.0 - 1e-2), "infeasible")

@@ -15,7 +15,7 @@ from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import LinesBasis
-from inputdesign_cli.tasks.result.needed_power import needed_power
+from inputdesign_cli.tasks.result.needed_factor import needed_factor
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound, named, rounded_up
 
 _TOLERANCE = 1e-5
@@ -44,9 +44,7 @@ def explain(
     missed = (problem.demands.requirement(index) for index, _ in nearest.active)
     names = " and ".join(dict.fromkeys(requirement.name for requirement in missed))
     try:
-        parts = _what_would_do(
-            unreachable, involved, only_density=bool(problem.densities and not question.limits)
-        )
+        parts = _what_would_do(unreachable, question, involved)
     except OutOfTimeError:  # that it is infeasible is proved
         parts = []
     message = "; ".join([f"{names} cannot be met within the limits: {bought.sentence}", *parts])
@@ -70,30 +68,54 @@ def explain(
 
 
 def _what_would_do(
-    unreachable: UnreachableError, involved: Sequence[PowerLimit], *, only_density: bool
+    unreachable: UnreachableError, question: Question, involved: Sequence[PowerLimit]
 ) -> list[str]:
     """Which limits are exhausted, and what they would have to be."""
     needs = {limit: _needed(unreachable, limit) for limit in involved if limit.upper}
     parts = [f"{named(limit)} is exhausted" for limit, need in needs.items() if not need]
     parts += [need for need in needs.values() if need]
     if not any(needs.values()):
-        # The optimum of the goal "factor" meets the accuracy within limits so many times as large.
-        times = f"would have to be {rounded_up(unreachable.nearest.objective)} times as large"
-        together = f"no change of a single limit is enough; all of them together {times}"
-        parts.append(f"limits.spectrum {times}" if only_density else together)
+        parts.append(_together(unreachable, question))
     return parts
+
+
+def _together(unreachable: UnreachableError, question: Question) -> str:
+    """What all upper limits would have to be."""
+    upper = {limit.key: limit for limit in question.limits if limit.upper}
+    raised = [limit for limit in question.limits if limit.upper]
+    densities = [density for density in question.densities if density.upper]
+    # The optimum of the goal "factor" meets the accuracy within limits and densities so many times as large.
+    factor = unreachable.nearest.objective if densities else needed_factor(unreachable, raised)
+    if factor is None:
+        return "no change of the upper limits is enough"
+    times = f"would have to be {rounded_up(factor)} times as large"
+    if not upper:
+        return f"limits.spectrum {times}"
+    if any(limit.implied for limit in upper.values()):  # what the spec limits there is not a power
+        own = {key: _own_factor(limit, factor) for key, limit in upper.items()}
+        own |= {density.key: factor for density in densities}
+        listed = " and ".join(f"{key} {rounded_up(each)} times" for key, each in own.items())
+        times = f"would have to be as large as a spectrum needs, {listed}, and larger for a record"
+    return f"no change of a single limit is enough; all of them together {times}"
+
+
+def _own_factor(limit: PowerLimit, factor: float) -> float:
+    """By what the number of the spec is multiplied where its power is multiplied by `factor`."""
+    return float(np.sqrt(factor)) if limit.implied else factor
 
 
 def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
     """What the limit would have to be with the others kept; empty if that does not help."""
-    least = needed_power(unreachable, limit)
-    if least is None:
+    factor = needed_factor(unreachable, [limit])
+    if factor is None:
         return ""
+    least = factor * limit.bound
     channel = "" if limit.channel is None else f" {limit.channel + 1}"
     needs = f"needs {limit.kind}{channel} power >= {rounded_up(least)}"
     if limit.implied:
         peak = np.sqrt(limit.bound)
-        return f"{needs}, but a peak of {peak:.6g} leaves {limit.bound:.6g}"
+        least_peak = rounded_up(float(np.sqrt(least)))
+        return f"{needs}, a peak of {least_peak} at least, but a peak of {peak:.6g} leaves {limit.bound:.6g}"
     return f"{needs}, limit is {limit.bound:.6g}"
 
 

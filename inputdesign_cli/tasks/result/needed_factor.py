@@ -1,7 +1,8 @@
-"""How far one limit would have to be raised, the others kept, for the accuracy to be met."""
+"""How far limits would have to be raised, the others kept, for the accuracy to be met."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,19 +19,22 @@ _LONGEST_STEP, _MOST = 1e3, 1e9
 _NO_SHARE = 1e-5
 
 
-def needed_power(unreachable: UnreachableError, limit: PowerLimit) -> float | None:
-    """The least bound of this limit with which the others allow the accuracy; None when none does.
+def needed_factor(unreachable: UnreachableError, limits: Sequence[PowerLimit]) -> float | None:
+    """How many times as large these limits together allow the accuracy, at least; None where they never do.
 
-    The multiplier of a limit tells how fast the square of the best ratio falls as the limit rises: Newton's
-    method, in logarithms, between values that are proved too small and values that are known to do.
+    The multipliers of the limits tell how fast the square of the best ratio falls as they rise: Newton's
+    method, in logarithms, between values that are proved too small and values that are known to do. What
+    noise or a prior tell does not grow with the powers: the square of the ratio is not the factor.
     """
-    found, places = unreachable.nearest, limit.everywhere(unreachable.problem.limits)
-    low, high, at = limit.bound, np.inf, limit.bound
+    stated = unreachable.problem.limits
+    bounds = {place: limit.bound for limit in limits for place in limit.everywhere(stated)}
+    places, found = list(bounds), unreachable.nearest
+    low, high, at = 1.0, np.inf, 1.0
     for _ in range(_STEPS):
-        share = float(found.certificate.limits[places].sum()) * at
+        share = float(found.certificate.limits[places] @ np.array(list(bounds.values()))) * at
         if found.certificate.bound > 1.0 + _TOLERANCE:
             low = at
-            if share < _NO_SHARE or low > _MOST * limit.bound:
+            if share < _NO_SHARE or low > _MOST:
                 return None
             step = min(np.log(found.certificate.bound) / share, np.log(_LONGEST_STEP))
             at = low * float(np.exp(step))
@@ -42,7 +46,7 @@ def needed_power(unreachable: UnreachableError, limit: PowerLimit) -> float | No
             return low
         if at >= high:
             at = float(np.sqrt(low * high))
-        problem = _raised(unreachable.problem.on(found.basis), places, at)
+        problem = _raised(unreachable.problem.on(found.basis), bounds, at)
         found = exchange(
             problem,
             found.x,
@@ -53,10 +57,10 @@ def needed_power(unreachable: UnreachableError, limit: PowerLimit) -> float | No
     return low if np.isfinite(high) else None
 
 
-def _raised(problem: Problem, places: list[int], bound: float) -> Problem:
+def _raised(problem: Problem, bounds: Mapping[int, float], factor: float) -> Problem:
     limits = list(problem.limits)
-    for index in places:
-        limits[index] = replace(limits[index], bound=bound)
+    for index, bound in bounds.items():
+        limits[index] = replace(limits[index], bound=factor * bound)
     return replace(problem, limits=tuple(limits), finer=None)
 
 
