@@ -78,7 +78,9 @@ def frequency_response(
 def found_period(x: Array) -> int:
     """Of a signal (N,) that repeats, at least twice; 0 of others."""
     tolerance = _REPEATS * float(np.abs(x).max())
-    begin = x[:_BEGINNING]
+    if x.size < 2:
+        return 0
+    begin = x[: min(_BEGINNING, x.size // 2)]  # so that it stands a second time in what follows
     windows = np.lib.stride_tricks.sliding_window_view(x[1 : x.size // 2 + begin.size], begin.size)
     same = np.flatnonzero(np.all(np.abs(windows - begin) <= tolerance, axis=1)) + 1
     for period in same[same <= x.size // 2][:_TRIED]:
