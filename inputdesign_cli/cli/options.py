@@ -91,7 +91,7 @@ DetrendWord = Annotated[
     one_of(("none", "constant", "linear", "auto"), "What to take away from every signal, segment by segment"),
 ]
 Skip = Annotated[
-    int, typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of every file.")
+    int, typer.Option("--skip", metavar="N", min=0, help="Leave out the first N rows of data of every file.")
 ]
 Span = Annotated[
     str, typer.Option("--range", metavar="FROM:TO", help="Keep rows whose times lie between these two.")
@@ -157,7 +157,7 @@ Fast = Annotated[
     bool,
     typer.Option(
         "--fast",
-        help="Leave out the bound over every spectrum, which takes about half of the time "
+        help="Leave out the bound over every spectrum, which may take as long as the design "
         "(solver.any_spectrum: false).",
     ),
 ]

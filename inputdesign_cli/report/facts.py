@@ -160,9 +160,14 @@ def _signal(result: Result) -> Iterator[str]:
     """The samples of the record, and what they attain."""
     signal = result["signal"]
     yield f"{signal['samples']} samples"
+    peak, of_u = (listed(signal[key]) if signal.get(key) else "" for key in ("peak", "input_peak"))
+    looped = bool(of_u) and of_u != peak  # what excites is then another signal than the input
     for key in ("power", "peak", "crest_factor"):
         if signal.get(key):
-            yield f"{spoken(key)} {listed(signal[key])}"
+            yield f"{spoken(key)}{' of r' * looped} {listed(signal[key])}"
+    if looped:
+        yield f"peak of u {of_u}"
+        yield f"peak of y {listed(signal['output_peak'])}"
     if "mean_squared_error" in signal:
         yield f"error {signal['mean_squared_error']:.6g} with these samples"
     if "worst_ratio" in signal:

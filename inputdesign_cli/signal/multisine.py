@@ -6,13 +6,18 @@ A record of r periods whose vectors are orthogonal has, on average over them, th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.lines import Lines
 from inputdesign_cli.signal.settings import LineVectors
+
+_AT_ONCE = 1_000_000  # values of sinusoids
 
 
 def orthogonal_columns(order: int) -> NDArray:
@@ -88,9 +93,25 @@ def _sinusoids(lines: Lines, vectors: ComplexArray, samples: int) -> Array:
     """(samples, r): the sum of sinusoids whose mean squares are those of `vectors` (L, r)."""
     if lines.period is None:
         amplitude = np.where(lines.real, 1.0, np.sqrt(2.0))[:, None] * vectors
-        return (np.exp(1j * np.outer(np.arange(samples), lines.frequencies)) @ amplitude).real
+        return np.concatenate(
+            [
+                (np.exp(1j * np.outer(times, lines.frequencies)) @ amplitude).real
+                for times in _pieces(samples, len(lines.frequencies))
+            ]
+        )
     spectrum = np.zeros((lines.period // 2 + 1, vectors.shape[1]), dtype=complex)
     index = np.rint(lines.frequencies * lines.period / (2 * np.pi)).astype(int)
     spectrum[index] = vectors * np.where(lines.real, 1.0, np.sqrt(0.5))[:, None] * lines.period
     one = np.fft.irfft(spectrum, lines.period, axis=0)
     return one if samples == lines.period else one[np.arange(samples) % lines.period]
+
+
+def _pieces(samples: int, lines: int) -> Iterator[NDArray[np.int64]]:
+    """The numbers of the samples, as many at once as memory likes, and as the time limit can wait for.
+
+    Raises:
+        OutOfTimeError: see `seconds_left`.
+    """
+    for times in np.array_split(np.arange(samples), max(samples * lines // _AT_ONCE, 1)):
+        seconds_left()
+        yield times

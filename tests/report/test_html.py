@@ -15,6 +15,7 @@ import pytest
 
 from inputdesign_cli import load_spec, solve
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.sweep.running import sweep
@@ -195,3 +196,11 @@ def test_a_directory_without_a_run(tmp_path):
     with pytest.raises(DataError) as caught:
         report_text(tmp_path)
     assert caught.value.diagnostics[0].code == "run-missing"
+
+
+def test_peaks_of_a_loop_are_those_of_each_signal():
+    signal = {"samples": 10, "peak": [3.0], "input_peak": [2.0], "output_peak": [5.0]}
+    told = {name: text for name, text, _ in facts({"signal": signal}, "s")}["signal"]
+    assert told == "10 samples, peak of r 3, peak of u 2, peak of y 5"
+    told = {name: text for name, text, _ in facts({"signal": signal | {"input_peak": [3.0]}}, "s")}["signal"]
+    assert told == "10 samples, peak 3"

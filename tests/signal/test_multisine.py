@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError, time_limit
 from inputdesign_cli.signal import Lines, autocorrelation, grid_lines, merged, multisine_record
 from inputdesign_cli.signal.multisine import orthogonal_columns
 from inputdesign_cli.spectrum import FirBasis
@@ -78,3 +79,21 @@ def test_the_lines_of_a_moving_average_have_exactly_its_power(samples):
     spectrum = np.abs(np.fft.rfft(x) / samples) ** 2
     spectrum[1 : (samples + 1) // 2] *= 2
     np.testing.assert_allclose(spectrum, lines.totals, atol=1e-14)
+
+
+def test_a_record_of_lines_anywhere_is_their_sum_however_long():
+    rng = np.random.default_rng(5)
+    frequencies, samples = np.sort(rng.uniform(0.01, 3.0, 700)), 3001
+    lines = Lines(frequencies, np.full((700, 1, 1), 0.5 + 0j))
+    angles = rng.uniform(0.0, 2.0 * np.pi, 700)
+    found = multisine_record(lines, samples, rng, "orthogonal", angles=angles)
+    at = [0, 1428, 1429, 3000]
+    expected = [sum(np.cos(w * t + a) for w, a in zip(frequencies, angles, strict=True)) for t in at]
+    np.testing.assert_allclose(found[at, 0], expected, atol=1e-9)
+
+
+def test_the_time_limit_ends_a_record_that_is_being_made():
+    rng = np.random.default_rng(5)
+    lines = Lines(rng.uniform(0.01, 3.0, 20), np.full((20, 1, 1), 0.5 + 0j))
+    with time_limit(0.0), pytest.raises(OutOfTimeError):
+        multisine_record(lines, 100, rng, "orthogonal")

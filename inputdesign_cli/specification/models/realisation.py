@@ -126,7 +126,7 @@ class Solver(Section):
     tolerance: Tolerance = Field(default=1e-7, description="Relative gap to be proved (default 1e-7).")
     any_spectrum: Flag = Field(
         default=True,
-        description="Whether to bound what other spectra reach (default true; half of the time).",
+        description="Whether to bound what other spectra reach (default true; may take as long again).",
     )
     any_spectrum_tolerance: Tolerance = Field(
         default=1e-4,
