@@ -157,8 +157,8 @@ Fast = Annotated[
     bool,
     typer.Option(
         "--fast",
-        help="Leave out the bound over every spectrum, which takes about half of the time "
-        "(solver.any_spectrum: false).",
+        help="Leave out the bound over every spectrum, which takes about half of the time, and the search "
+        "for other dead times that fit as well (solver.any_spectrum: false).",
     ),
 ]
 Figures = Annotated[

@@ -43,7 +43,7 @@ from inputdesign_cli.tasks.result.refutations import (
     unsettled,
 )
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
-from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors
+from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors, rival_notes
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -155,10 +155,13 @@ def _without_top_up(judged: Results, why: str) -> Results:
 
 def _rivals(units: Units, found: Identified, question: ModelQuestion) -> list[str]:
     """The other explanations of the data that the verdict would not hold for."""
-    errors = model_errors(question.requirements)
-    if errors:
-        return beyond_admissible(units, found.model, found.estimate, errors)
-    return beyond_errors(units, found.model, found.estimate, question.entries, question.information)
+    errors, model, estimate = model_errors(question.requirements), found.model, found.estimate
+    apart = (
+        beyond_admissible(model, estimate, errors)
+        if errors
+        else beyond_errors(model, estimate, question.entries, question.information)
+    )
+    return rival_notes(units, estimate, apart)
 
 
 def _about(topped: Results, levels: Mapping[str, float]) -> Results:
