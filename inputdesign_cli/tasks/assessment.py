@@ -118,23 +118,26 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     without: list[Neglected] = []
     if found.question is not None:
         without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
-    reasons = [
-        *unsettled(found.estimate),
-        *differences(found.estimate, [name for name, _ in found.data.files]),
-        *repetitions(found.estimate, found.data.files),
-        *refutations(found.model, found.estimate),
-        *contradictions(found.estimate),
-    ]
-    reasons += [found.unasked] if found.unasked else []
-    if found.question is not None:
-        reasons += _rivals(task.header.units, found, found.question)
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
     notes = objections(task.header.units, without) if met else []
-    reasons += notes
+    causes = {
+        "unsettled": unsettled(found.estimate),
+        "contradicted": [
+            *differences(found.estimate, [name for name, _ in found.data.files]),
+            *repetitions(found.estimate, found.data.files),
+            *refutations(found.model, found.estimate),
+            *contradictions(found.estimate),
+            *notes,
+        ],
+        "unasked": [found.unasked] if found.unasked else [],
+        "undetermined": [] if found.question is None else _rivals(task.header.units, found, found.question),
+    }
+    reasons = [reason for told_of in causes.values() for reason in told_of]
     verdict: Verdict = "undecided" if reasons else "met" if met else "missed"
-    assessment: dict[str, Json] = {"met": verdict == "met", "requirements": listed}
+    assessment: dict[str, Json] = {"verdict": verdict, "met": verdict == "met", "requirements": listed}
     if reasons:
         assessment["undecided"] = reasons
+        assessment["causes"] = [cause for cause, told_of in causes.items() if told_of]
     if without:
         assessment["neglected"] = [one.entry(task.header.units) for one in without]
     if found.question is not None:

@@ -5,13 +5,15 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
+from inputdesign_cli import analyse, assess, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.tasks import foresight, simulation
 from inputdesign_cli.tasks.build.convex import build_convex
+from tests.support.heater import said
 
 H, SAMPLES, VARIANCE = 4.76, 720, 0.04
 HEATER = (2.1, 180.0, 25.0)
+RICHER = "{type: fir, order: 12}"
 LIMIT = 2.0 * np.log(1000.0)
 
 
@@ -61,7 +63,26 @@ def test_rivals_of_two_sinusoids_are_those_of_a_plain_scan():
     assert "plant.known: [L]" in note
 
 
-@pytest.mark.parametrize("spectrum", ["{type: fir, order: 12}", "{type: multisine, lines: 40}"])
+@pytest.mark.parametrize(
+    ("spectrum", "undecided"), [("{type: multisine, lines: 120}", True), (RICHER, False)]
+)
+def test_what_is_told_beforehand_is_what_assess_says_afterwards(spectrum, undecided, tmp_path):
+    _, u = solved(f"spectrum={spectrum}")
+    y = HEATER[0] * plainly(*HEATER[1:], u)
+    y += np.sqrt(VARIANCE) * np.random.default_rng(5).standard_normal(u.size)
+    path = tmp_path / "record.csv"
+    columns = np.column_stack([H * np.arange(u.size), u, y])
+    np.savetxt(path, columns, delimiter=",", header="time_s,u,y", comments="")
+    found = assess(load_spec("specs/heater.yaml"), path)
+    assessment = found.results.result["assessment"]
+    assert (found.verdict == "undecided") == undecided
+    assert assessment["verdict"] == found.verdict
+    assert assessment.get("causes", []) == (["undetermined"] if undecided else [])
+    assert ("do not determine the model" in said(found.results)) == undecided
+    assert "contradict the model" not in said(found.results)
+
+
+@pytest.mark.parametrize("spectrum", [RICHER, "{type: multisine, lines: 40}"])
 def test_where_a_plain_scan_finds_none_none_is_told(spectrum):
     result, u = solved(f"spectrum={spectrum}")
     assert valleys(u) == []
