@@ -6,6 +6,7 @@ near which r_adm changes fast, `knots` the frequencies at which it may have a ki
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -104,11 +105,32 @@ class Sensitivity:
     For every plant G + D with s(D) <= r_adm then s(W S') <= 1: S' = S (I + D C S)^-1, so that
     s(S') <= s(S) / (1 - s(D) s(C S)). With one channel that is (|1 + C G| - |W|) / |C|
     ([bombois-least-costly], Illustration 2, by the reverse triangle inequality).
+
+    `settings` of the controller are told where the loop is what is asked for; None where it is not.
     """
 
     loop: Loop
     weight: ScalarTransfer
+    settings: Mapping[str, float] | None = None
     knots = _NOWHERE
+
+    def nominal(self, w: ArrayLike) -> Array:
+        """The largest singular value of S (n,) with the nominal plant."""
+        return largest_gain(self.loop.sensitivity(w)[0])
+
+    def margins(self, w: ArrayLike) -> dict[str, float]:
+        """What a loop keeps: the peak of |S| with the nominal plant, that with every other, its margins.
+
+        1 + L stays 1/|S| away from 0: a gain margin of |S|/(|S| - 1) and a phase margin of
+        2 asin(1/(2 |S|)), in degrees, follow.
+        """
+        peak = float(np.min(1.0 / np.abs(self.weight.at(w))))
+        return {
+            "nominal_peak": float(np.max(self.nominal(w))),
+            "max_sensitivity": peak,
+            "gain_margin": peak / (peak - 1.0),
+            "phase_margin": float(2.0 * np.degrees(np.arcsin(0.5 / peak))),
+        }
 
     @cached_property
     def singularities(self) -> ComplexArray:

@@ -109,7 +109,7 @@ def _whole(campaign: Mapping[str, Json]) -> bool:
     try:
         rounds, records = campaign["rounds"], campaign["records"]
         texts = (campaign["state"], campaign["folder"], campaign["time_unit"], rounds[-1]["state"])
-        told = [(record["file"], record["given"], bool(record["withdrawn"])) for record in records]
+        told = [(r["file"], r["given"], r["plan"], bool(r["withdrawn"])) for r in records]
         sizes = [(int(record["samples"]), float(record["energy"])) for record in records]
         plan = rounds[-1].get("plan")
         wanted = [] if plan is None else [plan[key] for key in ("file", "samples", "power", "offset")]

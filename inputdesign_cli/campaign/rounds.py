@@ -33,7 +33,7 @@ def begun(decide: Decide, folder: Path, directory: Path) -> Results:
         folder: what names of files in the spec start from.
         directory: where the campaign will be.
     """
-    decision = decide(Past((), 0, None, None, 1))
+    decision = decide(Past((), 0, None, None, None, 1))
     campaign: dict[str, Json] = {
         "version": VERSION,
         "time_unit": decision.header.units.time_unit,
@@ -97,6 +97,7 @@ def _again(
         past = Past(
             records=paths,
             done=sum(int(record["samples"]) for record in records),
+            ended=_ended(files, records),
             last=None if last is None else np.array(list(last.values()), dtype=float),
             first_cost=campaign.get("first_cost"),
             seed=seed,
@@ -104,6 +105,14 @@ def _again(
         decision = decide(past)
     results = _decided(decision, campaign, files, seed=seed)
     return replace(results, result={**results.result, "made_from": list(memory.made_from)})
+
+
+def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
+    """(r,): the last sample that was planned of what was applied."""
+    if not records:
+        return None
+    rows = files[records[-1]["plan"]].decode().splitlines()
+    return np.array(rows[int(records[-1]["samples"])].split(",")[1:], dtype=float)
 
 
 @contextmanager

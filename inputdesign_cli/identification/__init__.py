@@ -13,6 +13,7 @@ from inputdesign_cli.identification.extensions import Extension as Extension
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
     frequency_response as frequency_response,
+    silent_in as silent_in,
 )
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (

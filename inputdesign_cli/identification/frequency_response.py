@@ -22,6 +22,7 @@ from inputdesign_cli.identification.periodic_response import (
     excited_harmonics,
     periodic_response,
 )
+from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 CONFIDENCE = 0.95
@@ -68,16 +69,18 @@ def frequency_response(
     outside = u if x is None else x
     records = list(zip(*(np.split(signal, at) for signal in (outside, u, y)), strict=True))
     if len(records) == 1 and u.shape[1] == 1:
-        period = _period(records[0][0][:, 0])
+        period = found_period(records[0][0][:, 0])
         if period:
             return _by_lines(outside, u, y, period)
     return _local_polynomial(records)
 
 
-def _period(x: Array) -> int:
+def found_period(x: Array) -> int:
     """Of a signal (N,) that repeats, at least twice; 0 of others."""
     tolerance = _REPEATS * float(np.abs(x).max())
-    begin = x[:_BEGINNING]
+    if x.size < 2:
+        return 0
+    begin = x[: min(_BEGINNING, x.size // 2)]  # so that it stands a second time in what follows
     windows = np.lib.stride_tricks.sliding_window_view(x[1 : x.size // 2 + begin.size], begin.size)
     same = np.flatnonzero(np.all(np.abs(windows - begin) <= tolerance, axis=1)) + 1
     for period in same[same <= x.size // 2][:_TRIED]:
@@ -92,6 +95,29 @@ def _by_lines(x: Array, u: Array, y: Array, period: int) -> FrequencyResponse | 
     periods = Periods(period, skip=int(times > 2))
     found = periodic_response(u, y, periods, excited_harmonics(x, periods))
     return None if found is None else of_periods(found, period)
+
+
+def silent_in(u: Array, y: Array) -> dict[str, SilentLines]:
+    """What outputs have at odd and even harmonics that one input (N, 1) which repeats does not excite.
+
+    Empty where it does not repeat, or excites all of a kind.
+    """
+    period = found_period(u[:, 0]) if u.shape[1] == 1 else 0
+    if not period:
+        return {}
+    periods = Periods(period, skip=int(len(y) // period > 2))
+    # A drift is the same ramp in every period, and would speak at all lines.
+    whole = y[len(y) % period :].reshape(-1, period, y.shape[1]).mean(axis=1)
+    ramp = np.polyfit(period * np.arange(len(whole)), whole, 1)[0]
+    level = y - np.outer(np.arange(len(y)), ramp)
+    inside = np.arange(1, (period + 1) // 2)
+    silent = np.setdiff1d(inside, excited_harmonics(u, periods))
+    found = {}
+    for kind, harmonics in (("odd", silent[silent % 2 == 1]), ("even", silent[silent % 2 == 0])):
+        lines = silent_lines(periods.transforms(level)[:, :, harmonics])
+        if lines is not None:
+            found[kind] = lines
+    return found
 
 
 def of_periods(found: PeriodicResponse, period: int) -> FrequencyResponse:

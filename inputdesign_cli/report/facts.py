@@ -35,6 +35,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
         yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+    asked = result.get("requirements", result.get("assessment", {}).get("requirements", []))
+    yield from (_loop(entry["loop"], time_unit) for entry in asked if "loop" in entry)
     if "worst_ratio" in result.get("frequency_response", {}):
         yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
@@ -72,6 +74,20 @@ def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
         f"count{blocks}; standard deviations at most {found['worst_ratio']:.6g} of those admitted"
     )
     return "response", text, f"worst at {found['worst_frequency']:.4g} rad/{time_unit}"
+
+
+def _loop(found: Mapping[str, Json], time_unit: str) -> Fact:
+    """The controller of a loop, and the margin that is kept."""
+    settings = {name: found[name] for name in ("Kp", "Ti", "Td") if name in found}
+    told = ", ".join(
+        f"{name} {value:.4g}{'' if name == 'Kp' else f' {time_unit}'}" for name, value in settings.items()
+    )
+    peak = f"|S| at most {found['nominal_peak']:.4g} with this plant"
+    kept = (
+        f"asked: at most {found['max_sensitivity']:.4g} with every plant within r_u, so a gain margin "
+        f"of {found['gain_margin']:.3g} and a phase margin of {found['phase_margin']:.3g} degrees"
+    )
+    return "loop", f"{told}, {peak}" if told else peak, kept
 
 
 def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:

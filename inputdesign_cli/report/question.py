@@ -49,7 +49,7 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
         SpecError: `text` is no spec of this version.
     """
     spec = parse_spec(text, file, design=verb != "identify")
-    error = spec.accuracy.model_error
+    error = spec.accuracy.error
     sentences = [
         _system(spec),
         _experiment(spec),
@@ -138,7 +138,7 @@ def _uncertain(spec: Spec) -> list[str]:
 def _accuracy(spec: Spec) -> list[str]:
     accuracy = spec.accuracy
     sentences = []
-    error = accuracy.model_error
+    error = accuracy.error
     if error is not None:
         size = (
             f"alpha = {error.alpha:g}" if error.alpha else f"{100 * (error.probability or 0):g} % confidence"

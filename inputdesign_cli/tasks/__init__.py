@@ -173,10 +173,12 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
     Raises:
         SpecError: the model cannot be judged.
         DataError: the log cannot be used, or tells no model at all.
+        InaccurateError: the numbers of the log leave the range of double precision.
     """
     prepared = preparation or Preparation()
     if model is None:
-        return explore_log(_paths(data), prepared)
+        with sound_arithmetic(most_extreme({})):
+            return explore_log(_paths(data), prepared)
     with _placed(model):
         return judge(model_to_judge(model), build_header(model), _paths(data), prepared)
 

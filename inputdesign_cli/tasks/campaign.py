@@ -7,7 +7,7 @@ it looks at is the information, not the error ([anscombe-1952], [chow-robbins-19
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Literal, Protocol
@@ -69,6 +69,7 @@ class Rules:
     robust_last: bool = True
     stops: bool = True
     white: bool = False  # plans have a flat spectrum
+    rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
 
     @property
     def end(self) -> int:
@@ -129,6 +130,18 @@ class Planned:
     def cut(self, take: int) -> Planned:
         """The same, of which so many samples are applied."""
         return replace(self, take=take)
+
+    def following(self, last: Array, rate: Sequence[float] | None) -> Planned:
+        """The same after a part that ended at `last` (r,), with moves of at most `rate` back to its start.
+
+        A record starts within one move of zero.
+        """
+        if rate is None or not np.any(last):
+            return self
+        steps = int(np.max(np.ceil(np.abs(last) / rate)))
+        back = np.arange(1, steps + 1)[:, None] * np.asarray(rate)
+        ramp = np.sign(last) * np.maximum(np.abs(last) - back, 0.0)
+        return replace(self, record=np.concatenate([ramp, self.record]))
 
     def at_most(self, cost: float) -> Planned:
         """The same at a smaller power, where a sample would cost more."""

@@ -52,6 +52,7 @@ class Past:
     Attributes:
         records: the files that count, each with u and y of a part.
         done: samples that have been applied, in records that count or not.
+        ended: (r,) the last sample that was applied; None before any.
         last: (k,) the estimate that was built on before; None before any.
         first_cost: of a sample of the first plan, None before it.
         seed: of the next record.
@@ -59,6 +60,7 @@ class Past:
 
     records: Sequence[Path]
     done: int
+    ended: Array | None
     last: Array | None
     first_cost: float | None
     seed: int
@@ -140,6 +142,8 @@ def decide(task: Rounds, past: Past) -> Decision:
     if state != "running":
         return Decision(header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes))
     plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost)
+    if past.ended is not None:
+        plan = plan.following(past.ended - task.offsets, task.rules.rate)
     part = _part(task, plan, past.done)
     more = _of_the_plan(plan, task, past)
     return Decision(header, task.rules, state, stands, assessed, plan, part, task.offsets, (*notes, *more))
@@ -244,7 +248,7 @@ def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
     wanted = task.rules.robust_last and task.rules.schedule.last(past.done)
     if wanted and plan.kind == "nominal":
         notes.append(
-            "this part is planned for the estimate alone: some plant that the data leave open asks "
-            "for what cannot be done"
+            "this part is planned for the estimate alone: some plant that the data leave open asks for more "
+            "than campaign.power_cap and limits allow"
         )
     return notes

@@ -100,7 +100,8 @@ class _Run:
                 return self._ended("unplanned")
             if self.first is None and plan.kind != "pilot":
                 self.first = plan.cost
-            self.r = np.concatenate([self.r, plan.applied])
+            last = self.r[-1] if len(self.r) else np.zeros(self.r.shape[1])
+            self.r = np.concatenate([self.r, plan.following(last, rules.rate).applied])
             u, y = self._measured()
             self._estimate(u, y)
             met = self.known is not None and self.known.met

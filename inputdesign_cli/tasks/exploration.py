@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification import frequency_response, silent_in
 from inputdesign_cli.identification.explore import (
     Found,
     answers_output,
@@ -36,6 +36,7 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_entry,
 )
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
+from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
 
 # A simulation that explains less than this of data it has not seen is no model.
 _LEAST_FIT = 5.0
@@ -99,14 +100,19 @@ def _without_model(explored: Results, units: Units, log: Log, found: Found) -> R
     response = frequency_response(log.u[:, moving], log.y, lengths=log.lengths)
     if response is None:
         return explored
+    silent = silent_in(log.u[:, moving], log.y) if len(log.lengths) == 1 else {}
     table, curves, told = response_of_data(units, found.model, response, by_reference=False, inputs=moving)
     result = explored.result
     return replace(
         explored,
         result={
             **result,
-            "exploration": {**result["exploration"], "frequency_response": told},
-            "notes": [*result.get("notes", []), *response_note(told)],
+            "exploration": {
+                **result["exploration"],
+                "frequency_response": told,
+                **({"nonlinearity": silent_entry(silent)} if silent else {}),
+            },
+            "notes": [*result.get("notes", []), *response_note(told), *silent_notes(silent)],
         },
         tables={**explored.tables, "frequency_response": table},
         curves={**explored.curves, "frequency_response": curves},

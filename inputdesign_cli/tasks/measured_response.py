@@ -15,14 +15,15 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import frequency_response
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
+from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.runs.results import Json, Results
+from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.response import ResponseTask
-from inputdesign_cli.tasks.result.measured_response import Judged, SilentLines, measured_results
+from inputdesign_cli.tasks.result.measured_response import Judged, measured_results
 from inputdesign_cli.tasks.result.responses import response_of_data
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
@@ -60,7 +61,8 @@ def measure(
     units = question.header.units
     known = {**question.operating_point, **preparation.operating_point}
     data = read_data(paths, units, replace(preparation, operating_point=known))
-    task, judged, silent = question.task, None, None
+    task, judged = question.task, None
+    silent: dict[str, SilentLines] = {}
     if task is None:
         found = frequency_response(data.u, data.y, data.r, lengths=data.lengths)
         if found is None:
@@ -163,37 +165,16 @@ def _averaged(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     return np.asarray((sums[first + window] - sums[first]) / window)
 
 
-def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> SilentLines | None:
-    """What the outputs have at lines that are not excited, over their noise."""
-    grid = task.grid
-    if not grid.even.size:
-        return None
-    found: dict[str, Json] = {}
-    for kind, harmonics in (("odd", grid.odd), ("even", grid.even)):
-        if not harmonics.size:
-            continue
-        # Over the noise of the spec, so that lines count alike.
-        shape = _between(grid.at(harmonics), grid.frequencies, task.lines.noise)
+def _silent(task: ResponseTask, data: Data, periods: Periods, repeats: int) -> dict[str, SilentLines]:
+    """What the outputs have at lines of the design that are not excited, odd and even."""
+    found = {}
+    for kind, harmonics in (("odd", task.grid.odd), ("even", task.grid.even)):
         records = [periods.transforms(one)[:, :, harmonics] for one in np.split(data.y, repeats)]
-        Y = np.concatenate(records, axis=1) / np.sqrt(shape)
-        kept = Y.shape[1]
-        mean = Y.mean(axis=1, keepdims=True)
-        noise = np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (len(Y) * (kept - 1))
-        level = kept * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
-        # Of noise alone the ratio is of the F distribution, line by line and over all of them.
-        ratio = np.mean(level / noise, axis=0)
-        freedom = 2 * len(Y) * harmonics.size
-        probability = scipy.stats.f.sf(
-            np.sum(level, axis=0) / np.sum(noise, axis=0), freedom, freedom * (kept - 1)
-        )
-        excess = np.maximum(np.sum((level - noise) * shape, axis=0) / kept, 0.0)
-        found[kind] = {
-            "lines": int(harmonics.size),
-            "over_noise": ratio.tolist(),
-            "probability": np.asarray(probability).tolist(),
-            "rms": np.sqrt(2.0 * excess).tolist(),
-        }
-    return SilentLines(found)
+        shape = _between(task.grid.at(harmonics), task.grid.frequencies, task.lines.noise)
+        lines = silent_lines(np.concatenate(records, axis=1), shape)
+        if lines is not None:
+            found[kind] = lines
+    return found
 
 
 def _between(w: Array, lines: Array, values: Array) -> Array:

@@ -97,6 +97,13 @@ class ResponseTask:
                 hint="write compare: [white], which stands for lines of equal power",
                 key="simulation.compare",
             )
+        if self.simulation.runs < 2:
+            raise bad_spec(
+                "out-of-range",
+                "a single run has no standard deviation",
+                hint="write simulation.runs: 1000, whose deviations are known to 2 %",
+                key="simulation.runs",
+            )
         plan, results = self._solved()
         begun = time.perf_counter()
         records = {"design": plan.record.samples}

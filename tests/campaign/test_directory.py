@@ -114,6 +114,17 @@ def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_pat
     assert (begun / "result.json").read_bytes() == before
 
 
+def test_moves_between_parts_keep_the_limit(run, begun, tmp_path):
+    limits = ["--set", "limits.rate=1.2", "--set", "signal.offset=40", "--set", "limits.amplitude=2.5"]
+    assert run("campaign", "s.yaml", "-o", "d", "--no-figures", *limits)[0] == 0
+    for number in (1, 2, 3):
+        record = applied(tmp_path / "d", tmp_path / f"d{number}.csv")
+        assert run("next", "d", record, "--no-figures")[0] == 0
+    u = planned(tmp_path / "d")[:, 1] - 40.0
+    assert np.abs(np.diff(u, prepend=0.0)).max() <= 1.2 * (1 + 1e-9)
+    assert np.abs(u).max() <= 2.5 * (1 + 1e-9)
+
+
 def test_the_same_record_does_not_count_twice(run, begun, tmp_path):
     record = applied(begun, tmp_path / "r.csv")
     assert run("next", "c", record, "--no-figures")[0] == 0

@@ -113,3 +113,12 @@ def test_too_little_tells_nothing():
     sinusoid = np.sin(0.3 * np.arange(300))[:, None]
     found = frequency_response(sinusoid, sinusoid)
     assert found is None or np.all(np.isfinite(found.radius))
+
+
+@pytest.mark.parametrize("samples", range(1, 60))
+def test_short_records_have_a_response_or_none(samples):
+    rng = np.random.default_rng(samples)
+    u, y = rng.standard_normal((2, samples, 1))
+    for signal in (u, np.sign(u), np.zeros_like(u), np.resize([[1.0], [-1.0]], u.shape)):
+        found = frequency_response(signal, y)
+        assert found is None or np.all(np.isfinite(found.G))

@@ -11,10 +11,12 @@ from typer.testing import CliRunner
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.specification import load_spec, parse_spec
-from inputdesign_cli.tasks import explore, solve
+from inputdesign_cli.tasks import explore, identify, solve
 from inputdesign_cli.tasks.build.preparation import Preparation
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
+
+PLANT = "plant: {B: [0, 1], F: [1, -0.7]}\n"
 
 
 def record(path, *, samples=300, seed=0, noise=0.2, gain=1.0, head="time_min,input,output"):
@@ -104,3 +106,38 @@ def test_logs_that_tell_nothing_are_refused(text, message, tmp_path):
     path.write_text(text)
     with pytest.raises(DataError, match=message):
         explore(path)
+
+
+@pytest.mark.parametrize("samples", [1, 2, 40])
+@pytest.mark.parametrize("scale", [1e-320, 1e-300, 1e-160, 1e160, 1e300, 1e308])
+def test_signals_beyond_arithmetic_are_refused_by_their_row(scale, samples, tmp_path):
+    rng = np.random.default_rng(3)
+    path = tmp_path / "log.csv"
+    rows = [f"{u:.3f},{scale * y!r}" for u, y in rng.uniform(0.5, 1.0, (samples, 2)).tolist()]
+    path.write_text("\n".join(["u,y", *rows]) + "\n")
+    for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
+        with pytest.raises(DataError) as found:
+            read(path)
+        (diagnostic,) = found.value.diagnostics
+        assert diagnostic.code == "beyond-precision"
+        assert diagnostic.location.line >= 2
+
+
+@pytest.mark.parametrize("times", [[3, 2, 1, 0], [0, 0, 1, 2], [0, 1, 1, 2], [1e17] * 4, [0, 2, 1, 3]])
+def test_times_that_do_not_increase_are_named_by_every_command(times, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u,y\n" + "".join(f"{t!r},{i % 2},{i}\n" for i, t in enumerate(times)))
+    wrong = 2 + next(i for i in range(1, 4) if times[i] <= times[i - 1])
+    for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
+        with pytest.raises(DataError, match="do not increase") as found:
+            read(path)
+        assert found.value.diagnostics[0].location.line == wrong
+        assert "sample_time" not in found.value.diagnostics[0].hint
+
+
+def test_a_sample_time_of_the_file_is_positive(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, u=np.arange(40.0), y=np.arange(40.0), Ts=-1.0)
+    for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
+        with pytest.raises(DataError, match="states the sample time -1"):
+            read(path)

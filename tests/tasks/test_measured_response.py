@@ -42,6 +42,11 @@ def table(u, y):
     return columns | {"y1": y[:, 0]}
 
 
+def data_of(u, y):
+    time = np.arange(float(len(u)))
+    return Data(u=u, y=y, r=None, time=time, lengths=(len(u),), files=(), notes=())
+
+
 @pytest.mark.parametrize("text", [TEXT, TWO], ids=["one input", "two inputs"])
 def test_the_discs_hold_the_true_response(write, text):
     spec, u, y = recorded(text, 1)
@@ -82,7 +87,7 @@ def verdicts(admitted, number):
     found = []
     for seed in range(number):
         _, _, y = recorded_again(spec, u, seed)
-        data = Data(u, y, None, (len(u),), (), ())
+        data = data_of(u, y)
         by_lines = periodic_response(u, y, task.periods, task.grid.excited)
         found.append(_judged(task, by_lines, data, task.periods, 1).verdict)
     return found
@@ -138,8 +143,8 @@ def test_of_noise_alone_the_probability_is_uniform():
     found = []
     for seed in range(100):
         _, _, y = recorded_again(spec, u, seed)
-        silent = _silent(task, Data(u, y, None, (len(u),), (), ()), task.periods, 1)
-        found.append(silent.found["even"]["probability"][0])
+        silent = _silent(task, data_of(u, y), task.periods, 1)
+        found.append(silent["even"].probability[0])
     assert np.mean(found) == pytest.approx(0.5, abs=0.1)
     assert 0.02 < np.mean(np.array(found) < 0.1) < 0.2
 

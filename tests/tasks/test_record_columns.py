@@ -153,3 +153,40 @@ def test_hints_name_the_likely_mistake_first(setting, said):
     with pytest.raises(SpecError) as caught:
         parse_spec(STRUCTURE, overrides=[setting], design=False)
     assert re.search(said, caught.value.diagnostics[0].hint)
+
+
+@pytest.mark.parametrize("column", ["1", "Time", "TIME [s]", "time [s]"])
+def test_the_unit_of_a_column_counts_however_it_is_named(column, tmp_path):
+    path = tmp_path / "d.csv"
+    rows = "\n".join(
+        f"{2 * k},{u!r},{y!r}" for k, (u, y) in enumerate(zip(U.tolist(), Y.tolist(), strict=True))
+    )
+    path.write_text(f"Time [s],Valve (mA),level\n{rows}\n")
+    named = Preparation(columns={"time": column, "u1": "2", "y1": "3"})
+    spec = parse_spec(f"{STRUCTURE}channels: {{u1: {{name: valve, unit: '%'}}}}\n", design=False)
+    with pytest.raises(DataError, match="the times are in s, but the spec counts in min"):
+        identify(spec, path, preparation=named)
+    seconds = identify(spec.with_(time_unit="s"), path, preparation=named)
+    assert "Valve (mA) is in mA, the spec counts u1 in %: not converted" in seconds.result["notes"]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("degC", "\u00b0C", True),
+        ("\u2103", "deg C", True),
+        ("degrees C", "Celsius", True),
+        ("%", "percent", True),
+        ("s", "sec", True),
+        ("degC", "degF", False),
+        ("%", "mA", False),
+        ("deg", "degC", False),
+    ],
+)
+def test_spellings_of_one_unit_are_no_difference(one, other, same, tmp_path):
+    path = tmp_path / "d.csv"
+    rows = "\n".join(f"{u!r},{y!r}" for u, y in zip(U.tolist(), Y.tolist(), strict=True))
+    path.write_text(f"u,y ({other})\n{rows}\n", encoding="utf-8")
+    spec = parse_spec(f"{STRUCTURE}channels: {{y1: {{name: level, unit: '{one}'}}}}\n", design=False)
+    told = " ".join(identify(spec, path).result.get("notes", []))
+    assert ("not converted" in told) is not same

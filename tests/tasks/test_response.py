@@ -126,6 +126,26 @@ def test_simulated_deviations_are_those_designed_at_every_line(text):
         assert table[simulated] == pytest.approx(table[name], rel=0.05)
 
 
+def test_equal_lines_keep_lower_limits_too():
+    plain = solve(spec()).result
+    floor = 3.0 * plain["baseline"]["white"]["cost"]
+    result = solve(spec(limits__input_power={"min": floor})).result
+    assert result["cost"] == pytest.approx(floor, rel=1e-9)
+    assert result["baseline"]["white"]["cost"] == pytest.approx(floor, rel=1e-9)
+
+
+def test_a_record_that_limits_keep_from_the_accuracy_says_so():
+    need = solve(spec()).result["cost"]
+    result = solve(spec(limits__input_power=need * (1 + 1e-9))).result
+    assert result["signal"]["worst_ratio"] > 1.0001
+    assert any("leaks" in note for note in result["notes"])
+
+
+def test_one_run_has_no_deviation():
+    with pytest.raises(SpecError, match="single run"):
+        simulate(spec(simulation={"runs": 1}))
+
+
 def test_each_input_has_lines_of_its_own_powers():
     result = solve(spec(SEVERAL)).result
     powers = np.array(result["spectrum"]["powers"])
@@ -186,6 +206,7 @@ def test_lines_that_tell_nonlinearity_stay_silent():
         ({"accuracy.frequency_response.transient": 5}, "bad-period", "samples"),
         ({"accuracy.frequency_response.relative": None}, "missing-key", "frequency_response"),
         ({"objective": "best_accuracy"}, "needs-limits", "frequency_response"),
+        ({"experiment.samples": 10**8}, "too-large", "samples"),
         ({"uncertainty": {"intervals": {"b1": [0.3, 0.5]}}}, "not-supported", "uncertainty"),
     ],
 )  # fmt: skip

@@ -1,6 +1,7 @@
 """Met, missed or undecided: what `assess` says of records, right models and wrong ones."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,12 @@ from typer.testing import CliRunner
 from inputdesign_cli import assess, parse_spec
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.system import build_model
+from inputdesign_cli.tasks.result.nominal import from_nominal
 from tests.support.heater import HEATER, LAG, SLOW, covariance_of, heater, said
+
+UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
 
 
 def test_a_right_model_is_met(heater_record):
@@ -157,3 +163,21 @@ def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, he
         share = abs(factor - 1.0) / max(abs(factor), 1.0)
         assert nominal["worst_difference"] == pytest.approx(share, rel=0.15)
         assert "b7 is" in notes or "b6 is" in notes
+
+
+@pytest.mark.parametrize(
+    ("deviations", "contradicts"), [(0.5, False), (3.0, False), (4.5, True), (9.0, True)]
+)
+def test_a_far_estimate_contradicts_the_spec_by_its_statistic_alone(deviations, contradicts):
+    """Two parameters, one of them off: chi-squared is beyond its square with exp(-deviations^2 / 2)."""
+    nominal = build_model(parse_spec("plant: {B: [0, 1], F: [1, -0.7]}\n", design=False))
+    theta = nominal.theta + np.array([2.0, 0.0])
+    deviation = 2.0 / deviations
+    estimate = SimpleNamespace(theta=theta, covariance=deviation**2 * np.eye(2), names=["b1", "f1"])
+    error = SimpleNamespace(
+        grid=np.array([0.1]), entry=None, error_bound=lambda information, w: np.zeros(w.shape)
+    )
+    told, notes = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2))
+    assert told["probability"] == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
+    assert ("contradicts the plant" in notes[0]) == contradicts
+    assert ("does not contradict" in notes[0]) != contradicts

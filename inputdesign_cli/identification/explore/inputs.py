@@ -34,42 +34,49 @@ def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) ->
 
 
 def answers_output(parts: Sequence[tuple[Array, Array]]) -> list[tuple[int, float]]:
-    """Inputs that past outputs help to predict, with the probability of that by chance: a hint of a loop.
+    """Inputs that past noise of the outputs helps to predict, with the probability of that by chance.
 
-    Each input is regressed on its own past and the other inputs', then on the outputs' past as well
-    ([ljung-1999], Section 13.4); the test is that of the likelihood ratio.
+    That hints of a loop. Each input is regressed on its own past and the other inputs', then on past
+    innovations of the outputs as well ([ljung-1999], Section 13.4); the test is that of the likelihood ratio.
+    Not outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
+    would help to predict one that is held.
     """
     found = []
     r, p = parts[0][0].shape[1], parts[0][1].shape[1]
     lags = max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * (r + p))), 1)
+    centred = [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > 3 * lags]
+    if not centred:
+        return []
+    innovations = _innovations(centred, lags)
+    own = np.concatenate([_past(u, lags)[lags:] for u, _ in centred])
+    both = np.column_stack([own, np.concatenate([_past(e, lags) for e in innovations])])
     for j in range(r):
-        left = [0.0, 0.0]
-        samples = 0
-        blocks = []
-        for u, y in parts:
-            if len(y) <= 2 * lags:
-                continue
-            x, z = u - u.mean(axis=0), y - y.mean(axis=0)
-            past = [
-                np.stack([s[lags - lag : len(s) - lag] for lag in range(1, lags + 1)], axis=1).reshape(
-                    len(s) - lags, -1
-                )
-                for s in (x, z)
-            ]
-            blocks.append((past[0], past[1], x[lags:, j]))
-            samples += len(x) - lags
-        if not blocks:
-            continue
-        target = np.concatenate([t for _, _, t in blocks])
-        own = np.concatenate([a for a, _, _ in blocks])
-        both = np.column_stack([own, np.concatenate([b for _, b, _ in blocks])])
-        for k, columns in enumerate((own, both)):
-            solution = np.linalg.lstsq(columns, target, rcond=1e-10)[0]
-            left[k] = float(np.sum((target - columns @ solution) ** 2))
+        target = np.concatenate([u[2 * lags :, j] for u, _ in centred])
+        left = [_left_over(columns, target) for columns in (own, both)]
         if left[0] <= 1e-12 * float(np.sum(target**2)):
             continue  # the input follows from its own past: a deterministic signal
-        statistic = samples * np.log(left[0] / max(left[1], 1e-300))
+        statistic = len(target) * np.log(left[0] / max(left[1], 1e-300))
         probability = float(scipy.special.chdtrc(p * lags, statistic))
         if probability < _CERTAIN:
             found.append((j, probability))
     return found
+
+
+def _innovations(parts: Sequence[tuple[Array, Array]], lags: int) -> list[Array]:
+    """What past inputs and outputs do not tell of the outputs: (n - lags, p) of every part (n, ..)."""
+    rows = [np.column_stack([_past(u, lags), _past(y, lags)]) for u, y in parts]
+    columns, targets = np.concatenate(rows), np.concatenate([y[lags:] for _, y in parts])
+    solution = np.linalg.lstsq(columns, targets, rcond=1e-10)[0]
+    return [y[lags:] - own @ solution for (_, y), own in zip(parts, rows, strict=True)]
+
+
+def _past(signal: Array, lags: int) -> Array:
+    """(n - lags, lags channels): the samples before each of a signal (n, channels) but the first."""
+    shifted = [signal[lags - lag : len(signal) - lag] for lag in range(1, lags + 1)]
+    return np.stack(shifted, axis=1).reshape(len(signal) - lags, -1)
+
+
+def _left_over(columns: Array, target: Array) -> float:
+    """The sum of squares that a regression leaves."""
+    solution = np.linalg.lstsq(columns, target, rcond=1e-10)[0]
+    return float(np.sum((target - columns @ solution) ** 2))

@@ -12,6 +12,7 @@ from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.wording import count
 
 _SENSITIVITY = ("accuracy", "model_error", "sensitivity")
+_LOOP = ("accuracy", "loop")
 
 
 def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
@@ -26,19 +27,23 @@ def controller_fits(spec: Spec) -> Iterator[PathDiagnostic]:
 
 def kept_loop_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """So has the controller of a sensitivity that is to be kept."""
-    error = spec.accuracy.model_error
+    error, loop = spec.accuracy.model_error, spec.accuracy.loop
     controller = error.sensitivity.controller if error is not None and error.sensitivity is not None else None
     if controller is not None and spec.plant.kind != "regression":
         yield from _controller(spec.plant, controller, *_SENSITIVITY, "controller")
+    if loop is not None and loop.controller is not None and spec.plant.kind != "regression":
+        yield from _controller(spec.plant, loop.controller, *_LOOP, "controller")
 
 
 def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
     """A sensitivity is that of a loop."""
-    stated, own = spec.at(*_SENSITIVITY), spec.at(*_SENSITIVITY, "controller")
-    if stated is not None and own is None and not spec.closed_loop:
-        message = "{key} is that of a control loop, but there is no controller"
-        hint = "add experiment.controller, or a controller beside it for the loop to be kept"
-        yield PathDiagnostic("needs-controller", message, hint, _SENSITIVITY)
+    tuned = spec.at(*_LOOP, "tuning") is not None
+    for path, where in ((_SENSITIVITY, "beside it"), (_LOOP, "or tuning: {simc: {}} there")):
+        stated, own = spec.at(*path), spec.at(*path, "controller")
+        if stated is not None and own is None and not spec.closed_loop and not (path == _LOOP and tuned):
+            message = "{key} is that of a control loop, but there is no controller"
+            hint = f"add experiment.controller, or a controller {where} for the loop to be kept"
+            yield PathDiagnostic("needs-controller", message, hint, path)
 
 
 def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[PathDiagnostic]:

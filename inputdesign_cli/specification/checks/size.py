@@ -32,6 +32,7 @@ _PER_CHANNEL = {
 _BANDS = (
     ("limits", "band"),
     ("accuracy", "model_error", "band"),
+    ("accuracy", "loop", "band"),
     ("accuracy", "weighted_variance", "band"),
     ("accuracy", "frequency_response", "band"),
     ("spectrum", "band"),

@@ -29,6 +29,7 @@ from inputdesign_cli.specification.models.fields import (
     SemidefiniteMatrix,
     SymmetricMatrix,
 )
+from inputdesign_cli.specification.models.loop import LoopMargin
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
 from inputdesign_cli.specification.models.sizes import SIZES
@@ -253,6 +254,9 @@ class Accuracy(Section):
     model_error: ModelError | None = Field(
         default=None, description="Bound on the model error over frequency."
     )
+    loop: LoopMargin | None = Field(
+        default=None, description="Margin of a control loop, kept with every plant that the data leave over."
+    )
     information: Annotated[InformationTarget, Shorthand("matrix", {"type": "array"})] | None = Field(
         default=None, description="Lower bound on the information matrix."
     )
@@ -280,6 +284,22 @@ class Accuracy(Section):
     mean_squared_error: MeanSquaredError | None = Field(
         default=None, description="Mean-squared error with neglected regressors."
     )
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """A loop is kept by a bound on the model error: there is one."""
+        yield from self.at_most_one("model_error", "loop")
+
+    @property
+    def error(self) -> ModelError | None:
+        """The bound on the model error, stated or for the sake of the loop."""
+        if self.loop is None:
+            return self.model_error
+        confidence = None if self.loop.confidence is None else Confidence(ellipsoid=self.loop.confidence)
+        return ModelError(
+            sensitivity=Sensitivity(max_db=20.0 * math.log10(self.loop.peak)),
+            confidence=confidence,
+            band=self.loop.band,
+        )
 
     @property
     def requirements(self) -> tuple[str, ...]:

@@ -42,7 +42,15 @@ def build_rules(spec: Spec) -> Rules:
         power_cap=stated.power_cap,
         robust_last=stated.last == "robust",
         stops=stated.stop == "data",
+        rate=_rate(spec),
     )
+
+
+def _rate(spec: Spec) -> tuple[float, ...] | None:
+    """The largest move of each input; in a loop it is about u, and nothing is applied to u itself."""
+    if spec.limits.rate is None or spec.closed_loop:
+        return None
+    return tuple(np.broadcast_to(np.asarray(spec.limits.rate, dtype=float), (spec.plant.inputs,)).tolist())
 
 
 def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:

@@ -10,12 +10,19 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import is_time
+from inputdesign_cli.tasks.build.tables import is_time, named_columns
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
 TIME_UNITS = tuple(SECONDS)
 _UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
     unit: unit for unit in TIME_UNITS
+}
+_SPELLINGS = {
+    **dict.fromkeys(("celsius", "degcelsius", "\u2103", "c"), "degc"),
+    **dict.fromkeys(("fahrenheit", "degfahrenheit", "\u2109", "f"), "degf"),
+    **dict.fromkeys(("kelvin", "degk"), "k"),
+    **dict.fromkeys(("percent", "pct"), "%"),
+    **_UNITS,
 }
 _CHANNEL = re.compile(r"([uy])(\d+)(?![a-z0-9]).*")
 _WITH_UNIT = re.compile(r"(.*\S)\s*[(\[]([^)\]]*)[)\]]")
@@ -65,6 +72,16 @@ def with_names(sheet: Sheet, units: Units, preparation: Preparation) -> Preparat
     return replace(preparation, columns={**named, **preparation.columns}) if named else preparation
 
 
+def with_headers(sheet: Sheet, preparation: Preparation) -> Preparation:
+    """Columns that the user names by number, or by how they begin, by their whole names, which tell units."""
+    whole = {}
+    for channel, column in preparation.columns.items():
+        at = named_columns(sheet, column.strip().lower())
+        name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names else ""
+        whole[channel] = name if sheet.header.count(name.lower()) == 1 else column
+    return replace(preparation, columns=whole)
+
+
 def _split(header: str) -> tuple[str, str]:
     """The name and the unit of a column: `valve (%)` or `valve [%]`."""
     match = _WITH_UNIT.fullmatch(header.strip())
@@ -81,11 +98,17 @@ def other_units(sheet: Sheet, units: Units, preparation: Preparation) -> list[st
         for header in sheet.names:
             name, found = _split(header)
             ours = name.lower().split(" ")[0] in starts or header.strip().lower() in starts
-            if ours and unit and found and found.lower() != unit.lower():
+            if ours and unit and found and _plain_unit(found) != _plain_unit(unit):
                 told.append(
                     f"{header.strip()} is in {found}, the spec counts {channel} in {unit}: not converted"
                 )
     return told
+
+
+def _plain_unit(unit: str) -> str:
+    """One spelling of those that a unit has."""
+    plain = re.sub(r"degrees?|\u00b0", "deg", re.sub(r"[\s._]+", "", unit.lower()))
+    return _SPELLINGS.get(plain, plain)
 
 
 def reference_columns(units: Units, header: Sequence[str]) -> Sequence[str]:

@@ -126,7 +126,7 @@ def check_supported(spec: Spec) -> None:
 
 def _check_robust(spec: Spec, uncertainty: Uncertainty) -> None:
     """What is not designed for several plants at once."""
-    spectrum, error = spec.spectrum, spec.accuracy.model_error
+    spectrum, error = spec.spectrum, spec.accuracy.error
     columns = spectrum is not None and spectrum.type == "polynomial" and spectrum.factor_columns is not None
     if columns:
         what, hint = "hold a robust design to few factor columns", "remove spectrum.factor_columns"
@@ -171,12 +171,12 @@ def _grid_method(spec: Spec) -> GridMethod | None:
     """
     if spec.solver.method != "lmi":
         return None
-    error, stated = spec.accuracy.model_error, spec.limits
+    error, stated = spec.accuracy.error, spec.limits
     # Limits on single samples bind the signal, not the spectrum.
     limited = stated.model_dump(exclude={"amplitude", "rate"}, exclude_none=True)
     plain = (
         spec.goal == "least_cost"
-        and spec.accuracy.requirements == ("model_error",)
+        and spec.accuracy.requirements in (("model_error",), ("loop",))
         and error is not None
         and error.region == "first_order"
         and (spec.spectrum is None or spec.spectrum.type in ("fir", "white"))

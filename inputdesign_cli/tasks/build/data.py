@@ -14,15 +14,14 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.columns import (
     SECONDS,
-    channel_columns,
     other_units,
     reference_columns,
-    time_column,
     time_unit_of,
     unused_columns,
+    with_headers,
     with_names,
 )
-from inputdesign_cli.tasks.build.files import Sheet, read_sheet
+from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.preparation import (
     EVEN,
     MOST_JITTER,
@@ -35,7 +34,7 @@ from inputdesign_cli.tasks.build.preparation import (
     trend,
     whole_segments,
 )
-from inputdesign_cli.tasks.build.tables import columns_of, is_dated
+from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
 
 
 @dataclass(frozen=True)
@@ -95,70 +94,6 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
     )
 
 
-@dataclass(frozen=True)
-class Signals:
-    """What stands in the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
-
-    Attributes:
-        time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
-        dated: whether the times stand as dates; they are counted in seconds then.
-        inputs, outputs: what notes call the columns of u and y.
-    """
-
-    sheet: Sheet
-    time: Array
-    name: str
-    dated: bool
-    u: Array
-    y: Array
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-
-def signals_of(
-    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Sequence[str] = ()
-) -> Signals:
-    """The columns of so many channels; those of `references` follow the inputs.
-
-    Raises:
-        DataError: a column is missing, or holds text or nothing.
-    """
-    wanted = {
-        **channel_columns("u", inputs, sheet, preparation),
-        **channel_columns("y", outputs, sheet, preparation),
-        **{name: name for name in references},
-        **time_column(sheet, preparation),
-    }
-    found = columns_of(sheet, wanted)
-    for role, numbers in found.items():
-        if np.isnan(numbers).all():
-            message = f"the column {wanted[role]} holds no number"
-            raise DataError(sheet.error("data-not-a-number", message, "is it another column?", 0))
-    rows = np.arange(preparation.skip, len(sheet.lines))
-    time = found.get("time", np.arange(len(sheet.lines), dtype=float))
-    if preparation.span is not None:
-        begin, end = preparation.span
-        scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
-        rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
-    if not rows.size:
-        message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
-        raise DataError.because("data-unreadable", message, "mind --skip and --range", sheet.key)
-    kept = replace(
-        sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
-    )
-    driving = (*_labels("u", inputs), *references)
-    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
-    y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
-    name = wanted.get("time", "")
-    dated = bool(name) and is_dated(sheet, name)
-    return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
-
-
-def _labels(letter: str, count: int) -> tuple[str, ...]:
-    """What notes call channels: u, or u1, u2, .. of several."""
-    return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
-
-
 def prepared(
     signals: Signals, step: float, time_unit: str, preparation: Preparation
 ) -> tuple[list[Segment], list[str]]:
@@ -169,16 +104,10 @@ def prepared(
         time_unit: of the times, for messages.
 
     Raises:
-        DataError: `data-not-uniform`, the times run backwards or jitter too much.
+        DataError: `data-not-uniform`, the times jitter too much.
     """
     sheet, rows, told = signals.sheet, signals.sheet.lines, list[str]()
     time = signals.time if signals.name else signals.time * step
-    backwards = np.flatnonzero(np.diff(time) <= 0.0)
-    if backwards.size:
-        row = int(backwards[0]) + 1
-        message = f"the time goes from {time[row - 1]:.10g} to {time[row]:.10g} {time_unit}"
-        hint = "sort the rows, and keep one of those with the same time"
-        raise DataError(sheet.error("data-not-uniform", message, hint, row))
     for names, values in ((signals.inputs, signals.u), (signals.outputs, signals.y)):
         for name, x in zip(names, values.T, strict=True):
             there = ~np.isnan(x)
@@ -231,7 +160,7 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
     """One file, which the notes name if asked to."""
     sheet = read_sheet(path, key="")
     references = reference_columns(units, sheet.header)
-    preparation = with_names(sheet, units, preparation)
+    preparation = with_names(sheet, units, with_headers(sheet, preparation))
     signals = signals_of(sheet, units.inputs, units.outputs, preparation, references)
     unit = "s" if signals.dated else preparation.time_unit
     if unit is not None and signals.name:
@@ -306,7 +235,7 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
-    stated = preparation.sample_time or sheet.sample_time
+    stated = stated_step(sheet, preparation)
     typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
     if abs(typical - units.sample_time) <= (EVEN if stated else MOST_JITTER) * units.sample_time:
         return

@@ -80,7 +80,7 @@ def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:
         raise _too_large(spec, "spectrum", known, f"{_MOST_BYTES // (8 * size**2)} unknowns")
     accuracy = spec.accuracy
     inequalities = len(accuracy.standard_deviation or ()) + (_CRITERION if accuracy.criterion else 0)
-    if accuracy.model_error is not None or accuracy.weighted_variance is not None:
+    if accuracy.error is not None or accuracy.weighted_variance is not None:
         inequalities += _CUTS
 
     def seconds(parameters: int) -> float:

@@ -33,7 +33,11 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
         f"{'y' if found.model.outputs == 1 else f'y{i + 1}'}: {c.orders.family}"
         for i, c in enumerate(found.taken)
     )
-    names = ", ".join(f"{channel} is {column}" for channel, column in log.names.items() if channel != "time")
+    names = ", ".join(
+        f"{channel} is {' '.join(column.split())}"
+        for channel, column in log.names.items()
+        if channel != "time"
+    )
     samples = min(len(log.y), _MOST_SAMPLES)
     limit = _number(power[0]) if single else f"[{', '.join(map(_number, power))}]"
     offset = levels[0] if single else levels

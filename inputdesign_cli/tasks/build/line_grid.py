@@ -16,6 +16,7 @@ from inputdesign_cli.signal.harmonic_grid import (
     thinned,
 )
 from inputdesign_cli.specification import FrequencyResponse, Spec
+from inputdesign_cli.specification.models.sizes import most
 from inputdesign_cli.tasks.response import KEY
 
 # Beside the transient, periods of a block where nothing is said: their scatter tells the noise.
@@ -81,6 +82,14 @@ def build_periods(spec: Spec) -> Periods:
             "bad-period",
             f"a period of {period} samples has no harmonic between 0 and the Nyquist frequency",
             hint="take more samples, or fewer periods",
+            key="experiment.samples",
+        )
+    longest = most("signal.samples")
+    if not shortest and blocks * times * period > longest:
+        raise bad_spec(
+            "too-large",
+            f"the record has {blocks * times * period} samples, and at most {longest} are computed",
+            hint=f"write experiment.samples: {longest} or less",
             key="experiment.samples",
         )
     return Periods(period, blocks, skip)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.columns import time_unit_of
-from inputdesign_cli.tasks.build.data import prepared, signals_of
+from inputdesign_cli.tasks.build.columns import time_unit_of, with_headers
+from inputdesign_cli.tasks.build.data import prepared
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.signals import signals_of, stated_step
 
 _CHANNELS = {
     "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
@@ -58,13 +59,13 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         DataError: the file cannot be read, or does not tell its inputs and outputs.
     """
     sheet = read_sheet(path, key="")
-    columns = dict(preparation.columns) or channels_by_name(sheet)
+    columns = preparation.columns or channels_by_name(sheet)
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
-    given = Preparation(**{**vars(preparation), "columns": columns})
+    given = with_headers(sheet, replace(preparation, columns=columns))
     signals = signals_of(sheet, counts["u"], counts["y"], given)
-    unit = preparation.time_unit or time_unit_of(signals.name) or "s"
+    unit = "s" if signals.dated else preparation.time_unit or time_unit_of(signals.name) or "s"
     told = []
-    stated = preparation.sample_time or sheet.sample_time
+    stated = stated_step(sheet, preparation)
     if signals.name and not preparation.sample_time:
         step = _typical(signals.time)
     elif stated:
@@ -72,16 +73,16 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     else:
         step = 1.0
         told.append("the file has no times and no --sample-time was given: the sample time is taken for 1")
-    if not np.isfinite(step) or step <= 0.0:
-        message = f"the times of {path.name} do not increase"
-        hint = "sort the rows, or say which column holds the time: --columns time=1"
+    if not np.isfinite(step):
+        message = f"{path.name} has one time only, which tells no sample time"
+        hint = "give it: --sample-time 0.5; or say which column holds the time: --columns time=1"
         raise DataError(sheet.error("data-not-uniform", message, hint, 0))
     segments, notes = prepared(signals, step, unit, given)
     return Log(
         np.concatenate([part.u for part in segments]),
         np.concatenate([part.y for part in segments]),
         tuple(len(part.y) for part in segments),
-        {name: _shown(sheet, column) for name, column in columns.items()},
+        dict(given.columns),
         step,
         unit,
         (*told, *notes),
@@ -99,7 +100,7 @@ def channels_by_name(sheet: Sheet) -> dict[str, str]:
     return found
 
 
-def _count(sheet: Sheet, letter: str, columns: dict[str, str]) -> int:
+def _count(sheet: Sheet, letter: str, columns: Mapping[str, str]) -> int:
     """How many inputs or outputs; they are numbered from one on.
 
     Raises:
@@ -118,11 +119,6 @@ def _count(sheet: Sheet, letter: str, columns: dict[str, str]) -> int:
         message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
     hint = 'name them, or give their numbers: --columns "time=1,u1=2,y1=3"'
     raise DataError(sheet.error("data-missing-column", message, hint))
-
-
-def _shown(sheet: Sheet, column: str) -> str:
-    number = int(column) if column.isdecimal() else 0
-    return sheet.names[number - 1] if 0 < number <= len(sheet.names) else column
 
 
 def _typical(time: Array) -> float:

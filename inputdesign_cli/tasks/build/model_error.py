@@ -21,16 +21,20 @@ from inputdesign_cli.accuracy import (
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, Rational
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
+from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_loop
 from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
+from inputdesign_cli.tasks.build.tuning import loop_controller
 from inputdesign_cli.tasks.build.weights import build_weight, rational
 
 _KEY = "accuracy.model_error"
+_LOOP = "accuracy.loop"
 _GROWS = 5.0
 
 
@@ -41,7 +45,7 @@ def confidence_factor(probability: float, parameters: int) -> float:
 
 def model_error_alpha(spec: Spec, model: Model) -> float:
     """alpha as given, or from the confidence and the number of parameters of G."""
-    error = spec.accuracy.model_error
+    error = spec.accuracy.error
     if error is not None and error.alpha is not None:
         return error.alpha
     probability = (error.probability if error is not None else None) or DEFAULT_CONFIDENCE
@@ -50,7 +54,7 @@ def model_error_alpha(spec: Spec, model: Model) -> float:
 
 def build_calibration(spec: Spec) -> Calibration | None:
     """How alpha is calibrated where `confidence: {exact: ..}` asks for that."""
-    error = spec.accuracy.model_error
+    error = spec.accuracy.error
     stated = None if error is None else error.calibrated
     if stated is None or stated.exact is None:
         return None
@@ -70,9 +74,9 @@ def required_band(
 def build_model_errors(
     spec: Spec, experiment: Experiment, nominal: Model | None = None
 ) -> list[OnModelError]:
-    """`accuracy.model_error` in raw coordinates: one an entry of G that is not zero, or one of the norm.
+    """The bound on the model error, stated or of a loop, in raw coordinates.
 
-    Empty when it is not asked for.
+    One an entry of G that is not zero, or one of the norm; empty when it is not asked for.
 
     Args:
         nominal: where the experiment is on a scenario, the plant of the spec: r_adm may be that of the one or
@@ -82,7 +86,7 @@ def build_model_errors(
         SpecError: the form is not supported, or r_adm is not positive somewhere in the band.
         DataError: the table cannot be used.
     """
-    error = spec.accuracy.model_error
+    error = spec.accuracy.error
     if error is None:
         return []
     band = required_band(spec, experiment, error.band)
@@ -128,11 +132,30 @@ def _on_entry(
             against="absolute" if error.relative is None else "relative",
         )
     if nominal is None:
-        check_bounded(spec, made, _KEY)
+        check_bounded(spec, made, _KEY if spec.accuracy.loop is None else _LOOP)
     if nominal is None or not _has_floor(spec):
         units = build_units(spec)
-        check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
+        try:
+            check_positive(admissible, made.grid, unit=units.frequency, named=units.per_time)
+        except SpecError as missed:
+            raise _too_much(spec, admissible, made) or missed from missed
     return made
+
+
+def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
+    """What to say of a margin that the loop does not even have with the nominal plant."""
+    stated = spec.accuracy.loop
+    if stated is None or not isinstance(admissible, Sensitivity):
+        return None
+    peak = float(np.max(admissible.nominal(made.grid)))
+    more = 20.0 * np.log10(1.2 * peak)
+    return spec.complain(
+        "admissible-not-positive",
+        f"with the nominal plant |S| of the loop reaches {peak:.4g} already, and the margin asks for "
+        f"{stated.peak:.4g} at most",
+        hint=f"tune the controller more slowly (a larger tau_c), or write max_sensitivity_db: {more:.2g}",
+        key=_LOOP,
+    )
 
 
 def _has_floor(spec: Spec) -> bool:
@@ -261,7 +284,11 @@ def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str
 
 def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
     asked = error.sensitivity
-    given = None if asked is None else asked.controller or spec.experiment.controller
+    loop_kept = spec.accuracy.loop
+    if loop_kept is not None:
+        given = loop_controller(spec, loop_kept)
+    else:
+        given = None if asked is None else asked.controller or spec.experiment.controller
     if asked is None or given is None:
         raise ValueError("the spec has been checked: a bound on the sensitivity has a loop")
     loop = build_loop(spec, model, given)
@@ -270,9 +297,19 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
             "no-feedback",
             "the controller is zero: no model error can harm the sensitivity",
             hint="give the controller of the loop to be kept",
-            key=f"{_KEY}.sensitivity",
+            key=f"{_KEY}.sensitivity" if loop_kept is None else _LOOP,
         )
     if asked.weight is not None:
         return Sensitivity(loop, rational(asked.weight))
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
-    return Sensitivity(loop, Rational.build([peak]))
+    settings = _settings(given) if loop_kept is not None else None
+    return Sensitivity(loop, Rational.build([peak]), settings)
+
+
+def _settings(controller: Controller) -> dict[str, float] | None:
+    """Those of a PID controller; none of others."""
+    if controller.kind != "pid":
+        return {}
+    stated = controller.pid
+    listed = {"Kp": stated.Kp, "Ti": stated.Ti, "Td": stated.Td or None}
+    return {name: value for name, value in listed.items() if value is not None}

@@ -160,7 +160,7 @@ def limits_of_sensor(name: str, x: Array) -> list[str]:
                 )
     step = float(np.min(np.diff(levels), initial=np.inf))
     spread = float(np.std(x))
-    if np.isfinite(step) and step > _COARSE * spread:
+    if np.isfinite(step) and step > _COARSE * spread > 0.0:
         told.append(
             f"{name} is rounded to steps of {step:.3g}, {step / spread:.2f} of its standard deviation"
         )

@@ -45,7 +45,7 @@ def build_requirements(
     """
 
     def made(key: str) -> list[RequirementFactory]:
-        if key == "model_error" and nominal is not None:
+        if key in ("model_error", "loop") and nominal is not None:
             return [_maker(error) for error in build_model_errors(spec, experiment, nominal)]
         return BUILDERS[key](spec, experiment)
 
@@ -99,7 +99,7 @@ def stated_bounds(spec: Spec) -> list[StatedBound]:
     None for a bound over the whole confidence ellipsoid: its error is not in proportion to any of them.
     """
     accuracy, found = spec.accuracy, list[StatedBound]()
-    error, variance = accuracy.model_error, accuracy.weighted_variance
+    error, variance = accuracy.error, accuracy.weighted_variance
     if error is not None and error.region == "ellipsoid":
         return []
     if error is not None:
@@ -203,6 +203,7 @@ def _check_nowhere_zero(spec: Spec, variance: WeightedVariance) -> None:
 
 BUILDERS: dict[str, Callable[[Spec, Experiment], list[RequirementFactory]]] = {
     "model_error": _model_errors,
+    "loop": _model_errors,
     "information": _information,
     "application": _application,
     "weighted_variance": _weighted_variances,

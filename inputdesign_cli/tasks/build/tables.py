@@ -46,7 +46,7 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     Raises:
         DataError: `data-missing-column` or `data-not-a-number`.
     """
-    found = {role: _named(sheet, start.strip().lower()) for role, start in wanted.items()}
+    found = {role: named_columns(sheet, start.strip().lower()) for role, start in wanted.items()}
     wrong = [
         _unclear(sheet, what, [wanted[role] for role in roles])
         for what, roles in (
@@ -75,7 +75,7 @@ def is_time(name: str) -> bool:
 
 def is_dated(sheet: Sheet, name: str) -> bool:
     """Whether a column holds dates, as seconds since the first."""
-    return sheet.columns[_named(sheet, name.strip().lower())[0]].dated
+    return sheet.columns[named_columns(sheet, name.strip().lower())[0]].dated
 
 
 def read_header(path: Path, *, key: str) -> list[str]:
@@ -87,8 +87,8 @@ def read_header(path: Path, *, key: str) -> list[str]:
     return read_sheet(path, key=key).header
 
 
-def _named(sheet: Sheet, start: str) -> list[int]:
-    """The columns of this name, otherwise those whose names begin with it (u1 is not u10), or of a number."""
+def named_columns(sheet: Sheet, start: str) -> list[int]:
+    """Where columns of this name are, else those that begin with it (u1 is not u10), or that of a number."""
     header = sheet.header
     exact = [i for i, name in enumerate(header) if name == start]
     if exact:

@@ -12,22 +12,15 @@ from numpy.typing import NDArray
 from inputdesign_cli.design.response import ResponseLines
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.identification.periodic_response import Periods
+from inputdesign_cli.identification.silent_lines import SilentLines
 from inputdesign_cli.runs.curves import Curves, DeviationCurves, DeviationPanel, ResponseCurves
 from inputdesign_cli.runs.results import Array, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
 
 Verdict = Literal["met", "missed", "undecided"]
-# Silent lines whose probability is below this speak.
-_SPEAKS = 0.01
-
-
-@dataclass(frozen=True)
-class SilentLines:
-    """By kind, odd or even: how much the outputs have at lines that the input does not excite."""
-
-    found: Mapping[str, Json]
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,7 @@ def measured_results(
     found: FrequencyResponse,
     shown: tuple[Table, ResponseCurves, dict[str, Json]],
     judged: Judged | None,
-    silent: SilentLines | None,
+    silent: Mapping[str, SilentLines],
     data: Data,
     seconds: float,
     *,
@@ -106,9 +99,9 @@ def measured_results(
         }
         columns, panels = _deviations(header, judged, w)
         tables["deviations"], drawn["deviations"] = Table(columns), DeviationCurves(panels)
-    if silent is not None:
-        entry["nonlinearity"] = dict(silent.found)
-        notes += _spoken(silent)
+    if silent:
+        entry["nonlinearity"] = silent_entry(silent)
+        notes += silent_notes(silent)
     if assess and judged is not None:
         assessment = _assessment(header, judged, w)
         result |= {"status": judged.verdict, "assessment": assessment}
@@ -161,18 +154,3 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
         else:
             entry["no_top_up"] = f"repeat the record: {enough}"
     return entry
-
-
-def _spoken(silent: SilentLines) -> list[str]:
-    """What silent lines say of the plant, in sentences."""
-    notes = []
-    for kind, entry in silent.found.items():
-        chance = min(np.atleast_1d(entry["probability"]))
-        if chance < _SPEAKS:
-            level = ", ".join(f"{value:.3g}" for value in np.atleast_1d(entry["rms"]))
-            notes.append(
-                f"the outputs answer at {kind} lines that are not excited (rms {level}, probability of "
-                f"chance {chance:.2g}): a nonlinearity of {kind} degree, or an input that was not applied as "
-                "recorded"
-            )
-    return notes

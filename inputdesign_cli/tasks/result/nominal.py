@@ -17,6 +17,8 @@ from inputdesign_cli.runs.units import Units
 
 # Farther apart than this share of the larger of the two, and than so many r_u, G is that of another plant.
 _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
+# A statistic that chance exceeds more often than this contradicts nothing.
+_CHANCE = 1e-3
 _AWAY = 4.0
 _LISTED = 4
 
@@ -62,6 +64,17 @@ def from_nominal(
     told |= {"worst_difference": worst.share, "opposite_sign": any(o.opposite for p in found for o in p)}
     if worst.share <= _ANOTHER:
         return told, []
+    sign = "of the opposite sign at low frequency, and " if told["opposite_sign"] else ""
+    apart = (
+        f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
+        f"{worst.frequency:.4g} {units.per_time} (chi-squared {statistic:.4g} with {of_plant.size} "
+        "degrees of freedom"
+    )
+    if told["probability"] > _CHANCE:
+        return told, [
+            "the estimate is far from the plant of the spec, but so uncertain that it does not contradict "
+            f"it: {apart}, probability {told['probability']:.2g}). A longer record would tell"
+        ]
     deviations = np.abs(away) / scale
     listed = [
         f"{estimate.names[of_plant[k]]} is {estimate.theta[of_plant[k]]:.4g}, not "
@@ -69,14 +82,10 @@ def from_nominal(
         for k in np.argsort(-deviations)[:_LISTED]
         if deviations[k] > _AWAY
     ]
-    sign = "of the opposite sign at low frequency, and " if told["opposite_sign"] else ""
     return told, [
-        f"the estimate contradicts the plant of the spec: G{worst.entry} is {sign}up to "
-        f"{100 * worst.share:.0f} % of the larger one apart at {worst.frequency:.4g} {units.per_time} "
-        f"(chi-squared {statistic:.4g} with {of_plant.size} degrees of freedom"
-        f"{'; ' * bool(listed)}{', '.join(listed)}). The design rested on the plant of the spec; what is "
-        "admitted here is that of the estimate. Check signs and units of the record; if they are right, put "
-        "the estimate into the spec"
+        f"the estimate contradicts the plant of the spec: {apart}{'; ' * bool(listed)}{', '.join(listed)}). "
+        "The design rested on the plant of the spec; what is admitted here is that of the estimate. Check "
+        "signs and units of the record; if they are right, put the estimate into the spec"
     ]
 
 

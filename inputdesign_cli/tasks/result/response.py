@@ -135,6 +135,8 @@ def _objective(terms: ResponseTerms, plan: Planned) -> dict[str, Json]:
     flat = float(np.max(problem.needed)) * np.ones(problem.needed.size)
     white: dict[str, Json]
     if terms.goal == "cost":
+        rows, floors = problem.lower
+        flat = flat * float(np.max(floors / (rows @ (flat / problem.needed)), initial=1.0))
         cost = float(problem.price @ flat)
         white = {"cost": cost, "ratio": cost / value, "power": _power(terms, flat.reshape(plan.powers.shape))}
     else:
@@ -219,6 +221,13 @@ def _notes(terms: ResponseTerms, plan: Planned, result: dict[str, Json]) -> list
         notes.append(
             f"what the start leaves shifts the response by {plan.shift:.2g} standard deviations at most: "
             "raise accuracy.frequency_response.transient, or take a longer period"
+        )
+    ratio = plan.record.worst_ratio
+    if terms.goal in ("cost", "samples") and ratio > 1.0 + _ROUNDING:
+        notes.append(
+            f"the record leaves {ratio:.7g} times the deviation admitted, by the noise that leaks through "
+            "its finite length, and the limits leave no room to make up for it: a little more power or a few "
+            "more periods would do"
         )
     if terms.goal != "samples" and plan.length < terms.asked:
         times = terms.periods.blocks * terms.periods.each(plan.length)

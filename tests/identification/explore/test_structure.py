@@ -118,6 +118,17 @@ def test_a_loop_is_noticed_and_an_open_one_is_not():
     assert answers_output([(free[:, None], driven[:, None])]) == []
 
 
+@pytest.mark.parametrize("hold", [5, 20, 60])
+@pytest.mark.parametrize("pole", [0.7, 0.99])
+def test_an_input_that_is_held_is_no_answer(hold, pole):
+    """Its own past predicts it badly where that is cut off, and a plant that remembers it tells more."""
+    rng = np.random.default_rng(hold)
+    u = np.sign(rng.standard_normal(20000 // hold)).repeat(hold)
+    e = scipy.signal.lfilter([1.0], [1.0, -0.8], 0.3 * rng.standard_normal(u.size))
+    y = scipy.signal.lfilter([0.0, 0.0, 1.0 - pole], [1.0, -pole], u) + e
+    assert answers_output([(u[:, None], y[:, None])]) == []
+
+
 def test_sinusoids_excite_twice_their_number():
     t = np.arange(400.0)
     u = sum(np.sin(2.0 * np.pi * k / 400.0 * t + k) for k in (25, 70, 130))

@@ -1,0 +1,252 @@
+"""Writes docs/tutorial.md: plays the board, calls `idesign` as a user would, keeps what it says and draws.
+
+    python docs/make_tutorial.py [DIR]
+
+The log is real. The experiments that follow it are played by the physics of the board, fitted to the log here
+and known to the tool only through its data, with the noise that the log has.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import scipy.optimize
+import scipy.signal
+
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Table
+from inputdesign_cli.runs.text_formats import csv_text, read_csv
+
+DOCS = Path(__file__).parent
+LOG = DOCS / "data" / "tclab" / "two_heaters.txt"
+PAGE = "tutorial.md"
+WIDTH = 112
+# The noise of the log, as `explore` finds it, and the sensor's last digit.
+NOISE_C, NOISE_A, VARIANCE, DIGIT = [1.0, -1.123, 0.471], [1.0, -1.799, 0.8026], 0.0044, 0.03
+# Heat capacity (J/K), area (m^2) and emissivity of a heater; Stefan and Boltzmann's constant.
+CAPACITY, AREA, EMISSIVITY, RADIATION = 2.0, 1.2e-3, 0.9, 5.67e-8
+STEPS = 4  # of integration, in a sample
+SETTLED = 400  # samples at the operating point before an experiment
+
+TEXT = """\
+# From a log to an assessed experiment
+
+A log of a small board, two heaters with two temperature sensors, leads to an experiment whose model is as
+accurate as asked, with a verdict on the data. Computing takes half a minute, the experiments as long as
+heating takes.
+
+`python docs/make_tutorial.py` runs the commands below and writes this page; a test runs it. The log is real
+([its origin](data/README.md)). The two experiments are played: by an energy balance of the board
+(convection, radiation, the sensor's lag) that is fitted to the log, with the noise of the log. The tool
+sees the data only.
+
+## 1. What is in the log
+
+Ten minutes, a row about every three seconds, with jitter; both heaters were switched. Heater 1 and
+temperature 1 are what we want a model of:
+
+{explore}
+
+One command reads the file, evens out the jitter and tells that it did, finds the delay and the orders on
+one part of the record, and judges them on the other:
+
+![fit of the model to the log](images/tutorial_log_fit.png)
+
+The model that it chose explains {validated} of temperatures that it has not seen. It also writes
+`found/spec.yaml`: plant, noise, levels and limits as in the log, ready for a design. How good is the model?
+The data alone say where G may be at each frequency (shaded), and how the model goes through it:
+
+![frequency response of the log, without a model and by the model](images/tutorial_log_frequency_response.png)
+
+Ten minutes of this input tell little where a controller would act.
+
+## 2. The shortest experiment
+
+We ask for errors below 15 % of |G| from 0.003 to 0.04 rad/s, with 95 % confidence, and allow the heater 20
+to 80 %. How long must it run?
+
+{solve}
+
+White excitation of that power would take {white} samples where the best spectrum takes {spectrum}; a record
+that keeps within 20 and 80 % takes {record}. It has two levels, and its power where it teaches something:
+
+![the signal](images/tutorial_design_signal.png)
+
+![the model error that it buys](images/tutorial_design_bound.png)
+
+## 3. The experiment
+
+`design/signal.csv` is applied to the board, which was left to settle at 50 %, and the temperature is
+recorded beside it, in `first.csv`. Do these data meet the target?
+
+{first}
+
+They miss it: exit code 1. The log had told the fast part of the plant badly, so that the design stood on a
+wrong model; the new data tell it better, and at the new estimate the error is {ratio} times what is
+admitted. That is what assessing is for. The same command has designed what makes up for it: the shortest
+record that, after these data, meets the target.
+
+![the error that the first experiment leaves](images/tutorial_first_data_bound.png)
+
+## 4. The top-up
+
+`first_assessed/signal.csv` is applied in the same way. Both records are estimated jointly:
+
+{second}
+
+Met: exit code 0. The model, with its covariance, is `second_assessed/model.yaml`.
+
+![the error that both experiments leave](images/tutorial_second_bound.png)
+
+![fit of the model to both experiments](images/tutorial_second_fit.png)
+
+What an accuracy may be is in [questions.md](questions.md), what verdicts rest on in
+[identification.md](identification.md); a response without any model is measured as
+[frequency_response.md](frequency_response.md) tells.
+"""
+
+TARGET = (
+    "accuracy={model_error: {relative: 0.15, band: [0.003, 0.04]}}",
+    "limits={amplitude: 30}",
+    "objective=shortest_experiment",
+    "spectrum={type: multisine, lines: 200}",
+    "signal={type: binary, seed: 1, offset: 50}",
+)
+
+
+def answer(q: Array, other: Array, step: float, parameters: Array, start: float) -> Array:
+    """The sensor (n,) for heater powers q (n,) in per cent; `other` (n,) are temperatures beside it."""
+    loss, gain, lag, room, coupling = parameters
+    heater = sensor = start
+    found = np.empty(q.size)
+    for k in range(q.size):
+        found[k] = sensor
+        for _ in range(STEPS):
+            radiated = (room + 273.15) ** 4 - (heater + 273.15) ** 4
+            flow = loss * AREA * (room - heater) + EMISSIVITY * RADIATION * AREA * radiated
+            heater += step / STEPS * (flow + gain * q[k] + coupling * (other[k] - heater)) / CAPACITY
+            sensor += step / STEPS * (heater - sensor) / lag
+    return found
+
+
+def fitted_board() -> tuple[Array, float]:
+    """Loss, gain, lag, room temperature and coupling of the board in the log, and its sample time."""
+    time, u1, _, y1, y2 = np.loadtxt(LOG, delimiter=",", skiprows=1).T
+    step = float(np.mean(np.diff(time)))
+    fit = scipy.optimize.least_squares(
+        lambda p: answer(u1, y2, step, p, y1[0]) - y1,
+        [10.0, 0.01, 20.0, 21.0, 0.005],
+        x_scale=[10.0, 0.01, 20.0, 20.0, 0.01],
+    )
+    return np.asarray(fit.x), step
+
+
+def experiment(signal: Path, record: Path, seed: int) -> None:
+    """Apply a signal to the settled board and write the record; the control loop takes a sample to act."""
+    parameters, step = fitted_board()
+    applied = read_csv(signal)
+    time, u = applied["time_s"], applied["u1"]
+    q = np.concatenate([np.full(SETTLED + 1, u.mean()), u[:-1]])
+    room = float(parameters[3])
+    y = answer(q, np.full(q.size, room), step, parameters, room)[SETTLED:]
+    e = np.sqrt(VARIANCE) * np.random.default_rng(seed).standard_normal(u.size + 500)
+    y = np.round((y + scipy.signal.lfilter(NOISE_C, NOISE_A, e)[500:]) / DIGIT) * DIGIT
+    record.write_text(csv_text(Table({"time_s": time, "u1": u, "y1": y})), encoding="utf-8")
+
+
+class Terminal:
+    """Runs commands in a folder and shows them as a page does, the lines that begin with `kept` words."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def run(self, *words: str, kept: tuple[str, ...], code: int = 0) -> tuple[str, str]:
+        """The block of a page, and the whole output; the exit code must be as expected."""
+        done = subprocess.run(
+            [sys.executable, "-m", "inputdesign_cli", *words],
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != code:
+            raise SystemExit(f"idesign {' '.join(words)}: exit code {done.returncode}\n{done.stderr}")
+        lines, keeps = [], False
+        for line in done.stdout.splitlines():
+            keeps = line.startswith(kept) if not line.startswith(" ") else keeps
+            if keeps:
+                lines.append(line if len(line) <= WIDTH else line[: WIDTH - 3].rsplit(" ", 1)[0] + " ..")
+        return f"```\n$ {command(words)}\n" + "\n".join(lines) + "\n```", done.stdout
+
+
+def command(words: tuple[str, ...]) -> str:
+    """A command as one types it, an option with its value to a line where it is long."""
+    typed = [f'"{word}"' if re.search(r"[\s{}=,]", word) else word for word in words]
+    text = " ".join(["idesign", *typed])
+    if len(text) <= WIDTH - 2:
+        return text
+    head = typed[: next(n for n, word in enumerate(typed) if word.startswith("-"))]
+    pairs = typed[len(head) :]
+    rest = [f"    {option} {value}" for option, value in zip(pairs[::2], pairs[1::2], strict=True)]
+    return " \\\n".join([" ".join(["idesign", *head]), *rest])
+
+
+def keep(run: Path, images: Path, **figures: str) -> None:
+    """Copy figures of a run beside the page."""
+    for name, target in figures.items():
+        shutil.copy(run / f"{name}.png", images / f"tutorial_{target}.png")
+
+
+def tutorial(folder: Path, images: Path) -> str:
+    """The page; its runs go into `folder`, its figures into `images`."""
+    shutil.copy(LOG, folder / LOG.name)
+    terminal, found = Terminal(folder), {}
+    columns = "time=1,u1=Heater 1,y1=Temperature 1"
+    found["explore"], said = terminal.run(
+        *("explore", LOG.name, "--columns", columns, "-o", "found"),
+        kept=("estimate", "noise", "fit", "validated", "residuals", "note", "files"),
+    )
+    (found["validated"],) = re.findall(r"validated +simulation explains ([\d.]+ %)", said)
+    changes = [word for change in TARGET for word in ("--set", change)]
+    found["solve"], said = terminal.run(
+        *("solve", "found/spec.yaml", *changes, "-o", "design"),
+        kept=("asked", "samples", "power", "model error", "signal", "proved", "note"),
+    )
+    (found["white"],) = re.findall(r"white excitation: (\d+)", said)
+    (found["spectrum"],) = re.findall(r"spectrum alone would take (\d+)", said)
+    (found["record"],) = re.findall(r"signal +(\d+) samples", said)
+    shown = ("estimate", "assessed", "verdict", "signal", "files")
+    experiment(folder / "design" / "signal.csv", folder / "first.csv", seed=1)
+    found["first"], said = terminal.run(
+        *("assess", "design/spec.yaml", "first.csv", "-o", "first_assessed"), kept=shown, code=1
+    )
+    (found["ratio"],) = re.findall(r"that these data give is ([\d.]+) of", said)
+    experiment(folder / "first_assessed" / "signal.csv", folder / "second.csv", seed=11)
+    found["second"], _ = terminal.run(
+        *("assess", "design/spec.yaml", "first.csv", "second.csv", "-o", "second_assessed"), kept=shown
+    )
+    keep(folder / "found", images, fit="log_fit", frequency_response="log_frequency_response")
+    keep(folder / "design", images, signal="design_signal", bound="design_bound")
+    keep(folder / "first_assessed", images, data_bound="first_data_bound")
+    keep(folder / "second_assessed", images, bound="second_bound", fit="second_fit")
+    page = TEXT
+    for name, text in found.items():
+        page = page.replace(f"{{{name}}}", text)
+    return page
+
+
+def main() -> None:
+    """The page and its figures in docs, its runs in DIR (default runs/tutorial)."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS.parent / "runs" / "tutorial"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (DOCS / PAGE).write_text(tutorial(folder, DOCS / "images"), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""Lines that an input does not excite: what a linear plant leaves silent, a nonlinear one answers.
+
+[pintelon-schoukens-2012], Section 4.3: an even nonlinearity answers odd harmonics at even ones, an odd one at
+odd ones. The scatter of the periods tells how much of it is noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+# Neighbouring lines over which the spectrum of the noise is taken to be even, where it is not known.
+_NEIGHBOURS = 15
+
+
+@dataclass(frozen=True)
+class SilentLines:
+    """What p outputs have at so many lines without excitation.
+
+    Attributes:
+        over_noise: (p,) mean of the power there over that of the noise; about one for noise alone.
+        probability: (p,) that noise alone has as much, by an F test over all lines.
+        rms: (p,) of what is beyond the noise.
+    """
+
+    lines: int
+    over_noise: Array
+    probability: Array
+    rms: Array
+
+
+def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> SilentLines | None:
+    """From transforms (blocks, periods, lines, p) of outputs; None without lines or without scatter.
+
+    Args:
+        shape: (lines, p) of the spectrum of the noise, up to a factor; None: that of the scatter, smoothed.
+    """
+    blocks, periods, lines, _ = Y.shape
+    if lines == 0 or periods < 2:
+        return None
+    mean = Y.mean(axis=1, keepdims=True)
+    noise = np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (blocks * (periods - 1))
+    if np.any(noise <= 0.0):
+        return None
+    level: NDArray[np.float64] = periods * np.mean(np.abs(mean[:, 0]) ** 2, axis=0)
+    even = _smoothed(noise) if shape is None else shape
+    # Over the shape of the noise all lines count alike.
+    ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
+    freedom = 2 * blocks * lines
+    beyond = np.maximum(np.sum(level - noise, axis=0), 0.0)
+    return SilentLines(
+        lines,
+        np.asarray(ratio),
+        np.asarray(scipy.stats.f.sf(ratio, freedom, freedom * (periods - 1))),
+        np.sqrt(2.0 * beyond / periods),
+    )
+
+
+def _smoothed(noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(lines, p): means over neighbours, at the ends over the nearest so many."""
+    window = min(_NEIGHBOURS, len(noise))
+    sums = np.concatenate([np.zeros((1, noise.shape[1])), np.cumsum(noise, axis=0)])
+    first = np.clip(np.arange(len(noise)) - window // 2, 0, len(noise) - window)
+    return np.asarray((sums[first + window] - sums[first]) / window)

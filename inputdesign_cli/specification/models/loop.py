@@ -1,0 +1,88 @@
+"""`accuracy.loop:`, a control loop that is to keep its margin with every plant that the data leave over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from inputdesign_cli.specification.models.annotations import Wording
+from inputdesign_cli.specification.models.controller import Controller, Rule
+from inputdesign_cli.specification.models.fields import Band, Fraction, Positive
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.section import Section
+
+# A peak of |S| is above one; a phase margin of 60 degrees takes a peak of one.
+_MOST_DEGREES = 60.0
+
+
+class Simc(Section):
+    """PI settings by the rules of Skogestad."""
+
+    tau_c: Positive | None = Field(
+        default=None, description="Time constant of the closed loop, in time_unit (default: the dead time)."
+    )
+
+
+class Amigo(Section):
+    """PI or PID settings by the rules of Astrom and Hagglund."""
+
+    type: Literal["pi", "pid"] = Field(default="pi", description="With or without derivative action.")
+
+
+class Tuning(Section):
+    """How the controller follows from gain, time constant and dead time of the nominal plant."""
+
+    simc: Simc | None = Field(default=None, description="{tau_c: 25}, or {} for the dead time.")
+    amigo: Amigo | None = Field(default=None, description="{type: pi} or {type: pid}.")
+    sample: Rule = Field(default="tustin", description="How s becomes q^-1 (default tustin).")
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """There is one rule."""
+        yield from self.exactly_one("simc", "amigo")
+
+
+class LoopMargin(Section):
+    """For every plant within r_u the loop is stable, with |S| below a peak at every frequency."""
+
+    controller: Controller | None = Field(
+        default=None, description="C of the loop (default: the controller of the experiment)."
+    )
+    tuning: Tuning | None = Field(default=None, description="Or the rule by which it is tuned.")
+    max_sensitivity_db: Positive | None = Field(default=None, description="Largest |S|, in dB.")
+    phase_margin: (
+        Annotated[Positive, Wording("a number", "write degrees between 0 and 60, such as 45")] | None
+    ) = Field(
+        default=None, description="Least phase margin in degrees, below 60, kept by the peak of |S| for it."
+    )
+    gain_margin: Annotated[Positive, Wording("a number", "write a factor above 1, such as 2")] | None = Field(
+        default=None, description="Least gain margin, a factor above 1, kept by the peak of |S| for it."
+    )
+
+    confidence: Fraction | None = Field(
+        default=None, description="Probability that fixes alpha by chi-squared (default 0.95)."
+    )
+    band: Band | None = Field(default=None, description="Frequencies [low, high] (default: all).")
+
+    def check(self) -> Iterator[PathDiagnostic]:
+        """One margin, which a loop can have, and one controller."""
+        yield from self.exactly_one("max_sensitivity_db", "phase_margin", "gain_margin")
+        yield from self.at_most_one("controller", "tuning")
+        if self.phase_margin is not None and self.phase_margin >= _MOST_DEGREES:
+            message = f"{{key}} is {self.phase_margin:g} degrees, and a peak of |S| keeps less than 60"
+            yield PathDiagnostic("out-of-range", message, "write 45, say", ("phase_margin",))
+        if self.gain_margin is not None and self.gain_margin <= 1.0:
+            message = f"{{key}} is {self.gain_margin:g}, and a gain margin is a factor above 1"
+            yield PathDiagnostic("out-of-range", message, "write 2, say", ("gain_margin",))
+
+    @property
+    def peak(self) -> float:
+        """The largest |S|: at it 1 + L is 1/|S| away from 0, which bounds the margins of gain and phase."""
+        if self.max_sensitivity_db is not None:
+            return float(10 ** (self.max_sensitivity_db / 20))
+        if self.phase_margin is not None:
+            return 0.5 / math.sin(math.radians(self.phase_margin) / 2)
+        assert self.gain_margin is not None
+        return self.gain_margin / (self.gain_margin - 1.0)

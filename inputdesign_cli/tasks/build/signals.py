@@ -1,0 +1,136 @@
+"""The signals in the columns of a file: within the range of arithmetic, at times that increase."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.build.columns import channel_columns, time_column
+from inputdesign_cli.tasks.build.files import Sheet
+from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.tables import columns_of, is_dated
+
+# A signal whose largest value is beyond this, or below its inverse, leaves double precision when squared.
+_EXTREME = 1e100
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What stands in the columns of a file: u (n, m), y (n, p), NaN where a number is missing.
+
+    Attributes:
+        time: (n,), counted in sample times where the file has none; `name` is that of its column, if any.
+        dated: whether the times stand as dates; they are counted in seconds then.
+        inputs, outputs: what notes call the columns of u and y.
+    """
+
+    sheet: Sheet
+    time: Array
+    name: str
+    dated: bool
+    u: Array
+    y: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+def signals_of(
+    sheet: Sheet, inputs: int, outputs: int, preparation: Preparation, references: Sequence[str] = ()
+) -> Signals:
+    """The columns of so many channels; those of `references` follow the inputs.
+
+    Raises:
+        DataError: a column is missing, holds text or nothing, or leaves the range of arithmetic; the times
+            do not increase.
+    """
+    wanted = {
+        **channel_columns("u", inputs, sheet, preparation),
+        **channel_columns("y", outputs, sheet, preparation),
+        **{name: name for name in references},
+        **time_column(sheet, preparation),
+    }
+    found = columns_of(sheet, wanted)
+    for role, numbers in found.items():
+        if np.isnan(numbers).all():
+            message = f"the column {wanted[role]} holds no number"
+            raise DataError(sheet.error("data-not-a-number", message, "is it another column?", 0))
+    rows = np.arange(preparation.skip, len(sheet.lines))
+    time = found.get("time", np.arange(len(sheet.lines), dtype=float))
+    if preparation.span is not None:
+        begin, end = preparation.span
+        scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
+        rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
+    for role in found.keys() - {"time"}:
+        _check_range(sheet, wanted[role], found[role])
+    if not rows.size:
+        message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
+        raise DataError.because("data-unreadable", message, "mind --skip and --range", sheet.key)
+    name = wanted.get("time", "")
+    kept = replace(
+        sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
+    )
+    driving = (*_labels("u", inputs), *references)
+    u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
+    y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
+    dated = bool(name) and is_dated(sheet, name)
+    if name:
+        _check_rising(kept, time[rows])
+    return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
+
+
+def _check_range(sheet: Sheet, name: str, x: Array) -> None:
+    """The products of three samples of a signal x (n,) stay within double precision.
+
+    Raises:
+        DataError: `beyond-precision`.
+    """
+    row = int(np.nanargmax(np.abs(x)))
+    size = abs(float(x[row]))
+    if size and not 1.0 / _EXTREME < size < _EXTREME:
+        message = f"the column {name} has values up to {size:.3g}: their squares leave double precision"
+        hint = "write the signals in a unit in which they are of the order of one"
+        raise DataError(sheet.error("beyond-precision", message, hint, row))
+
+
+def _check_rising(sheet: Sheet, time: Array) -> None:
+    """Every time (n,) is later than the one before.
+
+    Raises:
+        DataError: `data-not-uniform`.
+    """
+    there = np.flatnonzero(~np.isnan(time))
+    wrong = np.flatnonzero(np.diff(time[there]) <= 0.0)
+    if wrong.size:
+        before, row = there[wrong[0]], there[wrong[0] + 1]
+        message = (
+            f"the times of {sheet.path.name} do not increase: {time[before]:.10g} is followed by "
+            f"{time[row]:.10g}"
+        )
+        hint = (
+            "sort the rows, keep one of those with the same time, write times with enough digits to differ, "
+            "or say which column holds the time: --columns time=1"
+        )
+        raise DataError(sheet.error("data-not-uniform", message, hint, int(row)))
+
+
+def stated_step(sheet: Sheet, preparation: Preparation) -> float | None:
+    """The sample time that the user or the file itself states.
+
+    Raises:
+        DataError: `data-not-uniform`, that of the file is no length of time.
+    """
+    stated = preparation.sample_time or sheet.sample_time
+    if stated is None or 0.0 < stated < np.inf:
+        return stated
+    message = f"{sheet.path.name} states the sample time {stated:g}, which is no positive number"
+    hint = "mend it in the file, or give the one that holds: --sample-time 0.5"
+    raise DataError(sheet.error("data-not-uniform", message, hint))
+
+
+def _labels(letter: str, count: int) -> tuple[str, ...]:
+    """What notes call channels: u, or u1, u2, .. of several."""
+    return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
