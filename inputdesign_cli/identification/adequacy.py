@@ -2,13 +2,15 @@
 
 Each test regresses the residuals on signals that the model does without: past inputs, past residuals, slow
 trends. What the parameters and unknown starts can explain is taken off these signals first, so that the
-statistic is chi-squared whatever was estimated. Few signals find a fault of a known shape, many one of any;
+statistic is chi-squared whatever was estimated. Past residuals lack what was estimated as well: where unknown
+starts are many, as those of a record with gaps, that alone correlates residuals, and it is what scores are
+compared with. Few signals find a fault of a known shape, many one of any;
 `directed.py` has the fewest, one parameter more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -32,6 +34,10 @@ _SAMPLES_A_DIRECTION = 8
 _DEPENDENT = 1e-6
 
 Fault = Literal["plant", "noise", "drift"]
+Echo = Callable[[Array], Array]
+"""What past errors (N, p) add to the gradient of a parameter."""
+Echoes = Sequence[tuple[int, Echo]]
+"""Such, and the places of the parameters in theta."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,7 @@ class _Signals:
     fault: Fault
     columns: NDArray[np.float64]  # (p, N, m)
     lags: tuple[int, ...] = ()
+    of_residuals: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,21 +80,60 @@ class White:
     Attributes:
         root: R (p, p), which makes residuals white.
         residuals: (N p,).
-        explained: (N p, m + k), what m unknown starts and the k parameters explain; `basis`, orthonormal.
+        starts: (N p, m), orthonormal, what m unknown starts explain.
+        explained: (N p, m + k), what they and the k parameters explain; `basis`, orthonormal.
+        means: (k,), of the scores of the parameters, see `echoes`.
     """
 
     root: Array
     residuals: Array
+    starts: Array
     explained: Array
     basis: Array
+    means: Array
 
     @classmethod
-    def of(cls, point: Point) -> White:
+    def of(cls, point: Point, echoes: Echoes | None = None) -> White:
         """That of a point of the search."""
         root = np.linalg.inv(np.linalg.cholesky(point.errors.T @ point.errors / len(point.errors)))
         psi = (point.psi @ root.T).reshape(len(point.psi), -1).T
         explained = np.column_stack([point.near.directions, psi])
-        return cls(root, (point.errors @ root.T).ravel(), explained, _orthonormal(_scaled(explained)))
+        residuals, starts = (point.errors @ root.T).ravel(), point.near.directions
+        none = np.zeros(point.theta.size)
+        found = cls(root, residuals, starts, explained, _orthonormal(_scaled(explained)), none)
+        for index, through in echoes or ():
+            none[index] = found.echoes(through)
+        return found
+
+    @property
+    def variance(self) -> float:
+        """Of the noise, in these units: residuals lack what unknown starts explain."""
+        size = self.residuals.size
+        return size / max(size - self.starts.shape[1], 1)
+
+    def echoes(self, through: Callable[[Array], Array]) -> float:
+        """The mean of the score of a signal that is made of the residuals themselves.
+
+        Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
+        the mean -tr(Q^T T Q), for T, which looks back in time, has no trace.
+
+        Args:
+            through: T, of errors (N, p).
+        """
+        outputs, back = len(self.root), np.linalg.inv(self.root).T
+        found = 0.0
+        for direction in self.starts.T:
+            own = direction.reshape(-1, outputs)
+            found += float(np.sum((through(own @ back) @ self.root.T) * own))
+        return -self.variance * found
+
+    def mean_left(self, columns: Array, means: Array) -> Array:
+        """(m,): the means of scores of columns (N p, m) once what parameters explain is taken off."""
+        if not np.any(means) and not np.any(self.means):
+            return np.zeros(columns.shape[1])
+        scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
+        shares = np.linalg.lstsq(self.explained / scale, columns, rcond=1e-12)[0] / scale[:, None]
+        return np.asarray(means - self.means @ shares[-self.means.size :])
 
     def unexplained(self, columns: Array) -> Array:
         """What the estimate leaves of columns (N p, m)."""
@@ -95,26 +141,35 @@ class White:
 
 
 def score_tests(
-    records: Records, point: Point, *, recent: int, feedback: bool = False
+    records: Records, point: Point, *, recent: int, feedback: bool = False, echoes: Echoes | None = None
 ) -> tuple[ScoreTest, ...]:
     """The tests of an estimate.
 
     Args:
+        echoes: what past errors add to the gradients of parameters, where they add anything; None where that
+            is not known: then scores are compared with zero.
         recent: the lag up to which the structure looks at the inputs.
         feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
     """
     n, p = point.errors.shape
-    white = White.of(point)
+    white = White.of(point, echoes)
     tests = []
     for signals in _tried(records, point, recent, int(feedback)):
         columns = np.einsum("pnm,qp->nqpm", signals.columns, white.root).reshape(n * p, -1)
-        regressors = white.unexplained(_scaled(columns))
-        scores = regressors.T @ white.residuals
-        scores = scores / np.maximum(np.linalg.norm(regressors, axis=0), _DEPENDENT)
-        directions = _orthonormal(regressors)
-        statistic, freedom = float(np.sum((directions.T @ white.residuals) ** 2)), directions.shape[1]
+        norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        regressors = white.unexplained(columns / norms)
+        own = np.zeros(norms.size)
+        if signals.of_residuals and echoes is not None:
+            own = _mean_scores(records, white, signals.lags)
+        scores = regressors.T @ white.residuals - white.mean_left(columns / norms, own / norms)
+        _, sizes, right = np.linalg.svd(regressors, full_matrices=False)
+        kept = sizes > _DEPENDENT
+        freedom = int(np.sum(kept))
         if not freedom:
             continue
+        along = (right[kept] @ scores) / sizes[kept]
+        statistic = float(np.sum(along**2)) / white.variance
+        scores = scores / np.maximum(np.linalg.norm(regressors, axis=0), _DEPENDENT)
         output, largest = divmod(int(np.argmax(np.abs(scores))), signals.columns.shape[2])
         lag = signals.lags[largest] if signals.lags else None
         # Lag by lag all inputs, or all residuals.
@@ -142,14 +197,27 @@ def _tried(records: Records, point: Point, recent: int, first: int) -> list[_Sig
     found = [
         _Signals("recent_inputs", "plant", *_lagged(records, u, near)),
         _Signals("older_inputs", "plant", *_summed(records, u, bins)),
-        _Signals("recent_residuals", "noise", *_lagged(records, own, few)),
-        _Signals("older_residuals", "noise", *_lagged(records, own, many)),
+        _Signals("recent_residuals", "noise", *_lagged(records, own, few), of_residuals=True),
+        _Signals("older_residuals", "noise", *_lagged(records, own, many), of_residuals=True),
     ]
     time = np.concatenate([np.linspace(-1.0, 1.0, length) for length in records.lengths])
     slow = [time**power for power in range(_TRENDS)]
     slow += [np.cos(0.5 * np.pi * k * (1.0 + time)) for k in range(1, _WAVES + 1)]
     trends = np.stack(slow, axis=1)
     return [*found, _Signals("trend", "drift", records.whitened(point.theta, trends))]
+
+
+def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
+    """(p lags,): see `White.echoes`, of the residuals of every output at every lag, for every output."""
+    p = len(white.root)
+    starts = white.starts.reshape(white.residuals.size // p, p, white.starts.shape[1])
+    here = np.einsum("nqm,qp->nmp", starts, white.root)
+    there = np.einsum("nqm,qp->nmp", starts, np.linalg.inv(white.root).T)
+    each = [
+        -white.variance * np.einsum("nmp,nms->ps", here, shifted(there, lag, records.lengths))
+        for lag in dict.fromkeys(lags)
+    ]
+    return np.stack(each, axis=1).reshape(-1)
 
 
 def _lagged(

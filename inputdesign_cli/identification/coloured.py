@@ -14,7 +14,8 @@ from functools import cached_property, partial, reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.extensions import Extension
+from inputdesign_cli.identification.adequacy import Echoes
+from inputdesign_cli.identification.extensions import Extension, late_echo
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
 from inputdesign_cli.identification.records import Record, Records
@@ -65,6 +66,10 @@ class ColouredRecord(OverRecord):
             past = filtered([1.0], below, impulses) if len(impulses) else impulses
             found.append(np.concatenate([filtered(above, below, responses), past]))
         return tuple(found)
+
+    def lateness(self, theta: Array) -> int:
+        """That of the plant."""
+        return self.record.lateness(self._of_plant(theta))
 
     @property
     def in_starts(self) -> NDArray[np.int64]:
@@ -159,6 +164,18 @@ class ColouredKind(OfModel):
     def record(self, u: Array, y: Array) -> ColouredRecord:
         """Samples u (N, r), y (N, p) that the structure is to explain."""
         return ColouredRecord(self.plant.record(u, y), self.model)
+
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """Those of C and D; what the plant has of its own is not known behind filters."""
+        model, first = self.model.at(theta), len(self.model.plant.parameters)
+        if self.plant.echoes(theta[:first], lengths) != ():
+            return None
+        found = []
+        for index, one in enumerate(model.own_parameters, start=first):
+            filters = {i: model.below(one.letter, i) for i, _ in one.places}
+            known = {i: (below, sign) for i, (below, sign) in filters.items() if below is not None}
+            found.append((index, late_echo(known, one.power, lengths)))
+        return tuple(found)
 
     def starts(self, parts: Sequence[Part], given: Array | None) -> Starts:
         """Those of the plant, each with C and D from what it leaves, and the `given` one."""

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.special
 from numpy.typing import ArrayLike
 
-from inputdesign_cli.identification.adequacy import Fault, ScoreTest, White
+from inputdesign_cli.identification.adequacy import Echoes, Fault, ScoreTest, White
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
@@ -27,6 +27,8 @@ BEYOND_CHANCE = 0.05
 _OPEN = 0.3
 # A parameter of whose effect the estimate explains all but this share is not tried.
 _EXPLAINED = 1e-6
+# A mean of the score that is less than this, in standard deviations, does not matter.
+_LITTLE = 0.1
 # Directions with a larger cosine are one.
 _SAME = 0.99
 
@@ -69,11 +71,12 @@ class Directed:
 
 @dataclass(frozen=True)
 class _Tried:
-    """An extension and its gradient (N p,) in white units; what the estimate leaves of it."""
+    """An extension and its gradient (N p,) in white units; what the estimate leaves of it; the mean score."""
 
     extension: Extension
     column: Array
     left: Array
+    mean: float
 
     @property
     def size(self) -> float:
@@ -83,13 +86,19 @@ class _Tried:
         return bool(abs(self.left @ other.left) > _SAME * self.size * other.size)
 
 
-def directed_tests(records: Records, point: Point, extensions: Sequence[Extension]) -> tuple[Directed, ...]:
+def directed_tests(
+    records: Records, point: Point, extensions: Sequence[Extension], echoes: Echoes | None = None
+) -> tuple[Directed, ...]:
     """The test of every extension; those that these data cannot tell apart share one."""
-    white = White.of(point)
+    white = White.of(point, echoes)
     groups: list[list[_Tried]] = []
     for extension in extensions:
         column = (extension.column(records) @ white.root.T).ravel()
-        tried = _Tried(extension, column, white.unexplained(column))
+        known = extension.echo is not None and echoes is not None
+        through = extension.echo(records.lengths) if known and extension.echo else None
+        own = np.array([0.0 if through is None else white.echoes(through)])
+        mean = float(white.mean_left(column[:, None], own)[0])
+        tried = _Tried(extension, column, white.unexplained(column), mean)
         if tried.size > _EXPLAINED * np.linalg.norm(column):
             alike = next((group for group in groups if tried.like(group[0])), None)
             groups.append([tried]) if alike is None else alike.append(tried)
@@ -97,14 +106,17 @@ def directed_tests(records: Records, point: Point, extensions: Sequence[Extensio
 
 
 def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -> Directed:
-    statistic = float(group[0].left @ white.residuals / group[0].size) ** 2
+    statistic = float(group[0].left @ white.residuals - group[0].mean) ** 2
+    statistic /= group[0].size ** 2 * white.variance
     larger: Model | None = None
     if _probability(statistic) < _OPEN and group[0].extension.nested and records.earlier is None:
         ends = [tried.extension.estimated(records) for tried in group]
-        costs = np.array([cost for _, cost in ends])
+        costs = np.array([cost for _, cost, _ in ends])
         group = [group[i] for i in np.argsort(costs)]
         best = int(np.argmin(costs))
-        statistic = max(statistic, _ratio(records, point.cost, costs[best]))
+        # A likelihood ratio has no mean to be compared with.
+        if abs(group[0].mean) <= _LITTLE * group[0].size:
+            statistic = max(statistic, _ratio(records, ends[best][2], costs[best]) / white.variance)
         larger = group[0].extension.model.at(ends[best][0])
     first = group[0]
     scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
@@ -117,7 +129,7 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
         extensions,
         deviation=1.0 / first.size,
         following=-explained[explained.size - point.theta.size :],
-        size=float(first.left @ white.residuals) / first.size**2,
+        size=float(first.left @ white.residuals - first.mean) / first.size**2,
         larger=larger,
     )
 

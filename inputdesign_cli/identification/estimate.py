@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
+from inputdesign_cli.identification.adequacy import Echoes, ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
 from inputdesign_cli.identification.directed import Directed, directed_tests
 from inputdesign_cli.identification.extensions import Extension
@@ -131,6 +131,7 @@ def concluded(
     extensions: Sequence[Extension],
     experiments: Sequence[int],
     feedback: bool,
+    echoes: Echoes | None,
 ) -> Estimate:
     """The estimate with its covariance and the tests of its residuals.
 
@@ -146,6 +147,7 @@ def concluded(
         extensions: the parameters that might be missing.
         experiments: the samples of each experiment.
         feedback: whether u(t) answers y(t).
+        echoes: what past errors add to the gradients of parameters.
 
     Raises:
         SpecError: `noise-free-data` or `not-exciting`.
@@ -180,8 +182,8 @@ def concluded(
         independence=cross_correlations(
             point.errors, records.u, fitted=in_plant, feedback=feedback, lengths=lengths
         ),
-        tests=score_tests(records, point, recent=recent, feedback=feedback),
-        directed=directed_tests(records, point, extensions),
+        tests=score_tests(records, point, recent=recent, feedback=feedback, echoes=echoes),
+        directed=directed_tests(records, point, extensions, echoes),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
         repeated=repetition(point.errors),

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.adequacy import Echo
 from inputdesign_cli.identification.gauss_newton import minimise
-from inputdesign_cli.identification.record_problem import RecordProblem
-from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
+from inputdesign_cli.identification.records import Record, Records, shifted
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
+from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import Listed
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
@@ -30,6 +32,8 @@ class Extension:
         name: of the new parameter; `what` it is.
         record: makes the record of samples u (N, r), y (N, p) that the larger structure is to explain.
         nested: whether that structure has no further freedom than the one parameter.
+        echo: made for the lengths of records, T of errors (N, p), what they add to `column`; None where
+            they add nothing.
     """
 
     model: Listed
@@ -37,6 +41,7 @@ class Extension:
     what: str
     record: Callable[[Array, Array], Record]
     nested: bool = True
+    echo: Callable[[Sequence[int]], Echo | None] | None = None
 
     @property
     def index(self) -> int:
@@ -54,15 +59,54 @@ class Extension:
         gradients = [part.errors_and_gradient(theta)[1] for part in self.records(records).parts]
         return np.concatenate([gradient[self.index] for gradient in gradients])
 
-    def estimated(self, records: Records) -> tuple[Array, float]:
-        """The larger structure's theta where a search ends that begins here, and its cost."""
-        found = minimise(RecordProblem((self.records(records),)), self.model.theta[None])
-        return found.theta[0], float(found.cost[0])
+    def estimated(self, records: Records) -> tuple[Array, float, float]:
+        """The larger structure's theta where a search ends that begins here, its cost, and that without it.
+
+        Both costs are with the unknown starts of the larger structure, which may be more in every record; the
+        second is by one step of Gauss and Newton from here.
+        """
+        larger, theta = self.records(records), self.model.theta
+        found = minimise(RecordProblem((larger,)), theta[None])
+        point, others = evaluate(larger, theta), np.arange(theta.size) != self.index
+        slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
+        gain = float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
+        return found.theta[0], float(found.cost[0]), point.cost - gain
 
     def records(self, records: Records) -> Records:
         """The same samples against the larger structure."""
         parts = tuple(self.record(part.u, part.y) for part in records.parts)
-        return Records(parts, free=records.free, weights=records.weights)
+        larger = Records(parts, weights=records.weights)
+        return larger.begun_freely(records.late) if records.free else larger
+
+
+def echo_of(larger: PolynomialModel, name: str, lengths: Sequence[int]) -> Echo | None:
+    """What past errors add to the gradient of a coefficient of A, C or D; None for others.
+
+    epsilon = (D/C)(A y - ..): -d epsilon / d theta is epsilon(t - k) through 1/C for a c_k, through -1/D for
+    a d_k and, by the noise in y, through -1/A for an a_k.
+    """
+    rows = {"a": (larger.A, -1.0), "c": (larger.C, 1.0), "d": (larger.D, -1.0)}
+    parameter = next(one for one in larger.parameters if one.name == name)
+    if parameter.letter not in rows:
+        return None
+    polynomials, sign = rows[parameter.letter]
+    outputs = {output for output, _ in parameter.places}
+    below = {i: (polynomials[0 if len(polynomials) == 1 else i], sign) for i in outputs}
+    return late_echo(below, parameter.power, lengths)
+
+
+def late_echo(filters: Mapping[int, tuple[Array, float]], power: int, lengths: Sequence[int]) -> Echo:
+    """Errors `power` samples late, of each listed output by its sign through 1 / polynomial; others not."""
+
+    def echo(errors: Array) -> Array:
+        late = shifted(errors, power, lengths)
+        found = np.zeros_like(errors)
+        for i, (below, sign) in filters.items():
+            pieces = np.split(late[:, i], np.cumsum(lengths)[:-1])
+            found[:, i] = np.concatenate([filtered([sign], below, piece) for piece in pieces])
+        return found
+
+    return echo
 
 
 def new_name(larger: Model, model: Model) -> str:

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import (
@@ -78,6 +79,9 @@ class Kind(Protocol):
             feedback: whether u(t) answers y(t).
         """
 
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """What past errors add to the gradients at theta (k,), in records of these lengths; None: unknown."""
+
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None
     ) -> tuple[Array, Sequence[bool]]:
@@ -145,6 +149,7 @@ def identify_records(
         extensions=kind.extensions(best.point.theta, feedback=feedback),
         experiments=experiments or (len(y),),
         feedback=feedback,
+        echoes=kind.echoes(best.point.theta, best.records.lengths),
     )
 
 

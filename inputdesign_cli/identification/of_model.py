@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.records import Record, split
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.plant import Model
@@ -40,6 +41,10 @@ class OfModel:
         """The same."""
         return self
 
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """None: the noise is white, and gradients are of inputs alone."""
+        return ()
+
     def caused(self, found: Search, y: Array, lengths: Sequence[int] | None) -> Array:
         """(N, p): what the inputs cause in the estimate, and what unknown starts explain."""
         fitted = self.model.at(found.point.theta)
@@ -64,3 +69,7 @@ class OverRecord:
     def y(self) -> Array:
         """(N, p)."""
         return self.record.y
+
+    def remembering(self, late: int) -> Self:
+        """The same, with a record that does."""
+        return replace(self, record=self.record.remembering(late))

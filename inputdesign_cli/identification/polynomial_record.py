@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,14 @@ class PolynomialRecord:
             _responses(row, theta[place], len(self.y))
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
         )
+
+    def lateness(self, theta: Array) -> int:
+        """None: the delay is known, and among what the filters remember."""
+        return 0
+
+    def remembering(self, late: int) -> Self:
+        """The same."""
+        return self
 
     @property
     def in_starts(self) -> NDArray[np.int64]:

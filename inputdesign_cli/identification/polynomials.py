@@ -14,9 +14,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
-from inputdesign_cli.identification.extensions import Extension, larger_polynomials, new_name
+from inputdesign_cli.identification.extensions import Extension, echo_of, larger_polynomials, new_name
 from inputdesign_cli.identification.gauss_newton import Minimum, best_run, minimise
 from inputdesign_cli.identification.kind import Part, Starts, identify_records
 from inputdesign_cli.identification.of_model import OfModel
@@ -73,12 +74,17 @@ class PolynomialKind(OfModel):
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:
         """One more coefficient in any of the polynomials."""
-        return tuple(
-            Extension(
-                larger, new_name(larger, self.model), what, partial(PolynomialRecord, Structure.of(larger))
-            )
-            for larger, what in larger_polynomials(self.model.at(theta), feedback=feedback)
-        )
+        found = []
+        for larger, what in larger_polynomials(self.model.at(theta), feedback=feedback):
+            name, record = new_name(larger, self.model), partial(PolynomialRecord, Structure.of(larger))
+            found.append(Extension(larger, name, what, record, echo=partial(echo_of, larger, name)))
+        return tuple(found)
+
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """Those of the coefficients of A, C and D."""
+        model = self.model.at(theta)
+        found = ((k, echo_of(model, name, lengths)) for k, name in enumerate(model.names))
+        return tuple((k, through) for k, through in found if through is not None)
 
     def simulated(
         self, found: Search, y: Array, lengths: Sequence[int] | None

@@ -8,9 +8,9 @@ gradient for every theta (variable projection, [golub-pereyra-1973]).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,12 @@ class Record(Protocol):
 
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): what m unknowns, its level and its past, add to its prediction errors."""
+
+    def lateness(self, theta: Array) -> int:
+        """The samples after which inputs from before the record no longer act but through the states."""
+
+    def remembering(self, late: int) -> Self:
+        """The same, with free responses of inputs before it that act for so many samples."""
 
     @property
     def in_starts(self) -> NDArray[np.int64]:
@@ -85,14 +91,25 @@ class Records:
 
     Attributes:
         free: whether each begins in an unknown state about an unknown level, instead of at rest at zero.
+        late: samples in which unknown inputs before each act, if it is free.
         weights: W (p, p) of the errors; None to weigh by their own covariance.
         earlier: what is known besides.
     """
 
     parts: tuple[Record, ...]
     free: bool = False
+    late: int = 0
     weights: Array | None = None
     earlier: Earlier | None = None
+
+    def begun_freely(self, late: int) -> Records:
+        """The same, each begun in an unknown state, after unknown inputs that act for `late` samples."""
+        parts = tuple(part.remembering(late) for part in self.parts)
+        return replace(self, parts=parts, free=True, late=late)
+
+    def lateness(self, theta: Array) -> int:
+        """The longest of all parts."""
+        return max(part.lateness(theta) for part in self.parts)
 
     @cached_property
     def u(self) -> Array:

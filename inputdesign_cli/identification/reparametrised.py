@@ -15,6 +15,7 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.adequacy import Echo, Echoes
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Kind, Part, Starts
 from inputdesign_cli.identification.of_model import OfModel, OverRecord
@@ -53,6 +54,10 @@ class ReparametrisedRecord(OverRecord):
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): what an unknown start adds."""
         return self.record.free_responses(self.parametrisation.at(theta).coefficients)
+
+    def lateness(self, theta: Array) -> int:
+        """That at the coefficients."""
+        return self.record.lateness(self.parametrisation.at(theta).coefficients)
 
     def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
         """The derivatives of the free responses with respect to one parameter, by the chain rule."""
@@ -120,6 +125,22 @@ class ReparametrisedKind(OfModel):
     def _moved(self) -> NDArray[np.bool_]:
         """(K, k): which parameter moves which coefficient."""
         return np.asarray(self.model.parametrisation.jacobian != 0.0)
+
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """Those of the coefficients, by the chain rule."""
+        here = self.model.parametrisation.at(theta)
+        of_all = self.coefficients.echoes(here.coefficients, lengths)
+        if of_all is None:
+            return None
+
+        def chained(j: int) -> Echo:
+            parts = [(here.jacobian[index, j], through) for index, through in of_all]
+            return lambda errors: sum((w * through(errors) for w, through in parts if w), 0.0 * errors)
+
+        moved = [index for index, _ in of_all]
+        return tuple(
+            (j, chained(j)) for j in np.flatnonzero(np.any(here.jacobian[moved] != 0.0, axis=0)).tolist()
+        )
 
     def own(self) -> Array:
         """(p,): as many parameters as there are, shared by the outputs as the coefficients are."""

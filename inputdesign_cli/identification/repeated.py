@@ -1,7 +1,8 @@
 """Were samples recorded once and given twice? Then prediction errors of different times follow each other.
 
 Errors of different times are independent if the model is right, and so is every other copy of the noise: only
-the same noise, also where it was rounded, shifted or scaled, comes again.
+the same noise, also where it was rounded, shifted or scaled, comes again. Where the model is wrong errors are
+coloured, and slow ones follow each other by chance: they are made white first, by an autoregression.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
+import scipy.linalg
 
 from inputdesign_cli.plant.polynomial import Array
 
@@ -19,6 +21,7 @@ _IN_A_ROW, _FOLLOWS = 30, 0.9
 _LAGS = 8
 # Larger errors, in standard deviations, count as much: single spikes say nothing.
 _SPIKE = 3.0
+_ORDER = 20
 _NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
 
 
@@ -37,7 +40,7 @@ def repetition(errors: Array) -> Repetition | None:
     samples = len(errors)
     if samples < 2 * _IN_A_ROW or not np.all(spread > 0.0):
         return None
-    e = np.clip(errors / spread, -_SPIKE, _SPIKE)
+    e = np.column_stack([_white(x) for x in np.clip(errors / spread, -_SPIKE, _SPIKE).T])
     around = scipy.fft.rfft(e, 2 * samples, axis=0)
     products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)
     lags = np.arange(_IN_A_ROW, samples - _IN_A_ROW + 1)
@@ -45,6 +48,16 @@ def repetition(errors: Array) -> Repetition | None:
     tried = lags[np.argsort(-strength, kind="stable")[:_LAGS]]
     found = [one for lag in tried.tolist() if (one := _at(e, lag)) is not None]
     return max(found, key=lambda one: one.length, default=None)
+
+
+def _white(x: Array) -> Array:
+    """What an autoregression leaves of a signal (N,), by the equations of Yule and Walker."""
+    order = min(_ORDER, x.size // 10)
+    x = x - x.mean()
+    products = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, 2 * x.size)) ** 2, 2 * x.size)[: order + 1]
+    products[0] *= 1.0 + 1e-9
+    ahead = scipy.linalg.solve_toeplitz(products[:-1], products[1:])
+    return np.asarray(np.convolve(x, np.concatenate([[1.0], -ahead]))[: x.size])
 
 
 def _at(e: Array, lag: int) -> Repetition | None:

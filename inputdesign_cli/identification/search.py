@@ -23,6 +23,8 @@ _UNLIKELY = 0.2
 _SETTLED = 1e-8
 _ASIDE = 0.01
 _MOST_HELD_STEPS = 60
+# Samples by which a dead time may grow while a search begun freely goes on.
+_SPARE = 2
 
 
 @dataclass(frozen=True)
@@ -138,18 +140,24 @@ def from_rest_or_free(
         rest: whether the records begin at rest about zero; None: as the data say.
         searched: what searches from its own starts and, if given, from the parameters (k,).
     """
-    free = replace(deviations, free=True)
 
-    def begun_free(known: Array | None) -> Search:
-        found = searched(free, known)
+    def begun_free(known: Array | None, late: int) -> Search:
+        found = searched(deviations.begun_freely(late), known)
+        longer = deviations.lateness(found.point.theta)
+        # The dead time may come out longer than was thought when the unknown inputs were counted.
+        if longer > late:
+            found = searched(deviations.begun_freely(longer + _SPARE), found.point.theta)
         errors = records.at(found.point.theta).errors
         return replace(found, first=errors[np.cumsum((0, *records.lengths[:-1]))])
 
     if rest is False:
-        return begun_free(None)
+        return begun_free(None, 0)
     at_rest = searched(records, None)
     if rest or at_rest.point.cost <= 0.0:
         return at_rest
+    late = deviations.lateness(at_rest.point.theta)
+    late += _SPARE if late else 0
+    free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
     unknowns = near.near.directions.shape[1]
     if records.y.size <= records.size + 2 * unknowns:
@@ -163,5 +171,5 @@ def from_rest_or_free(
     step = np.linalg.lstsq(near.hessian, near.slope, rcond=1e-12)[0]
     if probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
         return at_rest
-    begun = begun_free(at_rest.point.theta)
+    begun = begun_free(at_rest.point.theta, late)
     return begun if probability(begun.point.cost) < _MISTAKEN else at_rest

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.extensions import Extension
 from inputdesign_cli.identification.kind import Part, Starts
 from inputdesign_cli.identification.of_model import OfModel
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.search import Search
+from inputdesign_cli.identification.transfer_record import late_samples
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.polynomial import Array
 
@@ -24,11 +27,15 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class StateSpaceRecord:
-    """Samples u (N, r), y (N, p), and the `structure` that is to explain them; see `Record`."""
+    """Samples u (N, r), y (N, p), and the `structure` that is to explain them; see `Record`.
+
+    Unknown inputs before the record act for `late` samples of it, where it does not begin at rest.
+    """
 
     structure: StateSpaceModel
     u: Array
     y: Array
+    late: int = 0
 
     @property
     def size(self) -> int:
@@ -68,22 +75,44 @@ class StateSpaceRecord:
         return self.y - found[:, :p], np.moveaxis(psi, 1, 0)
 
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what levels of the outputs and the states at the start add."""
+        """Of each output (m, N): what levels of the outputs and the states at the start add.
+
+        Inputs before the record that come late by the dead time move the states, sample by sample, along the
+        directions in which inputs do; what they do at once, through D, is not counted.
+        """
         model = self.structure.at(theta)
         m, n, p = model.matrices, model.order, model.outputs
-        closed = model.held[0] - m.K @ m.C
-        x = np.concatenate([np.eye(n), np.zeros((p, n))])
-        level = np.concatenate([np.zeros((n, p)), np.eye(p)])
-        found = np.empty((n + p, len(self.y), p))
+        A, early, later = model.held
+        closed = A - m.K @ m.C
+        pushes = np.eye(n) if n <= 2 * model.inputs else np.concatenate([early, later], axis=1).T
+        late = min(self.late, len(self.y) - 1)
+        size = n + p + late * len(pushes)
+        x, level = np.zeros((size, n)), np.zeros((size, p))
+        x[:n], level[n : n + p] = np.eye(n), np.eye(p)
+        found = np.empty((size, len(self.y), p))
         for t in range(len(self.y)):
+            if 0 < t <= late:
+                first = n + p + (t - 1) * len(pushes)
+                x[first : first + len(pushes)] += pushes
             found[:, t] = level - x @ m.C.T
             x = x @ closed.T + level @ m.K.T
         return tuple(found[:, :, i] for i in range(p))
 
+    def lateness(self, theta: Array) -> int:
+        """The dead time in samples, one that is begun counted whole."""
+        model = self.structure.at(theta)
+        return late_samples(model.matrices.delay, model.sample_time or 1.0)
+
+    def remembering(self, late: int) -> Self:
+        """The same, where unknown inputs act for so many samples."""
+        return replace(self, late=late)
+
     @property
     def in_starts(self) -> NDArray[np.int64]:
-        """Those of A, C and K."""
-        return np.flatnonzero([letter in ("A", "C", "K") for letter, _, _ in self.structure.entries])
+        """Those of A, C and K; of B where it is no matter of course which way inputs push the states."""
+        pushed = self.late > 0 and self.structure.order > 2 * self.structure.inputs
+        letters = ("A", "C", "K", *(("B", "delay") if pushed else ()))
+        return np.flatnonzero([letter in letters for letter, _, _ in self.structure.entries])
 
     def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
         """By central differences."""
@@ -125,6 +154,10 @@ class StateSpaceKind(OfModel):
     """A state-space model; see `Kind`."""
 
     model: StateSpaceModel
+
+    def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
+        """None without a gain K; not known with one."""
+        return None if np.any(self.model.matrices.K) else ()
 
     @property
     def explaining(self) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +22,23 @@ _FASTEST = 1e4
 _STEP = 1e-6
 
 
+def late_samples(dead_time: float, sample_time: float) -> int:
+    """The samples of a record in which inputs before it act through a dead time; none without one."""
+    return int(np.ceil(dead_time / sample_time - 1e-9)) if dead_time > 0.0 else 0
+
+
 @dataclass(frozen=True)
 class TransferRecord:
-    """Samples u (N, r), y (N, p), and the `structure` that is to explain them by parameters theta (k,)."""
+    """Samples u (N, r), y (N, p), and the `structure` that is to explain them by parameters theta (k,).
+
+    Unknown inputs before the record act for `late` samples of it, where it does not begin at rest.
+    """
 
     structure: ContinuousModel
     u: Array
     y: Array
     intersample: Intersample
+    late: int = 0
 
     @property
     def samples(self) -> int:
@@ -54,16 +64,29 @@ class TransferRecord:
         return errors, psi
 
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): a level, and what the states of its entries do without an input."""
+        """Of each output (m, N): a level, and what the states of its entries do without an input.
+
+        Inputs before the record that come late by a dead time move the states, sample by sample, as if from
+        anywhere.
+        """
         model, samples = self.structure.at(theta), self.samples
         found = [[np.ones((1, samples))] for _ in range(model.outputs)]
         for i, j in model.active:
             entry = self._entry(model, i, j)
-            if not entry.order:
+            impulses = np.eye(min(entry.order + self.late, samples), samples)
+            if not len(impulses):
                 continue
-            poles = np.poly(entry.transition[: entry.order, : entry.order])
-            found[i].append(filtered([1.0], poles, np.eye(entry.order, samples)))
+            poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else [1.0]
+            found[i].append(filtered([1.0], poles, impulses))
         return tuple(np.concatenate(parts) for parts in found)
+
+    def lateness(self, theta: Array) -> int:
+        """The longest dead time, in samples, those that are begun counted whole."""
+        return late_samples(self.structure.at(theta).memory, self.intersample.sample_time)
+
+    def remembering(self, late: int) -> Self:
+        """The same, where unknown inputs act for so many samples."""
+        return replace(self, late=late)
 
     @property
     def in_starts(self) -> NDArray[np.int64]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from inputdesign_cli.identification.repeated import repetition
 
@@ -12,6 +13,17 @@ def white(samples, channels=1, seed=0):
 
 def test_errors_of_their_own_do_not_come_again():
     assert [seed for seed in range(200) if repetition(white(500, 1 + seed % 2, seed)) is not None] == []
+
+
+@pytest.mark.parametrize("pole", [0.9, 0.99, 0.999])
+def test_coloured_errors_of_a_wrong_model_are_no_copies(pole):
+    """Slow errors rise and fall together for thirty samples now and then."""
+    found = [
+        seed
+        for seed in range(100)
+        if repetition(scipy.signal.lfilter([1.0], [1.0, -pole], white(720, seed=seed), axis=0)) is not None
+    ]
+    assert found == []
 
 
 @pytest.mark.parametrize("start", [0, 300, 450])

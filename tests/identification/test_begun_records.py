@@ -1,0 +1,99 @@
+"""Records that begin in the middle of things: inputs before them that come late, and starts that are many."""
+
+import numpy as np
+import pytest
+import scipy.signal
+import scipy.stats
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.identification import identify
+from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.tasks.build.system import build_model
+
+GAIN, LAG, N, BEFORE = 2.0, 10.0, 500, 200
+IN_S = "{{continuous: {{gain: 2, time_constant: 10, dead_time: {delay}}}, sample: zoh}}"
+IN_STATES = (
+    "{{parameters: {{K: 2, T: 10, L: {delay}}}, sample: zoh, "
+    "state_space: {{A: [['-1/T']], B: [['K/T']], C: [[1]], delay: L}}}}"
+)
+COLOUR = "D: [1, -0.4], "
+
+
+def model_of(words, delay, colour=""):
+    text = f"plant: {words.format(delay=delay)}\nnoise: {{{colour}variance: 0.01}}\n"
+    return build_model(parse_spec(text, design=False))
+
+
+def cut_out(delay, seed, *, colour=0.0):
+    """u, y of a running experiment; the plant by its closed form behind a hold, the noise through 1/D."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], (N + BEFORE) // 5), 5)
+    whole, rest = divmod(delay, 1.0)
+    pole, early = np.exp(-1.0 / LAG), 1.0 - np.exp(-(1.0 - rest) / LAG)
+    B = np.concatenate([np.zeros(int(whole) + 1), GAIN * np.array([early, 1.0 - pole - early])])
+    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(N + BEFORE))
+    y = scipy.signal.lfilter(B, [1.0, -pole], u) + noise
+    return u[BEFORE:, None], y[BEFORE:, None]
+
+
+@pytest.mark.parametrize("words", [IN_S, IN_STATES], ids=["s", "states"])
+@pytest.mark.parametrize("delay", [0.4, 12.3])
+def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
+    """The first dead time of the record holds what nobody recorded."""
+    model, failed, deviations, variances = model_of(words, delay), 0, [], []
+    for seed in range(3):
+        found = identify(model, *cut_out(delay, seed), start=model.theta)
+        failed += bool(found.failed)
+        deviations.append((found.theta - model.theta) / np.sqrt(np.diag(found.covariance)))
+        variances.append(found.noise[0, 0])
+    assert failed <= 1
+    assert np.mean(variances) == pytest.approx(0.01, rel=0.1)
+    assert np.sum(np.square(deviations)) < scipy.stats.chi2.ppf(0.999, np.size(deviations))
+
+
+def test_the_same_behind_coloured_noise():
+    model, failed = model_of(IN_S, 5.4, COLOUR), 0
+    for seed in range(2):
+        found = identify(model, *cut_out(5.4, seed, colour=0.4), start=model.theta)
+        failed += bool(found.failed)
+        assert dict(zip(found.names, found.theta, strict=True))["dead_time"] == pytest.approx(5.4, abs=0.3)
+    assert failed <= 1
+
+
+def segmented(length, seed, *, colour=0.0):
+    """Many short records of one system, each begun in the middle of things."""
+    rng = np.random.default_rng([seed, 77])
+    u = rng.choice([-1.0, 1.0], 650)
+    noise = 0.1 * scipy.signal.lfilter([1.0], [1.0, -colour], rng.standard_normal(650))
+    y = scipy.signal.lfilter([0.0, 1.0], [1.0, -0.7], u) + noise
+    kept = np.arange(50, 50 + 600 - 600 % length)
+    return u[kept, None], y[kept, None], [length] * (kept.size // length)
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.4])
+@pytest.mark.parametrize("length", [20, 150])
+def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
+    """Unknown starts take their share of residuals away, which alone correlates them."""
+    one = np.ones(1)
+    D = np.array([1.0, -colour]) if colour else one
+    model = PolynomialModel(
+        B=((np.array([0.0, 1.0]),),), A=(one,), F=((np.array([1.0, -0.7]),),), C=(one,), D=(D,),
+        covariance=0.01 * np.eye(1),
+    )  # fmt: skip
+    failed = 0
+    for seed in range(5):
+        u, y, lengths = segmented(length, seed, colour=colour)
+        failed += bool(identify(model, u, y, lengths=lengths, rest=False).failed)
+    assert failed <= 1
+
+
+def test_what_many_starts_hide_is_still_found():
+    """White noise is what the model knows, and what it meets is not white."""
+    one = np.ones(1)
+    model = PolynomialModel(
+        B=((np.array([0.0, 1.0]),),), A=(one,), F=((np.array([1.0, -0.7]),),), C=(one,), D=(one,),
+        covariance=0.01 * np.eye(1),
+    )  # fmt: skip
+    for seed in range(3):
+        u, y, lengths = segmented(20, seed, colour=0.6)
+        assert identify(model, u, y, lengths=lengths, rest=False).failed
