@@ -157,8 +157,8 @@ Fast = Annotated[
     bool,
     typer.Option(
         "--fast",
-        help="Leave out the bound over every spectrum, which may take as long as the design "
-        "(solver.any_spectrum: false).",
+        help="Leave out the bound over every spectrum, which may take as long as the design, and the search "
+        "for other dead times that fit as well (solver.any_spectrum: false).",
     ),
 ]
 Figures = Annotated[

@@ -40,15 +40,9 @@ def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
     with an error of its own in each run.
     """
     true, system = job.true, job.true.model
-    e = rng.standard_normal((runs, true.samples, system.outputs)) @ np.linalg.cholesky(system.covariance).T
+    e = noise(true, runs, rng)
     r = job.excitation.draw(runs, true.samples, rng)
-    if true.loop is None:
-        u_r, u = r, r
-        y_r, y_e = system.simulate(r, e, job.step)
-    else:
-        (y_r, u_r), (y_e, u_e) = true.loop.signals(r, 0.0 * e), true.loop.signals(0.0 * r, e)
-        u = u_r + u_e
-    y = y_r + y_e
+    (u_r, u), (y_r, y) = responses(true, r, e, job.step)
     found = _again_where_lost(job, u, y, fit_batch(job.model, u, y, job.step, start=job.model.theta))
     theta = found.theta
     if true.prior is not None and system.names == job.model.names:
@@ -57,6 +51,22 @@ def run_job(job: TrialJob, runs: int, rng: np.random.Generator) -> Trials:
     power = {kind: _mean_squares(signal) for kind, signal in caused.items()}
     total: dict[PowerKind, list[float]] = {"input": _mean_squares(u), "output": _mean_squares(y)}
     return Trials(true, job.model, theta, found.converged, power, total, first=np.array(r[0]))
+
+
+def noise(true: Experiment, runs: int, rng: np.random.Generator) -> Array:
+    """e (runs, samples, p) of a system."""
+    system = true.model
+    white = rng.standard_normal((runs, true.samples, system.outputs))
+    return np.asarray(white @ np.linalg.cholesky(system.covariance).T)
+
+
+def responses(true: Experiment, r: Array, e: Array, step: float) -> tuple[tuple[Array, Array], ...]:
+    """Inputs (runs, samples, r) and outputs (runs, samples, p) from rest: of r alone, and of r and e."""
+    if true.loop is None:
+        y_r, y_e = true.model.simulate(r, e, step)
+        return (r, r), (y_r, y_r + y_e)
+    (y_r, u_r), (y_e, u_e) = true.loop.signals(r, 0.0 * e), true.loop.signals(0.0 * r, e)
+    return (u_r, u_r + u_e), (y_r, y_r + y_e)
 
 
 def _again_where_lost(job: TrialJob, u: Array, y: Array, found: BatchEstimate) -> BatchEstimate:

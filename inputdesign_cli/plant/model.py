@@ -63,6 +63,10 @@ class Model(Protocol):
         """(k,): the parameters on which G depends."""
 
     @property
+    def dead_times(self) -> NDArray[np.bool_]:
+        """(k,): the parameters that move a dead time."""
+
+    @property
     def singularities(self) -> ComplexArray:
         """Poles of G and of all gradients, as points of the frequency plane."""
 
@@ -183,6 +187,11 @@ class Parametrised:
     def theta(self) -> Array:
         """(k,): values of the parameters."""
         return np.array([parameter.value for parameter in self.parameters])
+
+    @cached_property
+    def dead_times(self) -> NDArray[np.bool_]:
+        """(k,): those that are dead times."""
+        return np.array([parameter.letter == DELAY for parameter in self.parameters], dtype=bool)
 
     @property
     def flaw(self) -> str | None:

@@ -88,6 +88,11 @@ class Reparametrised:
         """(k,): the parameters on which G depends."""
         return np.any(self.parametrisation.jacobian[self.coefficients.in_plant] != 0.0, axis=0)
 
+    @cached_property
+    def dead_times(self) -> NDArray[np.bool_]:
+        """(k,): the parameters that move a dead time."""
+        return np.any(self.parametrisation.jacobian[self.coefficients.dead_times] != 0.0, axis=0)
+
     @property
     def memory(self) -> float:
         """See `Model`."""

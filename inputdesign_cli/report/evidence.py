@@ -63,16 +63,26 @@ def estimate_answer(result: Result) -> str:
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in verdict(result))
 
 
+# Why data leave a verdict open, by `assessment.causes`.
+_UNDECIDED = {
+    "unsettled": "the search for the parameters did not settle",
+    "contradicted": "the data contradict the model",
+    "unasked": "what is asked cannot be asked of this estimate",
+    "undetermined": "the data do not determine the model: other parameters explain them nearly as well",
+    "chance": "chance may stand behind what was measured",
+}
+
+
 def verdict(result: Result) -> Iterator[str]:
     """What an assessment comes to, and what is left to do."""
     assessment = result.get("assessment")
     if assessment is None or result.get("status") == "running":
         return
     if "undecided" in assessment:
-        yield (
-            "undecided, neither met nor missed: the data contradict the model, or do not determine it; "
-            "the notes say what to change"
-        )
+        # Results of older versions do not tell the causes.
+        causes = assessment.get("causes", ["contradicted", "undetermined"])
+        told = "; ".join(_UNDECIDED[cause] for cause in causes)
+        yield f"undecided, neither met nor missed: {told}; the notes say what to change"
         return
     worst = max(assessment["requirements"], key=lambda entry: entry["worst_ratio"])
     if assessment["met"]:

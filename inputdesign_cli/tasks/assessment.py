@@ -43,7 +43,7 @@ from inputdesign_cli.tasks.result.refutations import (
     unsettled,
 )
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
-from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors
+from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors, rival_notes
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -118,23 +118,26 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     without: list[Neglected] = []
     if found.question is not None:
         without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
-    reasons = [
-        *unsettled(found.estimate),
-        *differences(found.estimate, [name for name, _ in found.data.files]),
-        *repetitions(found.estimate, found.data.files),
-        *refutations(found.model, found.estimate),
-        *contradictions(found.estimate),
-    ]
-    reasons += [found.unasked] if found.unasked else []
-    if found.question is not None:
-        reasons += _rivals(task.header.units, found, found.question)
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
     notes = objections(task.header.units, without) if met else []
-    reasons += notes
+    causes = {
+        "unsettled": unsettled(found.estimate),
+        "contradicted": [
+            *differences(found.estimate, [name for name, _ in found.data.files]),
+            *repetitions(found.estimate, found.data.files),
+            *refutations(found.model, found.estimate),
+            *contradictions(found.estimate),
+            *notes,
+        ],
+        "unasked": [found.unasked] if found.unasked else [],
+        "undetermined": [] if found.question is None else _rivals(task.header.units, found, found.question),
+    }
+    reasons = [reason for told_of in causes.values() for reason in told_of]
     verdict: Verdict = "undecided" if reasons else "met" if met else "missed"
-    assessment: dict[str, Json] = {"met": verdict == "met", "requirements": listed}
+    assessment: dict[str, Json] = {"verdict": verdict, "met": verdict == "met", "requirements": listed}
     if reasons:
         assessment["undecided"] = reasons
+        assessment["causes"] = [cause for cause, told_of in causes.items() if told_of]
     if without:
         assessment["neglected"] = [one.entry(task.header.units) for one in without]
     if found.question is not None:
@@ -155,10 +158,13 @@ def _without_top_up(judged: Results, why: str) -> Results:
 
 def _rivals(units: Units, found: Identified, question: ModelQuestion) -> list[str]:
     """The other explanations of the data that the verdict would not hold for."""
-    errors = model_errors(question.requirements)
-    if errors:
-        return beyond_admissible(units, found.model, found.estimate, errors)
-    return beyond_errors(units, found.model, found.estimate, question.entries, question.information)
+    errors, model, estimate = model_errors(question.requirements), found.model, found.estimate
+    apart = (
+        beyond_admissible(model, estimate, errors)
+        if errors
+        else beyond_errors(model, estimate, question.entries, question.information)
+    )
+    return rival_notes(units, estimate, apart)
 
 
 def _about(topped: Results, levels: Mapping[str, float]) -> Results:

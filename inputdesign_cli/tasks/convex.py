@@ -29,6 +29,7 @@ from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.confidence import Confidence, covered
 from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
+from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.grid_method import GridMethod
 from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, shortfall
 from inputdesign_cli.tasks.record_search import Made, fitting_record, samples_of_record
@@ -73,6 +74,7 @@ class ConvexTask:
     unstated: Sequence[ModelError]
     stated: Sequence[StatedBound]
     simulation: Simulation
+    foresight: Foresight | None = None
 
     def solve(self) -> Results:
         """The design, its proof, its signal and its curves.
@@ -133,6 +135,10 @@ class ConvexTask:
             known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
+            if record is not None and self.foresight is not None:
+                foreseen = self.foresight.foreseen(record.samples, done.problem.requirements, result)
+                result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
+                notes += foreseen.notes
             result |= {"notes": [*result.get("notes", []), *notes]} if notes else {}
         result["timing_s"] = {
             "design": solved - started,
@@ -146,7 +152,9 @@ class ConvexTask:
         found = made.design.result
         generator = redrawn(made.request, made.design, record)
         renewed = Redrawn("design", generator, found.basis, found.x)
-        return Delivered(results, record.samples, renewed, done.confidence.alpha)
+        seen, asked = self.foresight, done.problem.requirements
+        tried = None if seen is None else partial(seen.tried, record.samples, asked)
+        return Delivered(results, record.samples, renewed, done.confidence.alpha, tried)
 
     def designed(self) -> tuple[Designed, dict[str, Json]]:
         """The design with its experiment, its status and what the solver did.

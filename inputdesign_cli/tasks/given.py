@@ -24,6 +24,7 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.confidence import Confidence
+from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, record_notes, worst_ratio
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
@@ -106,6 +107,7 @@ class GivenTask:
     record: RecordRequest
     ellipses: Pairs | None
     simulation: Simulation
+    foresight: Foresight | None = None
 
     def solve(self) -> Results:
         """r_u, information, predicted standard deviations and powers of the excitation.
@@ -166,13 +168,19 @@ class GivenTask:
         signal = result.get("signal", {})
         notes = broken_limits(self.limits, experiment.samples, excitation.power, signal)
         notes += record_notes(self.record, experiment.samples, record) if record is None else []
+        if record is not None and self.foresight is not None:
+            foreseen = self.foresight.foreseen(record.samples, requirements, result)
+            result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
+            notes += foreseen.notes
         if notes:
             result["notes"] = notes
         result["timing_s"] = {"analysis": time.perf_counter() - started}
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, confidence.alpha)
-        return Delivered(results, record.samples, self._renewed(len(record.samples)), confidence.alpha)
+        renewed, seen = self._renewed(len(record.samples)), self.foresight
+        tried = None if seen is None else partial(seen.tried, record.samples, requirements)
+        return Delivered(results, record.samples, renewed, confidence.alpha, tried)
 
     def _result(
         self,

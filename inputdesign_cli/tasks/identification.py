@@ -28,7 +28,7 @@ from inputdesign_cli.tasks.result.estimates import (
     prior_notes,
 )
 from inputdesign_cli.tasks.result.refutations import differences, repetitions
-from inputdesign_cli.tasks.result.rivals import beyond_errors
+from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_notes
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,8 @@ def identification_results(task: Identification, found: Identified, started: flo
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
     else:
         errors = model_errors(question.requirements) or question.entries
-        notes += beyond_errors(header.units, found.model, estimate, errors, question.information)
+        apart = beyond_errors(found.model, estimate, errors, question.information)
+        notes += rival_notes(header.units, estimate, apart)
         tables["bound"], curves["bound"], worst = bound_of_data(
             header.units, question.requirements, question.entries, question.information
         )

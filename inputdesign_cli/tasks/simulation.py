@@ -7,7 +7,7 @@ Every run draws a new realisation of the spectrum (scaled to its power exactly) 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -35,9 +35,13 @@ from inputdesign_cli.tasks.result.simulation import (
     fractions,
     gap_notes,
     input_entry,
+    searched_notes,
     study_entry,
 )
 from inputdesign_cli.tasks.result.simulation_curves import cloud, disturbance, error_bands
+
+# Records that are searched from several starts, where those leave other minima.
+_SEARCHED = 10
 
 
 @dataclass(frozen=True)
@@ -94,12 +98,14 @@ class Delivered:
         record: (n, r), about its operating point; None if no excitation is needed.
         renewed: realises the spectrum anew in each run; None for a record that was given.
         alpha: of r_u, see the contract.
+        rivals: tries so many records with a search from several starts, where that finds other minima.
     """
 
     results: Results
     record: Array | None
     renewed: Excitation | None
     alpha: float
+    rivals: Callable[[int], Mapping[str, int]] | None = None
 
 
 def simulate(plan: Simulation, delivered: Delivered, executor: Executor | None = None) -> Results:
@@ -152,8 +158,12 @@ def _simulated(plan: Simulation, delivered: Delivered, executor: Executor | None
         if true.loop is not None:
             shown = disturbance(units, true.loop, tried.trials.first)
             tables[f"disturbance_{name}"], curves[f"disturbance_{name}"] = shown
+    searched: Mapping[str, int] = {}
+    if result.get("foreseen", {}).get("rivals") and delivered.rivals is not None:
+        searched = delivered.rivals(_SEARCHED)
+        inputs["design"] |= {"searched": dict(searched)} if searched else {}
     result["simulation"] = study_entry(study, inputs, excitation="new" if plan.renewed else "record")
-    notes = [*gap_notes(units, inputs), *confidence_notes(result, inputs)]
+    notes = [*gap_notes(units, inputs), *confidence_notes(result, inputs), *searched_notes(searched)]
     if notes:
         result["notes"] = [*result.get("notes", []), *notes]
     result["timing_s"] = {**result["timing_s"], "simulation": time.perf_counter() - started}

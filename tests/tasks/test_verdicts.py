@@ -34,7 +34,11 @@ def test_a_missing_lag_leaves_the_verdict_undecided(drift, heater_record):
     assert result["identification"]["tests"]["recent_inputs"]["lag"] in (7, 8, 9)
     assert "raise the orders of B and F" in " ".join(result["notes"])
     assert "signal" not in found.results.tables
-    assert "undecided, neither met nor missed" in said(found.results)
+    assert result["assessment"]["verdict"] == "undecided"
+    assert result["assessment"]["causes"] == ["contradicted"]
+    assert "undecided, neither met nor missed: the data contradict the model; the notes" in said(
+        found.results
+    )
 
 
 def test_records_of_two_plants_are_named(heater_record, tmp_path):
@@ -74,7 +78,8 @@ def test_a_drift_is_told_from_noise(heater_record):
     spec = parse_spec(HEATER, overrides=["noise={C: [1], D: [1, -0.5], variance: 0.001}"])
     found = assess(spec, heater_record("a.csv", 720, 1, drift=2.0)).results.result
     assert "trend" in found["identification"]["failed"]
-    assert "remove the trend" in " ".join(found["notes"])
+    first = found["assessment"]["undecided"][0]
+    assert "let the noise drift (noise: {drift: true}), remove the trend" in first
 
 
 def test_undecided_has_its_own_exit_code(heater_record, tmp_path):

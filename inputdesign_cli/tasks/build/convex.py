@@ -7,10 +7,12 @@ from dataclasses import replace
 
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
+from inputdesign_cli.runs.results import Result
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
 from inputdesign_cli.tasks.build.demand import check_design
+from inputdesign_cli.tasks.build.foresight import build_foresight
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.limits import build_density_limits, build_power_limits, implied_limits
@@ -81,7 +83,15 @@ def build_convex(spec: Spec) -> ConvexTask:
         unstated=unstated_errors(spec, experiment),
         stated=stated_bounds(spec),
         simulation=build_simulation(spec, experiment),
+        foresight=build_foresight(spec, experiment, _designed_alone),
     )
+
+
+def _designed_alone(spec: Spec) -> Result:
+    """The result of a design that is looked at beside another one: no bounds, and none beside it in turn."""
+    task = build_convex(spec)
+    alone = None if task.foresight is None else replace(task.foresight, richer={})
+    return replace(task, foresight=alone, any_spectrum_tolerance=None).solve().result
 
 
 def check_supported(spec: Spec) -> None:

@@ -16,6 +16,7 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
+from inputdesign_cli.tasks.build.foresight import build_foresight
 from inputdesign_cli.tasks.build.header import build_header, build_units
 from inputdesign_cli.tasks.build.limits import build_power_limits
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
@@ -80,6 +81,7 @@ def build_given(spec: Spec) -> GivenTask:
         record=build_record_request(spec, experiment.size),
         ellipses=spec.report.ellipses,
         simulation=build_simulation(spec, experiment),
+        foresight=build_foresight(spec, experiment, None),
     )
 
 

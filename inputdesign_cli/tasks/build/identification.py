@@ -10,6 +10,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy.calibration import with_alpha
 from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.identification import Earlier
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
@@ -93,14 +94,19 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
 
     def topped_up(levels: Mapping[str, float]) -> Results:
         prior = {"parameters": list(raw.model.names), "information": (factor @ factor.T).tolist()}
-        return build_convex(
+        task = build_convex(
             parse_spec(
                 spec.to_yaml(),
                 file="top-up",
                 overrides=[f"experiment.prior={json.dumps(prior)}", *_offset(spec, levels)],
                 folder=spec.resolve_path("."),
             )
-        ).solve()
+        )
+        if task.foresight is None:
+            return task.solve()
+        # Both records are assessed together.
+        earlier = Earlier(raw.model.theta, factor @ factor.T)
+        return replace(task, foresight=replace(task.foresight, earlier=earlier, richer={})).solve()
 
     requirements = [make(experiment) for make in build_requirements(spec, raw)]
     usual, information = model_error_alpha(spec, raw.model), np.eye(experiment.size)

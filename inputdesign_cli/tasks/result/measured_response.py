@@ -135,6 +135,7 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
     verdict, worst = judged.verdict, judged.worst
     ratio, low, high = float(judged.ratios[worst]), float(judged.least.max()), float(judged.largest.max())
     entry: dict[str, Json] = {
+        "verdict": verdict,
         "met": verdict == "met",
         "requirements": [{"name": "frequency_response", "worst_ratio": ratio, "frequency": float(w[worst])}],
     }
@@ -144,6 +145,7 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
         entry["periods"] = counted
         enough = f"about {counted} periods that count would do"
         if verdict == "undecided":
+            entry["causes"] = ["chance"]
             entry["undecided"] = [
                 f"the largest deviation is {ratio:.4g} of what is admitted, at {w[worst]:.4g} "
                 f"{header.units.per_time}, and by chance anything between {low:.3g} and {high:.3g} may stand "

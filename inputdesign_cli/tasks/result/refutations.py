@@ -8,6 +8,7 @@ import numpy as np
 
 from inputdesign_cli.identification import Estimate, Extension, ScoreTest
 from inputdesign_cli.plant import Model
+from inputdesign_cli.tasks.result.remedies import remedies_of
 
 _FOUND = {
     "plant": "past inputs explain residuals{where} (probability {p}), most at lag {lag}: the plant has "
@@ -15,21 +16,12 @@ _FOUND = {
     "enough",
     "noise": "the residuals are not white{where} (probability {p}), most at lag {lag}: the noise has "
     "more structure than the model, and the covariance is not to be trusted; {remedy}",
-    "drift": "the residuals drift slowly{where} (probability {p}): remove the trend from the record, "
-    "use a part of it without drift, or {remedy}",
+    "drift": "the residuals drift slowly{where} (probability {p}), which other tests notice too: {remedy}, "
+    "remove the trend from the record, or use a part of it without drift",
 }
+# What drifts makes other tests fail, and what is missing in G those of the noise.
+_FIRST = ("drift", "plant", "noise")
 _MISSING = "one parameter is missing (probability {p} without it): one more {what} ({name})"
-_IN_Q = {
-    "plant": "raise the orders of B and F (or A), or change the delay",
-    "noise": "raise the orders of C and D (or A)",
-    "drift": "raise the order of D",
-}
-_IN_S = {
-    "plant": "raise the orders of numerator and denominator",
-    "noise": "a model in q^-1 can describe it",
-    "drift": "describe it by a model in q^-1",
-}
-
 # The prior and the data of one system differ as much with this probability.
 _ONE_SYSTEM = 1e-3
 _LEAST = 1e-300
@@ -107,12 +99,16 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
             continue
         if test.fault not in strongest or test.probability < strongest[test.fault].probability:
             strongest[test.fault] = test
-    remedies = _IN_S if model.continuous else _IN_Q
+    remedies = remedies_of(model)
     of_many = [
         _FOUND[fault].format(
-            p=chance(test.probability), lag=test.lag, remedy=remedies[fault], where=_where(model, test)
+            p=chance(strongest[fault].probability),
+            lag=strongest[fault].lag,
+            remedy=remedies[fault],
+            where=_where(model, strongest[fault]),
         )
-        for fault, test in strongest.items()
+        for fault in _FIRST
+        if fault in strongest
     ]
     of_one = [
         _MISSING.format(p=chance(test.probability), what=directed[test][0].what, name=directed[test][0].name)

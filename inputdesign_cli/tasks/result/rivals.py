@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,48 +18,86 @@ from inputdesign_cli.runs.units import Units
 _MOST_NAMES = 4
 
 
+@dataclass(frozen=True)
+class Apart:
+    """A rival whose G differs from that of the estimate by `ratio` times a `measure`, most at `w`."""
+
+    rival: Rival
+    ratio: float
+    w: float
+    measure: str
+
+
 def rival_entries(estimate: Estimate) -> list[dict[str, Json]]:
     """`identification.rivals` of `result.json`."""
+    return [_entry(estimate, one) for one in estimate.rivals]
+
+
+def foreseen_entries(units: Units, estimate: Estimate, found: Sequence[Apart]) -> list[dict[str, Json]]:
+    """`foreseen.rivals` of `result.json`."""
     return [
-        {"theta": dict(zip(estimate.names, one.theta.tolist(), strict=True)), "excess": one.excess}
-        for one in estimate.rivals
+        _entry(estimate, one.rival)
+        | {"ratio": one.ratio, "measure": one.measure, "frequency": one.w / units.frequency}
+        for one in found
     ]
 
 
 def beyond_errors(
-    units: Units, model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array
-) -> list[str]:
+    model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array
+) -> list[Apart]:
     """The rivals whose G is outside of the error bound r_u of the estimate."""
-    return _told(units, model, estimate, errors, lambda error, w: error.error_bound(information, w), "r_u")
+    return _beyond(model, estimate, errors, lambda error, w: error.error_bound(information, w), "r_u")
 
 
-def beyond_admissible(
-    units: Units, model: Model, estimate: Estimate, errors: Sequence[OnModelError]
-) -> list[str]:
+def beyond_admissible(model: Model, estimate: Estimate, errors: Sequence[OnModelError]) -> list[Apart]:
     """The rivals whose G is further from that of the estimate than is admitted."""
-    return _told(
-        units, model, estimate, errors, lambda error, w: error.admissible.at(w), "the admissible error"
+    return _beyond(model, estimate, errors, lambda error, w: error.admissible.at(w), "the admissible error")
+
+
+def rival_notes(units: Units, estimate: Estimate, found: Sequence[Apart]) -> list[str]:
+    """What to say of rivals that were found in data."""
+    return [
+        f"other parameters explain the data nearly as well ({_parameters(estimate, one.rival)}; -2 log "
+        f"likelihood is {one.rival.excess:.3g} higher), and their G differs by {_far(units, one)}: excite "
+        "more frequencies, or hold what is known (plant.known)"
+        for one in found
+    ]
+
+
+def foreseen_note(units: Units, estimate: Estimate, found: Sequence[Apart], remedy: str) -> str:
+    """What to say of rivals that a record of the design would leave."""
+    nearest = min(found, key=lambda one: one.rival.excess)
+    excess = nearest.rival.excess
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return (
+        f"other parameters would explain such a record nearly as well: in a simulated one also "
+        f"{_parameters(estimate, nearest.rival)}{more}, of which -2 log likelihood is {abs(excess):.3g} "
+        f"{'higher' if excess >= 0.0 else 'lower'} and G differs by {_far(units, nearest)}. Estimates may "
+        f"end there, whatever r_u says, and assess would call such a record undecided: {remedy}"
     )
 
 
-def _told(
-    units: Units,
+def _far(units: Units, one: Apart) -> str:
+    return f"{one.ratio:.3g} times {one.measure} about {units.named(one.w)}"
+
+
+def _entry(estimate: Estimate, one: Rival) -> dict[str, Json]:
+    return {"theta": dict(zip(estimate.names, one.theta.tolist(), strict=True)), "excess": one.excess}
+
+
+def _beyond(
     model: Model,
     estimate: Estimate,
     errors: Sequence[OnModelError],
     size: Callable[[OnModelError, Array], Array],
-    name: str,
-) -> list[str]:
+    measure: str,
+) -> list[Apart]:
     found = []
     for rival in estimate.rivals:
         other = model.at(rival.theta)
         ratio, w = max((_furthest(model, other, error, size) for error in errors), default=(0.0, 0.0))
         if ratio > 1.0:
-            found.append(
-                f"other parameters explain the data nearly as well ({_parameters(estimate, rival)}; -2 log "
-                f"likelihood is {rival.excess:.3g} higher), and their G differs by {ratio:.3g} times {name} "
-                f"about {units.named(w)}: excite more frequencies, or hold what is known (plant.known)"
-            )
+            found.append(Apart(rival, ratio, w, measure))
     return found
 
 

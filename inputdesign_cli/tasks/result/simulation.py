@@ -119,6 +119,18 @@ def confidence_notes(result: Mapping[str, Json], inputs: Mapping[str, Json]) -> 
     ]
 
 
+def searched_notes(searched: Mapping[str, int]) -> list[str]:
+    """That the runs tell of one minimum only, where records leave others."""
+    if not searched:
+        return []
+    runs = searched["runs"]
+    return [
+        "the runs of simulate begin their estimates at the nominal parameters, and so tell of the minimum "
+        f"there alone: with the search of identify {searched['elsewhere']} of {runs} records end at other "
+        f"parameters, and {searched['rivals']} of {runs} would be undecided"
+    ]
+
+
 def gap_notes(units: Units, inputs: Mapping[str, Json]) -> list[str]:
     """The gap between what the design predicts on its own model and what the true system gives."""
     for name, entry in inputs.items():

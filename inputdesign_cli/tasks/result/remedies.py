@@ -1,0 +1,44 @@
+"""What mends a structure that data refute, in the words in which its spec states it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from inputdesign_cli.plant import Model
+from inputdesign_cli.runs.results import Json
+from inputdesign_cli.tasks.result.blocks import blocks_of
+
+_LAG = "one more lag, denominator: [[T1, 1], [T2, 1]] with both in parameters,"
+
+
+def remedies_of(model: Model) -> dict[str, str]:
+    """By what the tests find, `plant`, `noise` or `drift`, the keys to change."""
+    blocks = blocks_of(model)
+    return {"plant": _of_plant(blocks["plant"]), **_of_noise(model, blocks)}
+
+
+def _of_plant(plant: Mapping[str, Json]) -> str:
+    stated = plant.get("continuous", {})
+    if "gain" in stated:
+        return f"write plant.continuous with numerator: [K] and {_LAG} in place of gain and time_constant"
+    if "state_space" in plant:
+        return "give A, B and C of the state space one more state"
+    if "parameters" not in plant:
+        if "continuous" in plant:
+            return "raise the orders of numerator and denominator"
+        return "raise the orders of B and F (or A), or change the delay"
+    if "continuous" in plant:
+        return f"give the numerator one more coefficient, or the denominator {_LAG}"
+    return "give B or F (or A) one more coefficient, by a name in parameters"
+
+
+def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Json]]) -> dict[str, str]:
+    plant, noise = blocks["plant"], blocks["noise"]
+    if model.continuous:
+        sampled = "sample the plant (plant.sample: zoh), so that noise may have"
+        return {"noise": f"{sampled} C and D", "drift": f"{sampled} drift: true"}
+    first = " (such as noise: {C: [1, -0.1], D: [1, -0.8]})" if not {"C", "D"} & set(noise) else ""
+    polynomials = "" if "continuous" in plant or "state_space" in plant else " (or A)"
+    drifts = "drift" in noise
+    drift = "raise the order of D under noise" if drifts else "let the noise drift (noise: {drift: true})"
+    return {"noise": f"raise the orders of C and D under noise{first}{polynomials}", "drift": drift}

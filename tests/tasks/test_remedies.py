@@ -1,0 +1,62 @@
+"""What is said to mend a refuted structure can be written into the spec that states it."""
+
+import re
+
+import pytest
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.build.identification import build_identification
+from inputdesign_cli.tasks.result.remedies import remedies_of
+
+SPEC = """
+sample_time: 5
+noise: {variance: 0.04}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.3, band: [0.001, 0.1]}}
+spectrum: {type: fir, order: 8}
+"""
+SHORT = "{continuous: {gain: 2.1, time_constant: 180, dead_time: 25}, sample: zoh}"
+IN_S = "{continuous: {numerator: [2.1], denominator: [180, 1]}, sample: zoh}"
+NAMED = """{parameters: {K: 2.1, T: 180, L: 25}, sample: zoh,
+  continuous: {numerator: [K], denominator: [T, 1], delay: L}}"""
+STATES = "{parameters: {a: 0.03}, state_space: {A: [[-a]], B: [[1]], C: [[a]]}, sample: zoh}"
+IN_Q = "{B: [0, 0.05], F: [1, -0.97]}"
+NAMED_IN_Q = "{parameters: {b: 0.05, f: -0.97}, B: [0, b], F: [1, f]}"
+PLANTS = {"short": SHORT, "s": IN_S, "named": NAMED, "states": STATES, "q": IN_Q, "named q": NAMED_IN_Q}
+WORDS = {
+    "short": "numerator: [K]",
+    "s": "raise the orders of numerator and denominator",
+    "named": "denominator: [[T1, 1], [T2, 1]]",
+    "states": "one more state",
+    "q": "raise the orders of B and F",
+    "named q": "by a name in parameters",
+}
+
+
+def remedies(plant, *overrides):
+    spec = parse_spec(f"plant: {plant}\n{SPEC}", overrides=overrides)
+    return spec, remedies_of(build_identification(spec).nominal)
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_remedies_are_in_the_words_of_the_plant(kind):
+    spec, found = remedies(PLANTS[kind])
+    assert WORDS[kind] in found["plant"]
+    for other, words in WORDS.items():
+        assert other == kind or words not in found["plant"] or other in ("short", "named")
+    for fault in ("noise", "drift"):
+        (block,) = re.findall(r"noise: (\{.*\})\)", found[fault])
+        build_convex(parse_spec(spec.to_yaml(), overrides=[f"noise={{variance: 0.04, {block[1:]}"]))
+
+
+def test_a_lag_more_is_written_as_it_is_said():
+    plant = """{parameters: {K: 2.1, T1: 180, T2: 9, L: 25}, sample: zoh,
+      continuous: {numerator: [K], denominator: [[T1, 1], [T2, 1]], delay: L}}"""
+    assert build_identification(parse_spec(f"plant: {plant}\n{SPEC}")).nominal.names == ("K", "T1", "T2", "L")
+
+
+def test_a_noise_that_drifts_is_not_told_to_drift():
+    _, found = remedies(NAMED, "noise.drift=true", "noise.C=[1, -0.8]")
+    assert "raise the order of D under noise" in found["drift"]
+    assert "such as" not in found["noise"]
