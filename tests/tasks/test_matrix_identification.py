@@ -234,7 +234,11 @@ def test_offsets_and_outliers_name_the_channel(write):
         (lambda c: {**c, "y1": np.ones(500)}, "constant-output", "y1"),
         (lambda c: {**c, "u2": 2.0 * c["u1"]}, "not-exciting", "b1[1,1]"),
         (lambda c: {**c, "time_s": 0.1 * c["time_s"]}, "data-not-uniform", "every 0.1 s"),
-        (lambda c: {**c, "time_s": c["time_s"] - 2 * (c["time_s"] > 99)}, "data-not-uniform", "99 is followed by 98"),
+        (
+            lambda c: {**c, "time_s": c["time_s"] - 2 * (c["time_s"] > 99)},
+            "data-not-uniform",
+            "99 is followed by 98",
+        ),
         (lambda c: {"time_ms": c.pop("time_s"), **c}, "data-wrong-unit", "ms"),
     ],
 )
