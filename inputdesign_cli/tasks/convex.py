@@ -247,10 +247,19 @@ class ConvexTask:
                 "too-long",
                 f"the shortest experiment within the power limits takes {result['samples']} samples (proved: "
                 f"no fewer than {least}), but {limit} allows {most}; with these {bought.sentence}",
-                f"write {enough}, allow more power, or ask for less accuracy",
+                f"write {enough}{self._for_the_spectrum}, allow more power, or ask for less accuracy",
                 limit,
                 details=bought.details,
             )
+        )
+
+    @property
+    def _for_the_spectrum(self) -> str:
+        """What a length leaves open that no record was made for."""
+        return (
+            " (of the spectrum; within limits on single samples a record may take more)"
+            if (self.record.bounds.hard)
+            else ""
         )
 
     def _signal_entry(self, done: Designed, made: Made, record: Record) -> dict[str, Json]:

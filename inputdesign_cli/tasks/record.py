@@ -276,8 +276,8 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
     asked = request.samples or experiment
     if record.method != "given" and len(record.samples) > asked + request.settings.block:
         notes.append(
-            f"within the limits on single samples the accuracy takes {len(record.samples)} samples; the "
-            f"spectrum alone would take {asked}"
+            f"within the limits on single samples a record of {len(record.samples)} samples was found; the "
+            f"spectrum alone would take {asked}, and experiment.samples designs for a length in between"
         )
     return notes
 
