@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy.special
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -56,7 +56,7 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
     return SilentLines(
         lines,
         np.asarray(ratio),
-        np.asarray(scipy.stats.f.sf(ratio, freedom, freedom * (periods - 1))),
+        np.asarray(scipy.special.fdtrc(freedom, freedom * (periods - 1), ratio)),
         np.sqrt(2.0 * beyond / periods),
     )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import scipy.stats
+import scipy.special
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
@@ -140,9 +140,12 @@ def _judged(
     freedom = 2 * found.freedom * window
     tests = max(len(found.harmonics) // window, 1) * found.noise.shape[1]
     rare = 0.5 * (1.0 - _SURE) / tests
-    low, high = (float(np.sqrt(freedom / scipy.stats.chi2.ppf(p, freedom))) for p in (1.0 - rare, rare))
+    low, high = (
+        float(np.sqrt(freedom / (2.0 * scipy.special.gammaincinv(0.5 * freedom, p))))
+        for p in (1.0 - rare, rare)
+    )
     # Where r_adm is a share of |G|, it is known as well as |G| is.
-    away = scipy.stats.norm.isf(0.25 * (1.0 - _SURE) / smooth.size) * smooth * np.sqrt(0.5)
+    away = -scipy.special.ndtri(0.25 * (1.0 - _SURE) / smooth.size) * smooth * np.sqrt(0.5)
     at_least = lines.at(np.maximum(np.abs(found.G) - away, 1e-9 * away))
     at_most = lines.at(np.abs(found.G) + away)
     return Judged(

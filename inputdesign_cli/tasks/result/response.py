@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.stats
+import scipy.special
 from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
@@ -279,7 +279,11 @@ def _study_entry(
     ratio = (study.deviation / expected)[told]
     freedom = 2 * (study.runs - 1)
     each = _CHANCE / (2.0 * ratio.size)
-    chance = np.sqrt(scipy.stats.chi2.ppf([each, 1.0 - each], freedom) / freedom) if freedom else [0.0, 0.0]
+    chance = (
+        np.sqrt(2.0 * scipy.special.gammaincinv(0.5 * freedom, [each, 1.0 - each]) / freedom)
+        if freedom
+        else [0.0, 0.0]
+    )
     bias = np.abs(study.mean - terms.lines.G) / expected
     return {
         "deviation_ratio": {
