@@ -70,7 +70,7 @@ def segmented(length, seed, *, colour=0.0):
     return u[kept, None], y[kept, None], [length] * (kept.size // length)
 
 
-@pytest.mark.parametrize("colour", [0.0, 0.4])
+@pytest.mark.parametrize("colour", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("length", [20, 150])
 def test_right_models_of_records_with_gaps_are_seldom_refuted(length, colour):
     """Unknown starts take their share of residuals away, which alone correlates them."""
