@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from inputdesign_cli.cli import main
 from inputdesign_cli.runs.run_directory import read_run
 from tests.support.campaigns import SPEC, applied, planned, written
+from tests.support.commands import caller
 
 
 @pytest.fixture
@@ -18,15 +18,7 @@ def run(monkeypatch, capsys, tmp_path):
     """Run `idesign` in an empty folder with the spec in it: its exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.yaml").write_text(SPEC)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["idesign", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return call
+    return caller(monkeypatch, capsys)
 
 
 @pytest.fixture

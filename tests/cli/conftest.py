@@ -1,30 +1,21 @@
 """Commands in an empty folder, with stand-ins for what they compute."""
 
-import sys
 from importlib import import_module
 
 import numpy as np
 import pytest
 
 from inputdesign_cli import specification, tasks
-from inputdesign_cli.cli import main
 from inputdesign_cli.runs.results import Results, Table
 from tests.support.command_line import RESULT
+from tests.support.commands import caller
 
 
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
     """Run `idesign` in an empty folder: its exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["idesign", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capsys.readouterr()
-        return ended.value.code or 0, out, err
-
-    return call
+    return caller(monkeypatch, capsys)
 
 
 @pytest.fixture

@@ -73,8 +73,8 @@ def descend(
                 problem,
                 region,
                 shape,
-                lambda _: weight,  # noqa: B023
-                lambda s: weight(s),  # noqa: B023
+                lambda _: weight,  # noqa: B023 (called before the loop goes on)
+                lambda s: weight(s),  # noqa: B023 (likewise)
                 tolerance=tolerance,
                 counter=counter,
                 until=lambda s: np.isfinite(goal.value(s)),

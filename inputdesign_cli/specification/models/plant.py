@@ -166,7 +166,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         return as_matrix(self.B)
 
     @property
-    def F_matrix(self) -> PolynomialMatrix:  # noqa: N802
+    def F_matrix(self) -> PolynomialMatrix:  # noqa: N802 (likewise)
         """F in the same form; absent polynomials are 1."""
         ones = tuple(tuple((1.0,) for _ in row) for row in self.B_matrix)
         return ones if self.F is None else as_matrix(self.F)
