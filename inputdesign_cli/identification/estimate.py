@@ -159,7 +159,7 @@ def concluded(
     if records.weights is not None:
         noise = np.asarray(np.linalg.inv(records.weights), dtype=float)
     lengths, earlier = records.lengths, records.earlier
-    factor = factor_of_data(names, *_gradients(records, point, noise))
+    factor = factor_at(names, records, point, noise)
     return Estimate(
         names=names,
         theta=np.asarray(point.theta, dtype=float),
@@ -195,6 +195,15 @@ def noise_of(point: Point, own: Array) -> Array:
     samples, outputs = point.errors.shape
     left = np.sqrt(np.maximum(samples - own - point.near.directions.shape[1] / outputs, 1.0))
     return np.asarray(point.errors.T @ point.errors / np.outer(left, left))
+
+
+def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Array) -> Array:
+    """The information of records about the parameters, in factors.
+
+    Raises:
+        SpecError: `not-exciting`.
+    """
+    return factor_of_data(names, *_gradients(records, point, noise))
 
 
 def _gradients(records: Records, point: Point, noise: Array) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from inputdesign_cli.plant.polynomial import Array
 # Settled: the next step, squared and in standard deviations of the estimate, is this small. It is still
 # taken; the steps shrink at least tenfold where the model fits, so that what is left is far smaller.
 _SETTLED = 1e-10
-_MOST_STEPS = 150
+MOST_STEPS = 150
 _FIRST_DAMPING = 1e-3
 _LEAST_DAMPING = 1e-8
 _MOST_DAMPING = 1e8
@@ -59,8 +59,8 @@ class Minimum:
     steps: NDArray[np.int64]
 
 
-def minimise(problem: Problem, start: Array) -> Minimum:
-    """Minimise the cost of every run from `start` (runs, k)."""
+def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS) -> Minimum:
+    """Minimise the cost of every run from `start` (runs, k), in `most` steps at most."""
     theta = problem.stabilised(start)
     runs = theta.shape[0]
     cost, hessian, slope = problem.at(theta)
@@ -69,7 +69,7 @@ def minimise(problem: Problem, start: Array) -> Minimum:
     finite = np.isfinite(cost)
     active = np.flatnonzero(finite)
     going_on = problem if np.all(finite) else problem.kept(finite)
-    for _ in range(_MOST_STEPS):
+    for _ in range(most):
         newton, gain = _step(hessian[active], slope[active], np.zeros(active.size))
         settled = gain * (problem.errors / np.maximum(cost[active], 1e-300)) < _SETTLED
         settled |= cost[active] <= 0.0

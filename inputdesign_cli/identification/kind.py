@@ -134,7 +134,7 @@ def identify_records(
         steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
         return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
 
-    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched)
+    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched, start)
     simulated, stable = kind.simulated(best, y, lengths)
     return concluded(
         kind.names,

@@ -70,6 +70,11 @@ class OverRecord:
         """(N, p)."""
         return self.record.y
 
+    @property
+    def dead_times(self) -> NDArray[np.int64]:
+        """Those of the other, whose parameters come first."""
+        return self.record.dead_times
+
     def remembering(self, late: int) -> Self:
         """The same, with a record that does."""
         return replace(self, record=self.record.remembering(late))

@@ -60,6 +60,11 @@ class PolynomialRecord:
         """None: the delay is known, and among what the filters remember."""
         return 0
 
+    @property
+    def dead_times(self) -> NDArray[np.int64]:
+        """None: delays are whole samples, and known."""
+        return np.zeros(0, dtype=np.int64)
+
     def remembering(self, late: int) -> Self:
         """The same."""
         return self

@@ -48,6 +48,10 @@ class Record(Protocol):
     def lateness(self, theta: Array) -> int:
         """The samples after which inputs from before the record no longer act but through the states."""
 
+    @property
+    def dead_times(self) -> NDArray[np.int64]:
+        """The parameters that move dead times: there the cost has kinks."""
+
     def remembering(self, late: int) -> Self:
         """The same, with free responses of inputs before it that act for so many samples."""
 
@@ -110,6 +114,11 @@ class Records:
     def lateness(self, theta: Array) -> int:
         """The longest of all parts."""
         return max(part.lateness(theta) for part in self.parts)
+
+    @property
+    def dead_times(self) -> NDArray[np.int64]:
+        """See `Record`."""
+        return self.parts[0].dead_times
 
     @cached_property
     def u(self) -> Array:

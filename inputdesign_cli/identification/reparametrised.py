@@ -55,6 +55,12 @@ class ReparametrisedRecord(OverRecord):
         """Of each output (m, N): what an unknown start adds."""
         return self.record.free_responses(self.parametrisation.at(theta).coefficients)
 
+    @property
+    def dead_times(self) -> NDArray[np.int64]:
+        """The parameters that move one."""
+        rows = self.parametrisation.jacobian[self.record.dead_times]
+        return np.flatnonzero(np.any(rows != 0.0, axis=0))
+
     def lateness(self, theta: Array) -> int:
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.gauss_newton import best_run, minimise
+from inputdesign_cli.identification.gauss_newton import MOST_STEPS, best_run, minimise
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.rivals import Rival, rivals
@@ -45,29 +45,33 @@ class Search:
     rivals: tuple[Rival, ...]
 
 
-def search(records: Records, points: Array, *, starts: int, before: Array | int = 0) -> Search:
+def search(
+    records: Records, points: Array, *, starts: int, before: Array | int = 0, quick: int | None = None
+) -> Search:
     """The likeliest of what Gauss and Newton find from `points` (n, k).
 
     Args:
         starts: how many points were looked at.
         before: (n,) steps that have been made from each.
+        quick: only so many steps from each; kinks may stop it, and no other minima are told.
     """
-    found = minimise(RecordProblem((records,) * len(points)), points)
+    found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS)
     best = best_run(found)
     steps = int(found.steps[best] + np.broadcast_to(before, len(points))[best])
     point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])
-    if not converged and np.isfinite(point.cost):
+    if not converged and not quick and np.isfinite(point.cost) and records.dead_times.size:
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
     first = point.errors[np.cumsum((0, *records.lengths[:-1]))]
-    return Search(records, point, converged, steps, starts, first, rivals(records, point, found))
+    others = () if quick else rivals(records, point, found)
+    return Search(records, point, converged, steps, starts, first, others)
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
     """Where a search settles that was stopped by kinks of the cost; None where that is not what stopped it.
 
     A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains what its slopes promise. Parameters that block the way are held, one after the other; the
+    and Newton gains what its slopes promise. Dead times that block the way are held, one after the other; the
     rest settles, and then each held one is moved to both sides, where the cost must be higher.
     """
     size = point.theta.size
@@ -77,8 +81,8 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
         if gain * point.errors.size > _SETTLED * point.cost:
             trial = _moved(records, point, step)
             if trial.cost >= point.cost:
-                more = [held | _unit(size, j) for j in map(int, np.flatnonzero(~held))]
-                if len(more) < 2:
+                more = [held | _unit(size, j) for j in records.dead_times.tolist() if not held[j]]
+                if not more:
                     return None
                 tried = [_moved(records, point, _newton(point, blocking)[0]) for blocking in more]
                 best = int(np.argmin([other.cost for other in tried]))
@@ -128,6 +132,7 @@ def from_rest_or_free(
     deviations: Records,
     rest: bool | None,
     searched: Callable[[Records, Array | None], Search],
+    about: Array | None = None,
 ) -> Search:
     """The search from rest, unless unknown starts explain what it leaves better than chance.
 
@@ -139,6 +144,7 @@ def from_rest_or_free(
         deviations: the same from their means, which an unknown level makes up for.
         rest: whether the records begin at rest about zero; None: as the data say.
         searched: what searches from its own starts and, if given, from the parameters (k,).
+        about: (k,), parameters that tell about how long unknown inputs act.
     """
 
     def begun_free(known: Array | None, late: int) -> Search:
@@ -150,13 +156,16 @@ def from_rest_or_free(
         errors = records.at(found.point.theta).errors
         return replace(found, first=errors[np.cumsum((0, *records.lengths[:-1]))])
 
+    def later(theta: Array) -> int:
+        late = deviations.lateness(theta)
+        return late + _SPARE if late else 0
+
     if rest is False:
-        return begun_free(None, 0)
+        return begun_free(None, 0 if about is None else later(about))
     at_rest = searched(records, None)
     if rest or at_rest.point.cost <= 0.0:
         return at_rest
-    late = deviations.lateness(at_rest.point.theta)
-    late += _SPARE if late else 0
+    late = later(at_rest.point.theta)
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
     unknowns = near.near.directions.shape[1]

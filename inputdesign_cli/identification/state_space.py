@@ -18,6 +18,7 @@ from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.transfer_record import late_samples
 from inputdesign_cli.plant import StateSpaceModel
+from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
@@ -103,6 +104,11 @@ class StateSpaceRecord:
         model = self.structure.at(theta)
         return late_samples(model.matrices.delay, model.sample_time or 1.0)
 
+    @property
+    def dead_times(self) -> NDArray[np.int64]:
+        """That of the structure, if it is free."""
+        return np.flatnonzero([letter == DELAY for letter, _, _ in self.structure.entries])
+
     def remembering(self, late: int) -> Self:
         """The same, where unknown inputs act for so many samples."""
         return replace(self, late=late)
@@ -140,7 +146,7 @@ class StateSpaceRecord:
 
     def stabilised(self, theta: Array) -> Array:
         """theta where its predictor is stable, or integrates, and otherwise nothing that is finite."""
-        delay = [k for k, (letter, _, _) in enumerate(self.structure.entries) if letter == "delay"]
+        delay = [k for k, (letter, _, _) in enumerate(self.structure.entries) if letter == DELAY]
         out = theta.copy()
         longest = (len(self.y) - 1) * (self.structure.sample_time or 1.0)
         out[delay] = np.clip(out[delay], 0.0, longest)

@@ -69,20 +69,29 @@ class TransferRecord:
         Inputs before the record that come late by a dead time move the states, sample by sample, as if from
         anywhere.
         """
-        model, samples = self.structure.at(theta), self.samples
-        found = [[np.ones((1, samples))] for _ in range(model.outputs)]
+        model = self.structure.at(theta)
+        found = [[np.ones((1, self.samples))] for _ in range(model.outputs)]
         for i, j in model.active:
-            entry = self._entry(model, i, j)
-            impulses = np.eye(min(entry.order + self.late, samples), samples)
-            if not len(impulses):
-                continue
-            poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else [1.0]
-            found[i].append(filtered([1.0], poles, impulses))
+            found[i].append(self._begun(model, i, j))
         return tuple(np.concatenate(parts) for parts in found)
+
+    def _begun(self, model: ContinuousModel, i: int, j: int) -> NDArray[np.float64]:
+        """(m, N): those of one entry."""
+        entry = self._entry(model, i, j)
+        impulses = np.eye(min(entry.order + self.late, self.samples), self.samples)
+        if not len(impulses):
+            return impulses
+        poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
+        return filtered([1.0], poles, impulses)
 
     def lateness(self, theta: Array) -> int:
         """The longest dead time, in samples, those that are begun counted whole."""
         return late_samples(self.structure.at(theta).memory, self.intersample.sample_time)
+
+    @cached_property
+    def dead_times(self) -> NDArray[np.int64]:
+        """Where the dead times stand in theta."""
+        return np.flatnonzero([parameter.letter == DELAY for parameter in self.structure.parameters])
 
     def remembering(self, late: int) -> Self:
         """The same, where unknown inputs act for so many samples."""
@@ -97,12 +106,20 @@ class TransferRecord:
         """By central differences."""
         parameter = self.structure.parameters[index]
         i, j = parameter.places[0]
-        order = self.structure.denominator[i][j].size - 1
+        order = self._order(i, j)
         slowest = 1.0 / (self.samples * self.intersample.sample_time)
         size = _STEP * max(abs(theta[index]), slowest ** (order - parameter.power))
         step = size * np.eye(self.size)[index]
-        above, below = self.free_responses(theta + step), self.free_responses(theta - step)
-        return tuple((a - b) / (2.0 * size) for a, b in zip(above, below, strict=True))
+        ends = self.structure.at(theta + step), self.structure.at(theta - step)
+        found = [[np.zeros((1, self.samples))] for _ in range(self.structure.outputs)]
+        for place in self.structure.active:
+            if place in parameter.places:
+                above, below = (self._begun(end, *place) for end in ends)
+                found[place[0]].append((above - below) / (2.0 * size))
+            else:
+                unmoved = min(self._order(*place) + self.late, self.samples)
+                found[place[0]].append(np.zeros((unmoved, self.samples)))
+        return tuple(np.concatenate(parts) for parts in found)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """(p, N, m): the signals (N, m) as they are, for the noise is white."""
@@ -138,7 +155,7 @@ class TransferRecord:
         step = self.intersample.sample_time
         slowest, fastest = _LEAST_DECAY / (self.samples * step), _FASTEST / step
         out = theta.copy()
-        out[self._late] = np.clip(out[self._late], 0.0, (self.samples - 1) * step)
+        out[self.dead_times] = np.clip(out[self.dead_times], 0.0, (self.samples - 1) * step)
         for every in self._denominators:
             columns = every[integrators(np.append(theta[every], 1.0)) :]
             poles = polynomial_roots(np.append(theta[columns], 1.0))
@@ -149,13 +166,11 @@ class TransferRecord:
             out[columns] = np.poly(poles).real[:0:-1]
         return out
 
+    def _order(self, i: int, j: int) -> int:
+        return self.structure.denominator[i][j].size - 1
+
     def _entry(self, model: ContinuousModel, i: int, j: int) -> HeldEntry:
         return model.held(i, j, self.intersample.sample_time)
-
-    @cached_property
-    def _late(self) -> NDArray[np.int64]:
-        """Where the dead times stand in theta."""
-        return np.flatnonzero([parameter.letter == DELAY for parameter in self.structure.parameters])
 
     @cached_property
     def _denominators(self) -> list[NDArray[np.int64]]:

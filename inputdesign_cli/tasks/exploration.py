@@ -17,9 +17,10 @@ from inputdesign_cli.identification.explore import (
     by_chance,
     explore_records,
     fits,
+    only_answers,
     order_of_excitation,
 )
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
@@ -40,6 +41,9 @@ from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
 
 # A simulation that explains less than this of data it has not seen is no model.
 _LEAST_FIT = 5.0
+# One that is refuted besides needs more.
+_HALF = 50.0
+_KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     log = read_logs(paths, preparation)
     loops = answers_output(log.parts)
     with blaming_columns(paths[0]):
-        found = explore_records(log.parts, feedback=bool(loops))
-    reasons = _reasons(found)
+        found = explore_records(log.parts, feedback=bool(loops), step=log.step)
+    reasons = (*_reasons(found), *_refuted(found), *_undriven(log))
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
@@ -146,9 +150,38 @@ def _reasons(found: Found) -> tuple[str, ...]:
     return tuple(told)
 
 
-def judge(
-    model: PolynomialModel, header: Header, paths: Sequence[Path], preparation: Preparation
-) -> Exploration:
+def _refuted(found: Found) -> tuple[str, ...]:
+    """Outputs of which a model explains less than half, where every kind of test refutes it as well.
+
+    Tests alone do not take trust away: with samples enough they refute every model of a real plant, also one
+    that explains almost everything. Nor does a poor fit alone: the noise may be strong.
+    """
+    failed = {test.name for test in found.estimate.failed}
+    if not all(failed & kind for kind in _KINDS):
+        return ()
+    single = found.model.outputs == 1
+    return tuple(
+        f"past inputs explain residuals, residuals explain each other, and the simulation explains {fit:.1f} "
+        f"% of {'y' if single else f'y{i + 1}'} in data that it has not seen: the plant acts otherwise than "
+        "any structure that was tried. It may be nonlinear, vary with time, or have inputs that the log "
+        "lacks: record about one operating point, or log what else acts on it"
+        for i, fit in enumerate(found.validation.simulation)
+        if fit < _HALF
+    )
+
+
+def _undriven(log: Log) -> tuple[str, ...]:
+    """Inputs that only answer the outputs."""
+    single = log.u.shape[1] == 1
+    return tuple(
+        f"{'u' if single else f'u{j + 1}'} follows from the outputs and its own past: data from a loop "
+        "without excitation, from which a plant is not identifiable (the inverse of the controller explains "
+        "them as well). Move the reference of the loop, or add dither to the input, and record again"
+        for j in only_answers(log.parts)
+    )
+
+
+def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Preparation) -> Exploration:
     """How a given model does on other data.
 
     Raises:

@@ -1,8 +1,14 @@
 """From a record alone to a model: delays, orders and families, judged on data that they have not seen."""
 
-from inputdesign_cli.identification.explore.fits import Fits as Fits, by_chance as by_chance, fits as fits
+from inputdesign_cli.identification.explore.fits import (
+    Fits as Fits,
+    by_chance as by_chance,
+    fits as fits,
+    output_error_form as output_error_form,
+)
 from inputdesign_cli.identification.explore.inputs import (
     answers_output as answers_output,
+    only_answers as only_answers,
     order_of_excitation as order_of_excitation,
 )
 from inputdesign_cli.identification.explore.joint import Found as Found, explore_records as explore_records

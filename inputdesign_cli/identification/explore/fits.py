@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 
 import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.polynomial_record import PolynomialRecord
+from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.records import Records
-from inputdesign_cli.identification.structure import Structure
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant import Coloured, Model, PolynomialModel, Reparametrised, SampledModel
 from inputdesign_cli.plant.polynomial import Array
 
 Parts = Sequence[tuple[Array, Array]]
@@ -38,33 +38,44 @@ class Fits:
     errors: Array
 
 
-def fits(model: PolynomialModel, parts: Parts) -> Fits:
-    """The fits of a model to records u (n, r), y (n, p)."""
+def fits(model: Model, parts: Parts) -> Fits:
+    """The fits of a sampled model to records u (n, r), y (n, p).
+
+    Raises:
+        TypeError: see `output_error_form`.
+    """
     measured, varying, simulated = _simulated(model, parts)
-    structure = Structure.of(model)
+    kind = estimator(model, 1.0).kind
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
-        errors = np.concatenate([_prediction_errors(structure, model.theta, u, y) for u, y in parts])
+        records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
+        late = max(record.lateness(model.theta) for record in records)
+        errors = np.concatenate([record.begun_freely(late).at(model.theta).errors for record in records])
     return Fits(percent(measured - simulated, varying), percent(errors, varying), simulated, errors)
 
 
-def simulation_fit(model: PolynomialModel, parts: Parts) -> tuple[float, ...]:
+def beside(found: Sequence[Fits]) -> Fits:
+    """The fits of models of one output each, to the same records, as those of all outputs."""
+    return Fits(
+        tuple(fit for one in found for fit in one.simulation),
+        tuple(fit for one in found for fit in one.prediction),
+        np.concatenate([one.simulated for one in found], axis=1),
+        np.concatenate([one.errors for one in found], axis=1),
+    )
+
+
+def simulation_fit(model: Model, parts: Parts) -> tuple[float, ...]:
     """The first of them alone."""
     measured, varying, simulated = _simulated(model, parts)
     return percent(measured - simulated, varying)
 
 
-def _simulated(model: PolynomialModel, parts: Parts) -> tuple[Array, Array, Array]:
+def _simulated(model: Model, parts: Parts) -> tuple[Array, Array, Array]:
     """(N, p) each: the outputs, what of them varies in each record, and the simulations."""
     return (
         np.concatenate([y for _, y in parts]),
         np.concatenate([y - y.mean(axis=0) for _, y in parts]),
         np.concatenate([simulate_free(model, u - u.mean(axis=0), y) for u, y in parts]),
     )
-
-
-def _prediction_errors(structure: Structure, theta: Array, u: Array, y: Array) -> Array:
-    record = PolynomialRecord(structure, u - u.mean(axis=0), y - y.mean(axis=0))
-    return Records((record,), free=True).at(theta).errors
 
 
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
@@ -84,10 +95,11 @@ def percent(errors: Array, varying: Array) -> tuple[float, ...]:
     return tuple(float(100.0 * (1.0 - x)) if np.isfinite(x) else -np.inf for x in left)
 
 
-def simulate_free(model: PolynomialModel, u: Array, y: Array) -> Array:
+def simulate_free(model: Model, u: Array, y: Array) -> Array:
     """(n, p): the simulation from u (n, r), its level and start such that it is nearest to y (n, p)."""
     error_form = output_error_form(model)
-    record = PolynomialRecord(Structure.of(error_form), u, y)
+    record = estimator(error_form, 1.0).kind.record(u, y)
+    record = record.remembering(record.lateness(error_form.theta))
     with np.errstate(over="ignore", invalid="ignore"):
         caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
         starts = record.free_responses(error_form.theta)
@@ -104,10 +116,35 @@ def begun(responses: NDArray[np.float64], left: Array) -> Array:
     return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
 
 
-def output_error_form(model: PolynomialModel) -> PolynomialModel:
-    """The plant of a model, its A multiplied into every F, with white noise on the output."""
+@singledispatch
+def output_error_form(model: Model) -> Model:
+    """The plant of a model, its A multiplied into every F, with white noise on the output.
+
+    Raises:
+        TypeError: models of this kind have none here: those that are not sampled, and state space.
+    """
+    raise TypeError(f"{type(model).__name__} has no output-error form")
+
+
+@output_error_form.register
+def _(model: PolynomialModel) -> Model:
     rows = [
         tuple(np.convolve(a, f) for f in fs) for a, fs in zip(model.per_output(model.A), model.F, strict=True)
     ]
     one = (np.ones(1),)
     return PolynomialModel(model.B, one, tuple(rows), one, one, model.covariance)
+
+
+@output_error_form.register
+def _(model: SampledModel) -> Model:
+    return model
+
+
+@output_error_form.register
+def _(model: Coloured) -> Model:
+    return output_error_form(model.plant)
+
+
+@output_error_form.register
+def _(model: Reparametrised) -> Model:
+    return output_error_form(model.coefficients)

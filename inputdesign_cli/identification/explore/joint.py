@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.estimate import Estimate
-from inputdesign_cli.identification.explore.fits import Fits, Parts, fits
+from inputdesign_cli.identification.estimators import identify
+from inputdesign_cli.identification.explore.fits import Fits, Parts, beside, fits, output_error_form
+from inputdesign_cli.identification.explore.processes import process_models
 from inputdesign_cli.identification.explore.search import Candidate, Chosen, busiest, explore_structure
-from inputdesign_cli.identification.polynomials import identify_polynomials
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.plant import Model, PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 _SHARE = 0.6
@@ -39,7 +40,7 @@ class Found:
 
     outputs: tuple[Chosen, ...]
     taken: tuple[Candidate, ...]
-    model: PolynomialModel
+    model: Model
     estimate: Estimate
     used: Parts
     validation: Fits
@@ -47,8 +48,8 @@ class Found:
     still: tuple[int, ...]
 
 
-def explore_records(parts: Parts, *, feedback: bool = False) -> Found:
-    """The model that records u (n, r), y (n, p) speak for.
+def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) -> Found:
+    """The model that records u (n, r), y (n, p) speak for, samples `step` apart.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
@@ -72,7 +73,7 @@ def explore_records(parts: Parts, *, feedback: bool = False) -> Found:
     found = []
     for i in range(y.shape[1]):
         own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
-        chosen = explore_structure(own[0], own[1], feedback=feedback)
+        chosen = explore_structure(own[0], own[1], feedback=feedback, step=step, physical=not still)
         if chosen is None:
             name = signal_name("y", i, y.shape[1])
             raise bad_spec(
@@ -83,10 +84,11 @@ def explore_records(parts: Parts, *, feedback: bool = False) -> Found:
             )
         found.append(chosen)
     used = busiest(moved, _MOST_SAMPLES)
-    taken, estimate, model = _estimated(found, used)
-    on_first = rows([c.orders.model().at(c.theta) for c in taken])
-    validation = fits(on_first, second)
-    whole = embedded(model, u.shape[1], moving)
+    taken, estimate, model = _estimated(found, used, feedback)
+    validation = beside(
+        [fits(c.model, [(u, y[:, i : i + 1]) for u, y in second]) for i, c in enumerate(taken)]
+    )
+    whole = joined(taken, u.shape[1], moving).at(model.theta, model.covariance)
     return Found(
         tuple(found),
         taken,
@@ -100,23 +102,23 @@ def explore_records(parts: Parts, *, feedback: bool = False) -> Found:
 
 
 def _estimated(
-    found: Sequence[Chosen], used: Parts
-) -> tuple[tuple[Candidate, ...], Estimate, PolynomialModel]:
+    found: Sequence[Chosen], used: Parts, feedback: bool
+) -> tuple[tuple[Candidate, ...], Estimate, Model]:
     """The best structures on the whole record; simpler ones where these cannot be estimated there."""
-    simplest = tuple(min(chosen.candidates, key=lambda c: c.orders.size) for chosen in found)
     u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
+    lengths = [len(part) for _, part in used]
     reason: SpecError | None = None
-    for taken in (tuple(chosen.best for chosen in found), tuple(_second(c) for c in found), simplest):
-        structure = rows([c.orders.model().at(c.theta) for c in taken])
+    for taken in _combinations(found):
+        structure = joined(taken, u.shape[1], range(u.shape[1]))
         try:
-            estimate = identify_polynomials(
-                structure, u, y, start=structure.theta, lengths=[len(part) for _, part in used], rest=False
+            estimate = identify(
+                structure, u, y, start=structure.theta, feedback=feedback, lengths=lengths, rest=False
             )
         except SpecError as error:
             reason = error
             continue
         model = structure.at(estimate.theta, estimate.noise)
-        if all(model.stable_outputs):
+        if output_error_form(model).radius < 1.0:
             return taken, estimate, model
     raise reason or bad_spec(
         "no-structure",
@@ -126,8 +128,21 @@ def _estimated(
     )
 
 
-def _second(chosen: Chosen) -> Candidate:
-    return chosen.candidates[min(1, len(chosen.candidates) - 1)]
+def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
+    """What may be taken for all outputs together: all in s by their names, or all polynomials in q^-1.
+
+    The kind that is best for the first output where both will do; then simpler structures.
+    """
+    kinds = (found[0].best.orders.physical, not found[0].best.orders.physical)
+    for choices in ([chosen.best_of(physical=kind) for chosen in found] for kind in kinds):
+        taken = tuple(choice for choice in choices if choice is not None)
+        if len(taken) == len(found):
+            yield taken
+    plain = [[c for c in chosen.candidates if not c.orders.physical] for chosen in found]
+    if all(plain):
+        yield tuple(own[0] for own in plain)
+        yield tuple(own[min(1, len(own) - 1)] for own in plain)
+        yield tuple(min(own, key=lambda c: c.orders.size) for own in plain)
 
 
 def divided(parts: Parts) -> tuple[Parts, Parts, bool]:
@@ -160,6 +175,20 @@ def _moves(some: Parts, whole: Parts) -> bool:
         return False
     spread, of_all = (np.concatenate([u for u, _ in records]).std(axis=0) for records in (some, whole))
     return bool(np.all(spread > _STILL * of_all))
+
+
+def joined(taken: Sequence[Candidate], inputs: int, moving: Sequence[int]) -> Model:
+    """The models of single outputs, of structures of one kind, as one model.
+
+    Args:
+        inputs: of the whole; those that are `moving` are those of the single models. Plants in s have all.
+    """
+    processes = [(c.orders, c.theta) for c in taken if c.orders.physical is True]
+    if processes:
+        shapes, thetas = zip(*processes, strict=True)
+        return process_models(shapes, thetas, np.eye(len(shapes)))
+    single = rows([c.orders.model().at(c.theta) for c in taken if c.orders.physical is False])
+    return embedded(single, inputs, moving)
 
 
 def rows(models: Sequence[PolynomialModel]) -> PolynomialModel:

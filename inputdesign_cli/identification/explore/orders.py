@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.explore.regression import SharedDenominator
+from inputdesign_cli.identification.records import longest
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
@@ -22,10 +27,23 @@ class Orders:
     d: int = 0
     f: int = 0
 
+    # Whether the parameters have names that mean something: gains, time constants, dead times.
+    physical: ClassVar[Literal[False]] = False
+
     @property
     def size(self) -> int:
         """Number of parameters."""
         return self.a + self.c + self.d + len(self.delays) * (self.b + self.f)
+
+    @property
+    def shared(self) -> bool:
+        """Whether plant and noise have poles in common: a wrong noise model then biases the plant."""
+        return self.a > 0
+
+    @property
+    def unknowns(self) -> int:
+        """What the input must tell: the coefficients of one input."""
+        return self.b + self.order
 
     @property
     def order(self) -> int:
@@ -37,6 +55,14 @@ class Orders:
         """The orders of the polynomials that the family has."""
         every = {"A": self.a, "B": self.b, "C": self.c, "D": self.d, "F": self.f}
         return {letter: order for letter, order in every.items() if order}
+
+    def starts(self, parts: Parts, quick: SharedDenominator, b: int) -> Array:
+        """(n, k): where to begin, by regression on records at rest."""
+        return estimator(self.model(), 1.0).kind.starts(longest(parts), None).points
+
+    def with_coloured_noise(self) -> list[Orders]:
+        """A plant of the same orders, Box and Jenkins's noise."""
+        return [Orders("BJ", self.delays, self.b, c=n, d=n, f=self.order) for n in (1, 2)]
 
     def model(self) -> PolynomialModel:
         """The structure, with numbers that mean nothing."""
@@ -54,11 +80,6 @@ def plant_order(n: int, delays: tuple[int, ...]) -> list[Orders]:
     """The families with a plant of this order; B has one coefficient more than that at order one."""
     b = max(n, 2)
     return [Orders("ARX", delays, b, a=n), Orders("ARMAX", delays, b, a=n, c=n), Orders("OE", delays, b, f=n)]
-
-
-def box_jenkins(of: Orders) -> list[Orders]:
-    """A plant of the same orders with coloured noise."""
-    return [Orders("BJ", of.delays, of.b, c=n, d=n, f=of.order) for n in (1, 2)]
 
 
 def _monic(order: int) -> Array:

@@ -87,6 +87,16 @@ def _explained(
     return found
 
 
+def numerators(parts: Parts, shared: SharedDenominator, b: int) -> Array:
+    """(r, b): B of every input at an estimate's F, by least squares."""
+    own = len(shared.delays) * b
+    blocks = [
+        (np.stack([*_caused(u, len(y), shared.F, shared.F.size - 1, b, shared.delays)], axis=1), y)
+        for u, y in _begun(parts)
+    ]
+    return _solve(blocks, own=own)[:own].reshape(-1, b)
+
+
 def from_rest(parts: Parts, shared: SharedDenominator, b: int) -> list[tuple[Array, Array]]:
     """Records with inputs counted from their first values, and outputs (n, 1) without level and start."""
     begun = _begun(parts)

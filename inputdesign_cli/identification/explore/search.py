@@ -7,23 +7,30 @@ about equally good the one with the fewest parameters is chosen.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification.adequacy import ScoreTest, failed, score_tests
-from inputdesign_cli.identification.estimate import noise_of
-from inputdesign_cli.identification.explore.fits import Parts, fits, simulation_fit
-from inputdesign_cli.identification.explore.orders import Orders, arx, box_jenkins, plant_order
-from inputdesign_cli.identification.explore.regression import arx_grid, best_delays, from_rest, output_error
-from inputdesign_cli.identification.polynomial_record import PolynomialRecord
-from inputdesign_cli.identification.polynomials import identify_polynomials
+from inputdesign_cli.identification.adequacy import failed, score_tests
+from inputdesign_cli.identification.checks import check_length
+from inputdesign_cli.identification.estimate import factor_at, noise_of
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.explore.fits import Parts, fits, output_error_form, simulation_fit
+from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order
+from inputdesign_cli.identification.explore.processes import Process, processes
+from inputdesign_cli.identification.explore.regression import (
+    SharedDenominator,
+    arx_grid,
+    best_delays,
+    from_rest,
+    output_error,
+)
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
-from inputdesign_cli.identification.structure import Structure
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 
 _MOST_SAMPLES = 4000
@@ -34,10 +41,16 @@ _ALWAYS = 3
 _ARX_KEPT = 2
 # Of each family so many are estimated once more, levels and starts along with them.
 _FINALISTS = 2
-# An error of simulation that is larger by less than this share is as good.
-_AS_GOOD = 1.2
+# An error of simulation that is larger by less than this share, and by no more points, is as good.
+_AS_GOOD, _POINTS = 1.2, 2.0
+# Samples to a parameter, at least; steps of the search for a candidate, by whether it is physical.
+_PER_PARAMETER = 10
+_STEPS = {False: 100, True: 30}
 _CHI2 = 3.84  # 95 % for one degree of freedom
 _WIDTH = 6
+
+Shape = Orders | Process
+"""A structure for one output."""
 
 
 @dataclass(frozen=True)
@@ -45,24 +58,45 @@ class Candidate:
     """One structure for one output.
 
     Attributes:
-        theta: (k,), estimated on the first part.
+        orders: the structure; `model` is it, estimated on the first part.
         estimation, validation: per cent that the simulation explains of the two parts.
         prediction: per cent one step ahead, on the second part.
         criterion: log of the variance + k log(N) / N (BIC), on the first part.
         failed: tests of the residuals that refute it.
-        biased: whether that speaks against its plant: a wrong noise model biases an A that plant and noise
-            share, not the plant of OE and BJ ([ljung-1999], Section 8.4).
     """
 
-    orders: Orders
-    theta: Array
+    orders: Shape
+    model: Model
     estimation: float
     validation: float
     prediction: float
     criterion: float
     failed: tuple[str, ...]
-    biased: bool
     converged: bool
+
+    @property
+    def theta(self) -> Array:
+        """(k,)."""
+        return self.model.theta
+
+    @property
+    def settled(self) -> bool:
+        """Whether the search ended, as far as a quick one tells: kinks at dead times stop it early."""
+        return self.converged or self.orders.physical
+
+    @property
+    def biased(self) -> bool:
+        """Whether failed tests speak against its plant.
+
+        A wrong noise model biases an A that plant and noise share, not the plant of OE and BJ
+        ([ljung-1999], Section 8.4).
+        """
+        return self.orders.shared and bool(self.failed)
+
+    @property
+    def unknowns(self) -> int:
+        """Parameters, delays that were searched for included."""
+        return self.orders.size + (0 if self.orders.physical else len(self.orders.delays))
 
 
 @dataclass(frozen=True)
@@ -73,24 +107,94 @@ class Chosen:
         candidates: the best first.
         ranges: of each input, the delays that 95 % of confidence leaves.
         by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
+        finalists: those that may be taken, the best first.
     """
 
     candidates: tuple[Candidate, ...]
     ranges: tuple[tuple[int, int], ...]
     by_order: dict[int, float]
+    finalists: tuple[Candidate, ...]
 
     @property
     def best(self) -> Candidate:
         """The one to take."""
         return self.candidates[0]
 
+    def best_of(self, *, physical: bool) -> Candidate | None:
+        """The best with parameters of that kind among those that are about as good as any."""
+        return next((c for c in self.finalists if c.orders.physical == physical), None)
 
-def explore_structure(first: Parts, second: Parts, *, feedback: bool = False) -> Chosen | None:
+
+@dataclass(frozen=True)
+class _Parts:
+    """What structures are estimated from and judged by."""
+
+    first: Parts
+    second: Parts
+    feedback: bool
+    quick: dict[int, SharedDenominator]
+    resting: Mapping[int, Parts]
+
+    @property
+    def samples(self) -> int:
+        return sum(len(y) for _, y in self.first)
+
+    def candidate(self, orders: Shape) -> Candidate | None:
+        """A structure, quickly estimated from records that begin at rest, and judged."""
+        n = min(max(orders.order, 1), max(self.quick))
+        resting = self.resting[n]
+        try:
+            points = orders.starts(resting, self.quick[n], max(n, 2))
+            return self._searched(orders, orders.model(), resting, points, free=False)
+        except (SpecError, np.linalg.LinAlgError):
+            return None
+
+    def refined(self, candidate: Candidate) -> Candidate | None:
+        """The same, levels and starts estimated along: the search goes on from where it ended."""
+        try:
+            return self._searched(
+                candidate.orders, candidate.model, centred(self.first), candidate.theta[None], free=True
+            )
+        except (SpecError, np.linalg.LinAlgError):
+            return None
+
+    def _searched(
+        self, orders: Shape, structure: Model, parts: Parts, points: Array, *, free: bool
+    ) -> Candidate:
+        kind = estimator(structure, 1.0).kind
+        check_length(self.samples, len(kind.names), kind.recent, outputs=1)
+        records = Records(tuple(kind.record(*part) for part in parts))
+        if free:
+            records = records.begun_freely(max(records.lateness(theta) for theta in points))
+        found = search(records, points, starts=len(points), quick=_STEPS[orders.physical])
+        noise = noise_of(found.point, kind.own())
+        factor_at(kind.names, records, found.point, noise)
+        echoes = kind.echoes(found.point.theta, records.lengths)
+        tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
+        fitted = structure.at(found.point.theta, noise)
+        on_first, on_second = fits(fitted, self.first), fits(fitted, self.second)
+        return Candidate(
+            orders,
+            fitted,
+            on_first.simulation[0],
+            on_second.simulation[0] if output_error_form(fitted).radius < 1.0 else -np.inf,
+            on_second.prediction[0],
+            float(np.log(max(noise[0, 0], 1e-300)) + orders.size * np.log(self.samples) / self.samples),
+            tuple(test.name for test in failed(tests)),
+            found.converged,
+        )
+
+
+def explore_structure(
+    first: Parts, second: Parts, *, feedback: bool = False, step: float = 1.0, physical: bool = True
+) -> Chosen | None:
     """The structures of one output, y (n, 1), from all inputs (n, r); None where nothing can be estimated.
 
     Args:
         first, second: records to estimate from and to judge by.
         feedback: whether u(t) may answer y(t).
+        step: the sample time.
+        physical: whether plants in s are tried.
     """
     first, second = busiest(first, _MOST_SAMPLES), busiest(second, _MOST_SAMPLES)
     samples = sum(len(y) for _, y in first)
@@ -98,43 +202,44 @@ def explore_structure(first: Parts, second: Parts, *, feedback: bool = False) ->
     most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // 6), 1)
     highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
     delays: tuple[int, ...] = (int(feedback),) * r
-    quick, tried = {}, list[Orders]()
+    quick = dict[int, SharedDenominator]()
     for n in range(1, highest + 1):
-        found = best_delays(first, n, max(n, 2), most, delays)
-        quick[n] = found
-        delays = found.delays
+        quick[n] = best_delays(first, n, max(n, 2), most, delays)
+        delays = quick[n].delays
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
     penalty = np.log(samples) / samples
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
+    parts = _Parts(first, second, feedback, quick, resting)
 
-    def judged(tried: Iterable[Orders]) -> list[Candidate]:
-        found = [
-            _candidate(orders, resting[min(max(orders.order, 1), highest)], first, second, feedback)
-            for orders in dict.fromkeys(tried)
-        ]
-        return [candidate for candidate in found if candidate is not None]
+    def judged(tried: Iterable[Shape]) -> list[Candidate]:
+        small = (shape for shape in dict.fromkeys(tried) if _PER_PARAMETER * shape.size <= samples)
+        return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
 
+    tried: list[Shape] = []
     for n in sorted({*range(1, min(highest, _ALWAYS) + 1), near}):
         tried += plant_order(n, quick[n].delays)
     tried += _best_arx(first, second, quick[near].delays, r, samples)
-    found_models = judged(tried)
-    plain = [c for c in found_models if c.orders.family == "OE"]
-    if plain:
-        found_models += judged(box_jenkins(max(plain, key=lambda c: c.validation).orders))
-    finalists = {
-        c.orders: c for c in (_refined(c, first, second, feedback) for c in _leading(found_models)) if c
-    }
-    found_models = [finalists.get(c.orders, c) for c in found_models]
+    if physical:
+        tried += [process for n, found in quick.items() for process in processes(n, found.delays, step)]
+    found = judged(tried)
+    for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
+        plain = [c for c in found if c.orders.family in family]
+        if plain:
+            found += judged(max(plain, key=lambda c: c.validation).orders.with_coloured_noise())
+    finalists = {c.orders: c for c in map(parts.refined, _leading(found)) if c}
+    found = [finalists.get(c.orders, c) for c in found]
     usable = [c for c in finalists.values() if np.isfinite(c.validation)]
     if not usable:
         return None
     least = min(100.0 - c.validation for c in usable)
-    good = [c for c in usable if 100.0 - c.validation <= _AS_GOOD * least]
-    best = min(good, key=lambda c: (c.biased, c.orders.size, -c.validation))
-    rest = sorted((c for c in found_models if c.orders != best.orders), key=lambda c: -c.validation)
+    good = [c for c in usable if 100.0 - c.validation <= min(_AS_GOOD * least, least + _POINTS)]
+    good.sort(key=lambda c: (not c.settled, c.biased, c.unknowns, not c.orders.physical, -c.validation))
+    best = good[0]
+    rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
     order = min(max(best.orders.order, 1), highest)
-    return Chosen((best, *rest), _ranges(first, order, best.orders.delays, most), by_order)
+    ranges = _ranges(first, order, best.orders.delays, most)
+    return Chosen((best, *rest), ranges, by_order, tuple(good))
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
@@ -147,64 +252,13 @@ def _leading(found: Sequence[Candidate]) -> list[Candidate]:
     return kept
 
 
-def _candidate(
-    orders: Orders, resting: Parts, first: Parts, second: Parts, feedback: bool
-) -> Candidate | None:
-    """A structure, quickly estimated from records that begin at rest, and judged."""
-    u, y = (np.concatenate(signals) for signals in zip(*resting, strict=True))
-    lengths = [len(part) for _, part in resting]
-    try:
-        found = identify_polynomials(orders.model(), u, y, feedback=feedback, lengths=lengths, rest=True)
-    except (SpecError, np.linalg.LinAlgError):
-        return None
-    return _judged(orders, found.theta, found.noise, found.failed, found.converged, first, second)
-
-
-def _refined(candidate: Candidate, first: Parts, second: Parts, feedback: bool) -> Candidate | None:
-    """The same, levels and starts estimated along: the search goes on from where it ended."""
-    structure = Structure.of(candidate.orders.model())
-    records = Records(tuple(PolynomialRecord(structure, *part) for part in centred(first)), free=True)
-    try:
-        found = search(records, candidate.theta[None], starts=1)
-        tests = failed(score_tests(records, found.point, recent=structure.memory, feedback=feedback))
-    except (SpecError, np.linalg.LinAlgError):
-        return None
-    noise = noise_of(found.point, structure.own())
-    return _judged(candidate.orders, found.point.theta, noise, tests, found.converged, first, second)
-
-
-def _judged(
-    orders: Orders,
-    theta: Array,
-    noise: Array,
-    tests: Sequence[ScoreTest],
-    converged: bool,
-    first: Parts,
-    second: Parts,
-) -> Candidate:
-    fitted = orders.model().at(theta, noise)
-    on_first, on_second = fits(fitted, first), fits(fitted, second)
-    samples = sum(len(y) for _, y in first)
-    return Candidate(
-        orders,
-        theta,
-        on_first.simulation[0],
-        on_second.simulation[0] if all(fitted.stable_outputs) else -np.inf,
-        on_second.prediction[0],
-        float(np.log(max(noise[0, 0], 1e-300)) + orders.size * np.log(samples) / samples),
-        tuple(test.name for test in tests),
-        orders.a > 0 and bool(tests),
-        converged,
-    )
-
-
 def _best_arx(first: Parts, second: Parts, delays: tuple[int, ...], r: int, samples: int) -> Iterator[Orders]:
     """The ARX models that simulate the second part best."""
     highest = max(min(_HIGHEST_ARX, samples // (6 * (r + 1))), 1)
     ranked = []
     for a, b, lags, theta in arx_grid(first, highest, list(dict.fromkeys([delays, (0,) * r, (1,) * r]))):
         orders = arx(lags, a, b)
-        if np.all(np.isfinite(theta)) and Structure.of(orders.model()).size == theta.size:
+        if np.all(np.isfinite(theta)) and orders.size == theta.size:
             model = orders.model().at(theta)
             if all(model.stable_outputs):
                 ranked.append((simulation_fit(model, second)[0], orders))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.identification.explore import Found
-from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.identification.explore import Found, output_error_form
+from inputdesign_cli.plant import Model
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.identification import build_identification
 from inputdesign_cli.tasks.build.log import Log
@@ -33,6 +33,11 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
         f"{'y' if found.model.outputs == 1 else f'y{i + 1}'}: {c.orders.family}"
         for i, c in enumerate(found.taken)
     )
+    kind = (
+        f"plants in s by their parameters (times in {log.time_unit}), their inputs held between samples"
+        if any(c.orders.physical for c in found.taken)
+        else "A y = (B/F) u + (C/D) e, polynomials in q^-1"
+    )
     names = ", ".join(
         f"{channel} is {' '.join(column.split())}"
         for channel, column in log.names.items()
@@ -50,7 +55,7 @@ title: {json.dumps(f"The next experiment after {source}")}
 sample_time: {log.step!r}          # in time_unit; frequencies are in rad per time_unit
 time_unit: {log.time_unit}
 
-# What the record tells: A y = (B/F) u + (C/D) e, polynomials in q^-1 ({structures}).
+# What the record tells: {kind} ({structures}).
 # {names}
 """
     for key, block in blocks.items():
@@ -84,19 +89,20 @@ def build_explored(text: str) -> Identification:
     return build_identification(parse_spec(text, "spec.yaml"))
 
 
-def model_to_judge(spec: Spec) -> PolynomialModel:
+def model_to_judge(spec: Spec) -> Model:
     """The model of a spec that is to be judged by data.
 
     Raises:
-        SpecError: it is not one of polynomials in q^-1.
+        SpecError: it is neither of polynomials nor of transfer functions that are sampled.
     """
-    match build_model(spec):
-        case PolynomialModel() as model:
-            return model
-        case _:
-            raise bad_spec(
-                "not-supported",
-                "models in s cannot be judged by data in this version",
-                hint="idesign identify DATA --spec MODEL estimates them anew and shows the fit",
-                key="plant",
-            )
+    model = build_model(spec)
+    try:
+        output_error_form(model)
+    except TypeError:
+        raise bad_spec(
+            "not-supported",
+            "models in state space, and in s without sample: zoh, cannot be judged by data in this version",
+            hint="idesign identify DATA --spec MODEL estimates them anew and shows the fit",
+            key="plant",
+        ) from None
+    return model

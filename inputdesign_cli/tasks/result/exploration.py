@@ -101,7 +101,7 @@ def exploration_notes(
         "write experiment.controller"
         for j, p in loops
     ]
-    needed = max(candidate.orders.b + candidate.orders.order for candidate in found.taken)
+    needed = max(candidate.orders.unknowns for candidate in found.taken)
     if excitation < needed:
         notes.append(
             f"the input is persistently exciting of order {excitation} only, and the model needs {needed}: "
