@@ -60,6 +60,14 @@ class Orders:
         """(n, k): where to begin, by regression on records at rest."""
         return estimator(self.model(), 1.0).kind.starts(longest(parts), None).points
 
+    def ranges(self, theta: Array, deviations: Array) -> tuple[tuple[int, int], ...]:
+        """None: delays are no parameters."""
+        return ()
+
+    def at(self, theta: Array) -> Orders:
+        """The same: its delays are stated."""
+        return self
+
     def with_coloured_noise(self) -> list[Orders]:
         """A plant of the same orders, Box and Jenkins's noise."""
         return [Orders("BJ", self.delays, self.b, c=n, d=n, f=self.order) for n in (1, 2)]

@@ -40,6 +40,10 @@ _BESIDE = (-0.75, -0.25, 0.25)
 _FASTEST = 1e-3
 _SLOWEST = 1.0 - 1e-4
 _ZERO = 0.5
+# A dead time this near below a whole number of samples is that number.
+_ROUNDED = 0.01
+_NORMAL = 1.96  # 95 % of a Gaussian estimate
+_LONGEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,25 @@ class Process:
     def unknowns(self) -> int:
         """What the input must tell: coefficients and dead time of one input."""
         return len(self.letters)
+
+    def at(self, theta: Array) -> Process:
+        """The same, its delays those of the dead times among its parameters (k,)."""
+        return replace(self, delays=self._first(self._late(theta)))
+
+    def ranges(self, theta: Array, deviations: Array) -> tuple[tuple[int, int], ...]:
+        """Of each input the delays that 95 % of confidence leaves, by parameters and deviations (k,)."""
+        late, width = self._late(theta), _NORMAL * self._late(deviations)
+        low, high = (self._first(np.maximum(x, 0.0)) for x in (late - width, late + width))
+        return tuple(zip(low, high, strict=True))
+
+    def _late(self, theta: Array) -> Array:
+        """(r,): the dead times."""
+        width = len(self.letters)
+        return theta[width - 1 : width * len(self.delays) : width]
+
+    def _first(self, late: Array) -> tuple[int, ...]:
+        """The lags of the first samples that inputs move after dead times (r,)."""
+        return tuple(int(np.floor(min(x, _LONGEST))) + 1 for x in late / self.step + _ROUNDED)
 
     def with_coloured_noise(self) -> list[Process]:
         """The same plant, the noise filtered."""

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError
@@ -44,7 +45,7 @@ _FINALISTS = 2
 # An error of simulation that is larger by less than this share, and by no more points, is as good.
 _AS_GOOD, _POINTS = 1.2, 2.0
 # Samples to a parameter, at least; steps of the search for a candidate, by whether it is physical.
-_PER_PARAMETER = 10
+_PER_PARAMETER = 5
 _STEPS = {False: 100, True: 30}
 _CHI2 = 3.84  # 95 % for one degree of freedom
 _WIDTH = 6
@@ -63,6 +64,7 @@ class Candidate:
         prediction: per cent one step ahead, on the second part.
         criterion: log of the variance + k log(N) / N (BIC), on the first part.
         failed: tests of the residuals that refute it.
+        ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
     """
 
     orders: Shape
@@ -73,6 +75,7 @@ class Candidate:
     criterion: float
     failed: tuple[str, ...]
     converged: bool
+    ranges: tuple[tuple[int, int], ...]
 
     @property
     def theta(self) -> Array:
@@ -168,13 +171,16 @@ class _Parts:
             records = records.begun_freely(max(records.lateness(theta) for theta in points))
         found = search(records, points, starts=len(points), quick=_STEPS[orders.physical])
         noise = noise_of(found.point, kind.own())
-        factor_at(kind.names, records, found.point, noise)
+        factor = factor_at(kind.names, records, found.point, noise)
+        deviations = np.linalg.norm(
+            scipy.linalg.solve_triangular(factor, np.eye(len(factor)), lower=True), axis=0
+        )
         echoes = kind.echoes(found.point.theta, records.lengths)
         tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
         fitted = structure.at(found.point.theta, noise)
         on_first, on_second = fits(fitted, self.first), fits(fitted, self.second)
         return Candidate(
-            orders,
+            orders.at(found.point.theta),
             fitted,
             on_first.simulation[0],
             on_second.simulation[0] if output_error_form(fitted).radius < 1.0 else -np.inf,
@@ -182,6 +188,7 @@ class _Parts:
             float(np.log(max(noise[0, 0], 1e-300)) + orders.size * np.log(self.samples) / self.samples),
             tuple(test.name for test in failed(tests)),
             found.converged,
+            orders.ranges(found.point.theta, deviations),
         )
 
 
@@ -227,9 +234,9 @@ def explore_structure(
         plain = [c for c in found if c.orders.family in family]
         if plain:
             found += judged(max(plain, key=lambda c: c.validation).orders.with_coloured_noise())
-    finalists = {c.orders: c for c in map(parts.refined, _leading(found)) if c}
-    found = [finalists.get(c.orders, c) for c in found]
-    usable = [c for c in finalists.values() if np.isfinite(c.validation)]
+    again = {c.orders: parts.refined(c) for c in _leading(found)}
+    found = [again.get(c.orders) or c for c in found]
+    usable = [c for c in again.values() if c is not None and np.isfinite(c.validation)]
     if not usable:
         return None
     least = min(100.0 - c.validation for c in usable)
@@ -238,7 +245,7 @@ def explore_structure(
     best = good[0]
     rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
     order = min(max(best.orders.order, 1), highest)
-    ranges = _ranges(first, order, best.orders.delays, most)
+    ranges = best.ranges or _ranges(first, order, best.orders.delays, most)
     return Chosen((best, *rest), ranges, by_order, tuple(good))
 
 

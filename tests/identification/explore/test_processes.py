@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.identification.explore import explore_records
+from inputdesign_cli.identification.explore import explore_records, explore_structure
 from inputdesign_cli.identification.explore.processes import Process, process_models
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 
@@ -43,3 +43,22 @@ def test_gain_time_constant_and_dead_time_are_found():
     assert found.model.names == ("K", "T", "L")
     deviations = (found.estimate.theta - [2.0, 6.0, 1.7]) / np.sqrt(np.diag(found.estimate.covariance))
     assert np.all(np.abs(deviations) < 4.0)
+
+
+@pytest.mark.slow
+def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
+    """Dead times to 15 samples, time constants of 4 to 25; delays within one sample in 95, orders in 95."""
+    delays = orders = 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        T, L = STEP * rng.uniform(4.0, 25.0), STEP * rng.uniform(0.0, 15.0)
+        hold = int(rng.integers(4, 12))
+        u = np.repeat(rng.choice([-1.0, 1.0], 400 // hold + 1), hold)[:400, None]
+        x, _ = first_order(rng.uniform(0.5, 3.0), T, L).simulate(u, np.zeros(u.shape), 1.0)
+        y = x + np.std(x) / np.sqrt(10.0) * rng.standard_normal(u.shape)
+        best = explore_structure([(u[:240], y[:240])], [(u[240:], y[240:])], step=STEP).best
+        first = int(np.floor(L / STEP)) + 1  # the first sample that an input moves
+        delays += abs(best.orders.delays[0] - first) <= 1
+        orders += abs(best.orders.order - 1) <= 1
+    assert delays >= 95
+    assert orders >= 95
