@@ -56,6 +56,13 @@ class PolynomialRecord:
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
         )
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): impulses through 1/C, if there is a C."""
+        return tuple(
+            _past_noise(row, theta[place], len(self.y))
+            for row, place in zip(self.structure.rows, self.structure.places, strict=True)
+        )
+
     def lateness(self, theta: Array) -> int:
         """None: the delay is known, and among what the filters remember."""
         return 0
@@ -106,3 +113,8 @@ def _responses(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.floa
     for entry, F in zip(row.entries, p.F, strict=True):
         through.append((p.D[0], np.convolve(p.C[0], F[0]), impulses[: entry.f]))
     return np.concatenate([filtered(b, a, x) for b, a, x in through if len(x)])
+
+
+def _past_noise(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.float64]:
+    impulses = np.eye(max(row.c, row.a + row.d) if row.c else 0, samples)
+    return np.asarray(filtered(np.ones(1), row.polynomials(theta[None]).C[0], impulses))

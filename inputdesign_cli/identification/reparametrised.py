@@ -55,6 +55,10 @@ class ReparametrisedRecord(OverRecord):
         """Of each output (m, N): what an unknown start adds."""
         return self.record.free_responses(self.parametrisation.at(theta).coefficients)
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """That at the coefficients."""
+        return self.record.past_noise(self.parametrisation.at(theta).coefficients)
+
     def lateness(self, theta: Array) -> int:
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)

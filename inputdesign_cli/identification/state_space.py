@@ -98,6 +98,11 @@ class StateSpaceRecord:
             x = x @ closed.T + level @ m.K.T
         return tuple(found[:, :, i] for i in range(p))
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): what states at the start add, if past noise moves them."""
+        states = self.structure.order if np.any(self.structure.at(theta).matrices.K) else 0
+        return tuple(responses[:states] for responses in self.free_responses(theta))
+
     def lateness(self, theta: Array) -> int:
         """The dead time in samples, one that is begun counted whole."""
         model = self.structure.at(theta)

@@ -80,6 +80,10 @@ class TransferRecord:
             found[i].append(filtered([1.0], poles, impulses))
         return tuple(np.concatenate(parts) for parts in found)
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """None: the noise is white."""
+        return (np.zeros((0, self.samples)),) * self.structure.outputs
+
     def lateness(self, theta: Array) -> int:
         """The longest dead time, in samples, those that are begun counted whole."""
         return late_samples(self.structure.at(theta).memory, self.intersample.sample_time)

@@ -97,3 +97,13 @@ def test_what_many_starts_hide_is_still_found():
     for seed in range(3):
         u, y, lengths = segmented(20, seed, colour=0.6)
         assert identify(model, u, y, lengths=lengths, rest=False).failed
+
+
+@pytest.mark.parametrize(("zero", "free"), [(0.97, True), (0.5, False)])
+def test_a_start_is_free_where_zeros_of_the_noise_remember_what_was_before(zero, free):
+    """A plant at rest; of noise that was there before, 0.97^20 = 0.54 is left after a tenth of the record."""
+    rng = np.random.default_rng(8)
+    model = PolynomialModel.single([0, 0.6], F=[1, -0.7], C=[1, -zero])
+    u, e = rng.standard_normal(200), rng.standard_normal(500)
+    y = scipy.signal.lfilter([0, 0.6], [1, -0.7], u) + scipy.signal.lfilter([1, -zero], [1], e)[300:]
+    assert identify(model, u[:, None], y[:, None]).free == free
