@@ -78,9 +78,11 @@ def identify(
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
+        from inputdesign_cli.runs.origin import check_counted_once
 
         stated = read_spec(spec, overrides, confine, design=False)
         place = place.checked(stated)
+        check_counted_once(spec, data)
         results = tasks.identify(
             stated,
             data,
@@ -123,9 +125,11 @@ def assess(
     place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output)
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
+        from inputdesign_cli.runs.origin import check_counted_once
 
         stated = read_spec(spec, overrides, confine)
         place = place.checked(stated)
+        check_counted_once(spec, data)
         assessment = tasks.assess(
             stated,
             data,

@@ -11,6 +11,7 @@ import hashlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from filecmp import cmp
 from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_INPUT, DataError, OutputError
@@ -100,6 +101,29 @@ def has_other_values(directory: Path, spec: str) -> bool:
         return load_result(directory).get("spec_sha256") not in (None, digest(spec))
     except DataError:
         return False
+
+
+def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
+    """No file is given whose information the spec of a top-up has as its prior.
+
+    Raises:
+        DataError: `data-repeated`.
+    """
+    try:
+        result = load_result(spec.parent) if spec.name == SPEC else {}
+    except DataError:
+        return
+    assessment, counted = result.get("assessment"), result.get("made_from")
+    if not (isinstance(assessment, dict) and "top_up_status" in assessment and isinstance(counted, list)):
+        return
+    before = [spec.parent / str(name) for name in counted[1:]]
+    for file in data:
+        if any(one.is_file() and file.is_file() and cmp(one, file, shallow=False) for one in before):
+            raise DataError.because(
+                "data-repeated",
+                f"{file} counts as experiment.prior of {spec} already, and would count twice",
+                "give only the records since then, or all of them with the spec that was assessed first",
+            )
 
 
 def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
