@@ -179,10 +179,6 @@ class _Scenarios(Unsure):
         flaw = model.flaw
         if flaw is not None:
             raise _NoPlantError("not-a-plant", flaw)
-        if model.names != self.nominal.names:
-            raise _NoPlantError(
-                "not-a-plant", "a first coefficient of B is zero, which would be a known delay"
-            )
         lost = self._acting(self.nominal) & ~self._acting(model)
         if np.any(lost):
             output, input = np.argwhere(lost)[0] + 1
