@@ -52,6 +52,7 @@ from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.robust import Plants, without_dearest
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
+from inputdesign_cli.tasks.unknown_start import start_notes
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,8 @@ class ConvexTask:
             known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
+                asked, step = done.problem.requirements, self.record.step
+                notes += start_notes(done.experiment, record.samples, step, asked)
             if record is not None and self.foresight is not None:
                 foreseen = self.foresight.foreseen(record.samples, done.problem.requirements, result)
                 result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
