@@ -40,6 +40,7 @@ from inputdesign_cli.specification.models.shapes import (
     check_shapes,
     denominators_of,
 )
+from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.models.values import PolynomialList, PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -153,7 +154,7 @@ class DelayedMatrix(ContinuousMatrix, family="continuous", phrase="a transfer ma
     denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
         default=None,
         description="Dead time in time_unit: a number, common to all entries, or rows of columns.",
         examples=[25],
