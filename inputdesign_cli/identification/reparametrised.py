@@ -55,6 +55,10 @@ class ReparametrisedRecord(OverRecord):
         """Of each output (m, N): what an unknown start adds."""
         return self.record.free_responses(self.parametrisation.at(theta).coefficients)
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """That at the coefficients."""
+        return self.record.past_noise(self.parametrisation.at(theta).coefficients)
+
     def lateness(self, theta: Array) -> int:
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)
@@ -86,17 +90,30 @@ class ReparametrisedRecord(OverRecord):
         return self.record.whitened(self.parametrisation.at(theta).coefficients, signals)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta, moved towards the nominal parameters until its predictor is stable."""
-        home, share = self.parametrisation.theta, 1.0
-        for _ in range(_HALVINGS):
-            point = home + share * (theta - home)
-            coefficients = self.parametrisation.at(point).coefficients
-            if np.all(np.isfinite(coefficients)) and np.array_equal(
-                self.record.stabilised(coefficients), coefficients
-            ):
-                return point
-            share *= 0.5
-        return home.copy()
+        """theta; where its predictor is not stable, the nominal parameters moved there as far as it is.
+
+        One after the other, so that one which has reached its end, as a dead time of zero, holds no other.
+        """
+        if self._is_stable(theta):
+            return theta.copy()
+        point = self.parametrisation.theta.copy()
+        for index in range(theta.size):
+            home, share = point[index], 1.0
+            for _ in range(_HALVINGS):
+                point[index] = home + share * (theta[index] - home)
+                if self._is_stable(point):
+                    break
+                share *= 0.5
+            else:
+                point[index] = home
+        return point
+
+    def _is_stable(self, theta: Array) -> bool:
+        coefficients = self.parametrisation.at(theta).coefficients
+        return bool(
+            np.all(np.isfinite(coefficients))
+            and np.array_equal(self.record.stabilised(coefficients), coefficients)
+        )
 
 
 @dataclass(frozen=True)
