@@ -76,8 +76,7 @@ class ReparametrisedRecord(OverRecord):
     @property
     def in_starts(self) -> NDArray[np.int64]:
         """Those that move a coefficient on which the free responses depend."""
-        rows = self.parametrisation.jacobian[self.record.in_starts]
-        return np.flatnonzero(np.any(rows != 0.0, axis=0))
+        return np.flatnonzero(np.any(self.parametrisation.moves[self.record.in_starts], axis=0))
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p), see `Record`."""
@@ -141,7 +140,7 @@ class ReparametrisedKind(OfModel):
     @cached_property
     def _moved(self) -> NDArray[np.bool_]:
         """(K, k): which parameter moves which coefficient."""
-        return np.asarray(self.model.parametrisation.jacobian != 0.0)
+        return self.model.parametrisation.moves
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
         """Those of the coefficients, by the chain rule."""
@@ -155,9 +154,7 @@ class ReparametrisedKind(OfModel):
             return lambda errors: sum((w * through(errors) for w, through in parts if w), 0.0 * errors)
 
         moved = [index for index, _ in of_all]
-        return tuple(
-            (j, chained(j)) for j in np.flatnonzero(np.any(here.jacobian[moved] != 0.0, axis=0)).tolist()
-        )
+        return tuple((j, chained(j)) for j in np.flatnonzero(np.any(self._moved[moved], axis=0)).tolist())
 
     def own(self) -> Array:
         """(p,): as many parameters as there are, shared by the outputs as the coefficients are."""
