@@ -35,7 +35,7 @@ def start_notes(
     )
     return [
         "the record relies on its start from rest, which spectra and the bounds on them do not know: begun "
-        f"in an unknown state about an unknown level {errors}; keep the plant at rest before the record "
+        f"in an unknown state about unknown levels {errors}; keep the plant at rest before the record "
         "begins, and take inputs and outputs from their levels there"
     ]
 
