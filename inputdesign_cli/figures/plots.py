@@ -50,9 +50,9 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
 }
 
 
-def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> bytes:
-    """The figure of `curves` as a file; frequencies are labelled rad per `time_unit`."""
-    return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type)
+def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png", *, narrow: bool = False) -> bytes:
+    """The figure of `curves` as a file, see `rendered`; frequencies are labelled rad per `time_unit`."""
+    return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type, narrow=narrow)
 
 
 def figure(results: Results, name: str) -> Figure:

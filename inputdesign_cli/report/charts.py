@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -21,14 +22,18 @@ from inputdesign_cli.runs.curves import (
     SignalCurves,
     SpectrumCurves,
 )
+from inputdesign_cli.runs.objectives import white_labels
 from inputdesign_cli.runs.results import Array, Result
 from inputdesign_cli.runs.text_formats import read_csv
 
 # Curves, what they show in words, and a caption.
 Drawn = tuple[Curves, str, str]
 
+# An entry of G limits the design where its r_u / r_adm is above this.
+_LIMITS = 0.999
 _CAPTIONS = {
-    "bound": "The error that the model may have (r_u) against the error that is admitted (r_adm).",
+    "bound": "Above: the error that the model may have (r_u) against the error that is admitted (r_adm). "
+    "Below: their ratio, which is to stay below one; white excitation that spends the same goes higher.",
     "deviations": "The standard deviation of the measured frequency response at every line, against what is "
     "admitted.",
     "fan": "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at "
@@ -74,7 +79,7 @@ def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) 
         found = make(read_csv(path), result) if path.is_file() else None
         if found is not None:
             curves, alt, caption = found
-            charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg")), alt, caption)
+            charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg", narrow=True)), alt, caption)
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
         if kind == "png" and stem not in charts and (run / name).is_file():
@@ -119,24 +124,34 @@ def _frequency(table: Mapping[str, Array]) -> Array:
 
 
 def _bound(table: Mapping[str, Array], result: Result) -> Drawn | None:
-    if not {"r_u", "G_abs"} <= set(table):
-        return None
     w = _frequency(table)
     error = result.get("model_error", {})
-    active = np.clip(np.array(error.get("active_frequencies", []), dtype=float), w[0], w[-1])
-    panel = BoundPanel(
-        w,
-        table["r_u"],
-        table["G_abs"],
-        table.get("r_adm"),
-        table.get("r_u_white"),
-        active,
-        table.get("r_u_record"),
-        # Beside a design the figure of the data is one of its own.
-        label="data" if "identification" in result and "objective" not in result else "design",
-    )
-    curves = BoundCurves((panel,))
-    if panel.r_adm is None:
+    places = [name.removeprefix("r_u") for name in table if re.fullmatch(r"r_u(_\d\d)?", name)]
+    if not all({f"r_u{place}", f"G_abs{place}"} <= set(table) for place in places) or not places:
+        return None
+    frequencies = np.clip(np.array(error.get("active_frequencies", []), dtype=float), w[0], w[-1])
+
+    def panel(place: str) -> BoundPanel:
+        r_u, r_adm = table[f"r_u{place}"], table.get(f"r_adm{place}")
+        # Of several entries each limits at frequencies of its own.
+        near = np.interp(frequencies, w, np.zeros(w.size) if r_adm is None else r_u / r_adm) > _LIMITS
+        return BoundPanel(
+            w,
+            r_u,
+            table[f"G_abs{place}"],
+            r_adm,
+            table.get(f"r_u_white{place}"),
+            frequencies if len(places) == 1 else frequencies[near],
+            table.get(f"r_u_record{place}"),
+            # Beside a design the figure of the data is one of its own.
+            label="data" if "identification" in result and "objective" not in result else "design",
+            r_u_equal=table.get(f"r_u_equal{place}"),
+            white_labels=white_labels(result),
+            entry=(int(place[1]) - 1, int(place[2]) - 1) if place else None,
+        )
+
+    curves = BoundCurves(tuple(panel(place) for place in places))
+    if all(one.r_adm is None for one in curves.panels):
         alone = "The error r_u that the model may have, and the gain |G|, against frequency."
         return curves, alone, alone
     worst = f"; the largest ratio is {error['worst_ratio']:.6g}" if "worst_ratio" in error else ""

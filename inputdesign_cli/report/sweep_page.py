@@ -100,7 +100,11 @@ def _charts(table: SweepTable) -> list[Chart]:
         "moments": "The second moments of the regressors over the key.",
     }
     return [
-        Chart(svg_uri(rendered(paint, "svg")), f"{captions[name]} Drawn from sweep.csv.", captions[name])
+        Chart(
+            svg_uri(rendered(paint, "svg", narrow=True)),
+            f"{captions[name]} Drawn from sweep.csv.",
+            captions[name],
+        )
         for name, paint in sweep_figures(table)
     ]
 

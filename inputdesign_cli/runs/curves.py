@@ -60,10 +60,12 @@ class BoundPanel:
     r_u: Array
     G_abs: Array
     r_adm: Array | None = None
-    r_u_white: Array | None = None  # of white excitation at the cost that it needs
+    r_u_white: Array | None = None  # of white excitation that meets the same, or exhausts the same limits
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
+    r_u_equal: Array | None = None  # of white excitation at the cost, or of the length, of the design
+    white_labels: tuple[str, str] = ("white", "white, same cost")  # what r_u_white and r_u_equal are called
     entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
     names: str = ""  # of the input and the output, where the user gave them
 

@@ -22,7 +22,8 @@ from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.objectives import white_labels
+from inputdesign_cli.runs.results import Json, Result, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit import audit
@@ -33,7 +34,7 @@ from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.grid_method import GridMethod
 from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, shortfall
 from inputdesign_cli.tasks.record_search import Made, fitting_record, samples_of_record
-from inputdesign_cli.tasks.result.bound import bound_curves
+from inputdesign_cli.tasks.result.bound import bound_curves, equal_white
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
@@ -120,7 +121,7 @@ class ConvexTask:
                 None, self.record, done.design, notes=(no_record_in_time(self.record.settings.candidates),)
             )
         record = made.record
-        tables, curves = self._illustrations(done, record)
+        tables, curves = self._illustrations(done, record, result)
         if self.plants is not None:
             robust = robust_result(done, self.plants)
             result["robust"] = robust.entry
@@ -279,7 +280,7 @@ class ConvexTask:
         return entry | made.entry
 
     def _illustrations(
-        self, done: Designed, record: Record | None
+        self, done: Designed, record: Record | None, result: Result
     ) -> tuple[dict[str, Table], dict[str, Curves]]:
         """Tables and curves of the spectrum, of r_u and of the proof."""
         design, units = done.design, self.header.units
@@ -302,6 +303,8 @@ class ConvexTask:
                 errors or unstated,
                 done.information,
                 white=white,
+                equal=equal_white(design, done.experiment.samples, result["baseline"]["white"]["ratio"]),
+                white_labels=white_labels(result),
                 record=self._known(done, record),
                 stated=bool(errors),
                 active=[found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)],

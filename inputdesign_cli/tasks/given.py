@@ -19,6 +19,7 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, P
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.objectives import white_labels
 from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
@@ -147,7 +148,12 @@ class GivenTask:
         stated = model_errors(requirements)
         unstated = [replace(error, experiment=experiment) for error in self.unstated]
         tables["bound"], curves["bound"] = bound_curves(
-            units, stated or unstated, information, white=white, stated=bool(stated)
+            units,
+            stated or unstated,
+            information,
+            white=white,
+            white_labels=white_labels(result),
+            stated=bool(stated),
         )
         if excitation.basis is not None and excitation.x is not None:
             tables["spectrum"], curves["spectrum"] = spectrum_curves(

@@ -63,6 +63,11 @@ BANDS = ErrorBandPanel(W, {0.05: 0.1 * G, 0.5: 0.2 * G, 0.95: 0.4 * G}, 0.5 * G,
 
 CURVES = {
     "bound": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi]))),
+    "bound beside white": bound(
+        BoundPanel(
+            W, 0.008 * G, G, 0.01 * G, 0.01 * G, r_u_equal=0.03 * G, white_labels=("white, 4 × the cost", "w")
+        )
+    ),
     "bound without a target": bound(BoundPanel(W, 0.008 * G, G)),
     "bound with a gap in r_adm": bound(BoundPanel(W, 0.008 * G, G, np.where(W < 1, 0.01 * G, -1.0))),
     "spectrum": one_input(DENSITY, 1.7),
@@ -126,7 +131,9 @@ def lines_by_label(axes):
 def test_a_png_of_the_promised_size(name):
     data = draw(CURVES[name])
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    assert struct.unpack(">II", data[16:24]) == (1050, 675)
+    width, height = struct.unpack(">II", data[16:24])
+    assert width == 1050
+    assert 675 <= height <= 1000
 
 
 def test_no_global_state():
@@ -140,23 +147,45 @@ def test_no_global_state():
     assert state() == before
 
 
-def test_bound_shows_every_curve_and_marks_the_active_frequencies(page):
-    (axes,) = page(CURVES["bound"]).axes
-    lines = lines_by_label(axes)
-    np.testing.assert_array_equal(lines["|G|"].get_ydata(), G)
+def test_bound_shows_every_error_and_marks_the_limiting_frequencies(page):
+    above, below = page(CURVES["bound"]).axes
+    lines = lines_by_label(above)
     np.testing.assert_array_equal(lines["r_u, design"].get_ydata(), 0.008 * G)
     np.testing.assert_array_equal(lines["r_u, white"].get_ydata(), 0.01 * G)
-    np.testing.assert_array_equal(lines["r_adm"].get_ydata(), 0.01 * G)
+    np.testing.assert_array_equal(lines["r_adm, admitted"].get_ydata(), 0.01 * G)
     z = np.exp(-0.5j)
     expected = 0.008 * abs(3.6 * z / (1 - 0.7 * z))
-    assert lines["active"].get_xdata()[0] == 0.5
-    assert lines["active"].get_ydata()[0] == pytest.approx(expected, rel=1e-3)
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert lines["limiting frequencies"].get_xdata()[0] == 0.5
+    assert lines["limiting frequencies"].get_ydata()[0] == pytest.approx(expected, rel=1e-3)
+    assert (above.get_xscale(), above.get_yscale()) == ("log", "log")
+    ratios = lines_by_label(below)
+    np.testing.assert_allclose(ratios["design: up to 0.8"].get_ydata(), 0.8)
+    assert set(ratios["limit"].get_ydata()) == {1.0}
+    assert below.get_yscale() == "linear"
+
+
+def test_bound_shows_the_range_of_the_errors_not_that_of_the_gain(page):
+    above, _ = page(CURVES["bound beside white"]).axes
+    low, high = above.get_ylim()
+    assert low > 0.5 * (0.008 * G).min()
+    assert high < 2.0 * (0.03 * G).max()
+
+
+def test_bound_tells_how_far_white_excitation_of_the_same_cost_misses(page):
+    above, below = page(CURVES["bound beside white"]).axes
+    assert {"r_u, w", "r_u, white, 4 × the cost"} <= set(lines_by_label(above))
+    np.testing.assert_allclose(lines_by_label(below)["w: up to 3"].get_ydata(), 3.0)
+
+
+def test_a_ratio_far_beyond_the_limit_does_not_squeeze_the_others(page):
+    curves = bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_equal=3.0 * G))
+    _, below = page(curves).axes
+    assert below.get_ylim()[1] < 10.0
 
 
 def test_only_what_is_there_is_in_the_legend(page):
     (axes,) = page(CURVES["bound without a target"]).axes
-    assert list(lines_by_label(axes)) == ["|G|", "r_u, design"]
+    assert list(lines_by_label(axes)) == ["r_u, design", "|G|"]
 
 
 def test_the_unit_of_time_is_on_the_axis(page):
@@ -173,10 +202,13 @@ def test_the_spectrum_beside_the_white_level(page):
 
 
 def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
-    panels = page(CURVES["bounds of entries"]).axes
-    assert [axes.get_title(loc="left") for axes in panels] == ["", "$G_{12}$", "$G_{21}$", ""]
-    np.testing.assert_array_equal(lines_by_label(panels[1])["r_adm"].get_ydata(), 0.01 * G)
-    assert "r_adm" not in lines_by_label(panels[2])
+    *panels, below = page(CURVES["bounds of entries"]).axes
+    titles = {axes.get_subplotspec().num1: axes.get_title(loc="left") for axes in panels}
+    assert titles == {1: "$G_{12}$", 2: "$G_{21}$"}
+    first, second = panels
+    np.testing.assert_array_equal(lines_by_label(first)["r_adm, admitted"].get_ydata(), 0.01 * G)
+    assert "r_adm, admitted" not in lines_by_label(second)
+    assert list(lines_by_label(below)) == ["G12: up to 0.8", "limit"]
 
 
 def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(page):
