@@ -15,6 +15,7 @@ from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.exploration import draw_orders
 from inputdesign_cli.figures.fan import draw_fan
 from inputdesign_cli.figures.moments import draw_error, draw_moments
+from inputdesign_cli.figures.nyquist import draw_nyquist
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
@@ -39,6 +40,7 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.FitCurves: draw_fit,
     of.LossCurves: draw_loss,
     of.MomentsCurves: draw_moments,
+    of.NyquistCurves: draw_nyquist,
     of.OptimalityCurves: draw_optimality,
     of.OrderCurves: draw_orders,
     of.RatioCurves: draw_true_ratio,

@@ -78,6 +78,17 @@ class BoundCurves(Curves):
 
 
 @dataclass(frozen=True)
+class NyquistCurves(Curves):
+    """The loop C G of one channel over frequency, and how far r_u lets it stray; arrays (n,)."""
+
+    frequency: Array
+    loop: NDArray[np.complex128]
+    radius: Array  # |C| r_u
+    circle: float | None = None  # the distance from -1 that is to be kept, where it is one
+    limiting: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
 class ResponsePanel:
     """An entry of G from data alone, the radius of its confidence disc, and that of a model; all (n,)."""
 
@@ -269,13 +280,26 @@ class OrderCurves(Curves):
 
 
 @dataclass(frozen=True)
+class PredictedPanel:
+    """What the record causes at an output from rest, and the standard deviation of the noise; arrays (n,)."""
+
+    name: str  # "y1"
+    values: Array
+    deviation: Array
+    limits: tuple[float, float] | None = None
+    label: str = ""  # its name and unit, where there are any
+
+
+@dataclass(frozen=True)
 class SignalCurves(Curves):
-    """The record to be applied: `time` (n,), one array (n,) a channel."""
+    """The record to be applied: `time` (n,), one array (n,) a channel; below, what it is to cause."""
 
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
     labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
+    predicted: tuple[PredictedPanel, ...] = ()
+    held: bool = True  # each value until the next
 
 
 @dataclass(frozen=True)

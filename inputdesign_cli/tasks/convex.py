@@ -38,6 +38,7 @@ from inputdesign_cli.tasks.result.bound import bound_curves, equal_white
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
+from inputdesign_cli.tasks.result.nyquist import nyquist_curves
 from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
@@ -129,7 +130,8 @@ class ConvexTask:
         files: dict[str, bytes] = {}
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record)
-            tables["signal"], curves["signal"] = signal_curves(made.request, self.header.units, record)
+            drawn = signal_curves(made.request, self.header.units, done.experiment, record)
+            tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
             notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
@@ -297,6 +299,7 @@ class ConvexTask:
         asked = (*problem.requirements, *problem.side)
         errors = model_errors(asked)
         unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
+        active = [found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)]
         with suppress(np.linalg.LinAlgError):  # a parameter that a T-optimal design does not excite
             tables["bound"], curves["bound"] = bound_curves(
                 units,
@@ -307,8 +310,10 @@ class ConvexTask:
                 white_labels=white_labels(result),
                 record=self._known(done, record),
                 stated=bool(errors),
-                active=[found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)],
+                active=active,
             )
+            loops = nyquist_curves(units, (errors or unstated)[:1], done.information, active)
+            tables, curves = tables | loops[0], curves | loops[1]
         optimality = optimality_curves(units, design)
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality

@@ -23,7 +23,9 @@ from inputdesign_cli.runs.curves import (
     FitPanel,
     LossCurves,
     MomentsCurves,
+    NyquistCurves,
     OptimalityCurves,
+    PredictedPanel,
     ResidualCurves,
     SignalCurves,
     SpectrumCurves,
@@ -77,6 +79,13 @@ CURVES = {
     ),
     "bound with its record": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_record=0.009 * G)),
     "limited signal": SignalCurves(np.arange(50.0), {"u1": 3 + np.sin(np.arange(50.0))}, {"u1": (1.5, 4.5)}),
+    "predicted signal": SignalCurves(
+        np.arange(50.0),
+        {"u1": 3 + np.sin(np.arange(50.0))},
+        {"u1": (1.5, 4.5)},
+        {"u1": "valve (%)"},
+        (PredictedPanel("y1", T[:50], np.sqrt(T[:50]), (-60.0, 60.0), "level (m)"),),
+    ),
     "lines": lines([0.1553], [0.1925], white=1.7, band=(1e-3, np.pi)),
     "lines in a loop": lines([0.02, 0.1], [0.1, 0.2], symbol="r"),
     "matrix": SpectrumCurves(W, PAIR, 1.7),
@@ -85,6 +94,8 @@ CURVES = {
     "directions": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([DENSITY, W], 1), 1.7),
     "directions of lines": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
     "loss": LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
+    "nyquist": NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W, 0.5, W[150:151]),
+    "nyquist without a bound": NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W),
     "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
     "matrix on a logarithmic axis": SpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
     "matrix with a peak": SpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
@@ -133,7 +144,7 @@ def test_a_png_of_the_promised_size(name):
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     width, height = struct.unpack(">II", data[16:24])
     assert width == 1050
-    assert 675 <= height <= 1000
+    assert 675 <= height <= 1050
 
 
 def test_no_global_state():
@@ -181,6 +192,18 @@ def test_a_ratio_far_beyond_the_limit_does_not_squeeze_the_others(page):
     curves = bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_equal=3.0 * G))
     _, below = page(curves).axes
     assert below.get_ylim()[1] < 10.0
+
+
+def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
+    (axes,) = page(CURVES["nyquist"]).axes
+    (discs,) = axes.collections
+    near = Z[150]
+    centre = 0.8 * near**2 / (1 - near)
+    offsets = discs.get_offsets()
+    assert np.hypot(offsets[:, 0] - centre.real, offsets[:, 1] - centre.imag).min() < 1e-9
+    np.testing.assert_allclose(discs.get_widths(), 0.2)
+    assert [circle.get_radius() for circle in axes.patches] == [0.5, 0.5]
+    assert not page(CURVES["nyquist without a bound"]).axes[0].patches
 
 
 def test_only_what_is_there_is_in_the_legend(page):
@@ -242,9 +265,25 @@ def test_lines_stand_as_stems_of_their_power(page):
 def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
     figure = page(CURVES["long signal"])
     record, histogram = figure.axes[:2]
-    assert "first 1000 of 3000 samples, 4 of 6 channels" in record.get_title(loc="left")
+    assert "first 1000 of 3000 samples, 4 of 6 channels" in figure.axes[6].get_xlabel()
     assert record.lines[0].get_xdata().size == 1000
     assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
+    figure = page(CURVES["predicted signal"])
+    record, _, below, _ = figure.axes
+    assert record.lines[0].get_drawstyle() == "steps-post"
+    assert (record.get_ylabel(), below.get_ylabel()) == ("valve (%)", "level (m)")
+    band = below.collections[0].get_paths()[0].vertices
+    np.testing.assert_allclose([band[:, 1].min(), band[:, 1].max()], [-1.0, 49.0 + 2.0 * 7.0], atol=1e-9)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == [
+        "to be applied, held between samples",
+        "limits",
+        "± 2 standard deviations of noise since the start",
+        "predicted output, from rest",
+    ]
 
 
 @pytest.mark.parametrize("name", CURVES)
