@@ -28,7 +28,6 @@ class SpectrumCurves(Curves):
     white: float | None = None  # the level of the white baseline; of one input's sinusoids its power
     lines: bool = False
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
-    logarithmic: bool = False  # the axis of frequency; that of one input always is
     record: Array | None = None  # (n, r), smoothed periodograms of the record
     band: tuple[float, float] | None = None  # where the sinusoids might be
 

@@ -97,7 +97,7 @@ CURVES = {
     "nyquist": NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W, 0.5, W[150:151]),
     "nyquist without a bound": NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W),
     "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
-    "matrix on a logarithmic axis": SpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
+    "matrix of one direction": SpectrumCurves(W, PAIR * np.array([[1, 1e-14], [1e-14, 1]]), symbol="r"),
     "matrix with a peak": SpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
     "one line of channels": SpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
     "bounds of entries": bound(
@@ -301,3 +301,23 @@ def test_a_spectrum_of_no_lines_is_an_empty_page():
     """What a design is that needs no excitation."""
     nothing = SpectrumCurves(np.zeros(0), np.zeros((0, 1, 1)), lines=True, band=(0.0, 1.0))
     assert draw(nothing).startswith(b"\x89PNG")
+
+
+def test_entries_that_coincide_share_a_curve_and_rounding_has_none(page):
+    above, _ = page(CURVES["matrix of one direction"]).axes
+    assert list(lines_by_label(above)) == [r"$|\Phi_{11}|$ = $|\Phi_{22}|$"]
+    assert [axes.get_xscale() for axes in page(CURVES["matrix"]).axes] == ["log", "log"]
+
+
+def test_the_certificate_says_what_it_means(page):
+    figure = page(CURVES["optimality"])
+    assert "no other spectrum can do better" in figure.get_suptitle()
+
+
+def test_where_runs_leave_what_is_admitted_is_marked(page):
+    kept, missed = page(CURVES["error bands"]).axes[0], replace(BANDS, r_adm=np.where(W < 1, G, 0.3 * G))
+    assert not any("leave" in label for label in lines_by_label(kept))
+    (axes,) = page(ErrorBandCurves((missed,), "design", 100)).axes
+    (marked,) = [part for label, part in lines_by_label(axes).items() if "leave r_adm" in label]
+    assert marked.get_paths()[0].vertices[:, 0].min() >= 0.99
+    assert lines_by_label(axes)["r_adm, admitted"].get_linestyle() == "--"
