@@ -14,6 +14,7 @@ from inputdesign_cli.cli.options import (
     DataFiles,
     DetrendWord,
     EstimateOutput,
+    FigureFormat,
     Figures,
     Json,
     Means,
@@ -66,6 +67,7 @@ def identify(
         ),
     ] = False,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -87,7 +89,7 @@ def identify(
             frequency_response=frequency_response,
         )
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def assess(
@@ -108,6 +110,7 @@ def assess(
     skip: Skip = 0,
     span: Span = "",
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -129,7 +132,14 @@ def assess(
             preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
         )
     place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output)
-    keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(
+        assessment.results,
+        place,
+        figures=figures,
+        figure_format=figure_format,
+        json_output=json_output,
+        quiet=quiet,
+    )
     if assessment.verdict != "met":
         raise typer.Exit({"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}[assessment.verdict])
 

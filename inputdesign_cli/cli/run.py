@@ -36,8 +36,16 @@ class Place:
         return self.output or Path("runs") / self.name
 
 
-def keep(results: Results, place: Place, *, figures: bool, json_output: bool, quiet: bool) -> None:
-    """Write a run to its place, and print its result or its summary.
+def keep(
+    results: Results,
+    place: Place,
+    *,
+    figures: bool,
+    json_output: bool,
+    quiet: bool,
+    figure_format: str = "png",
+) -> None:
+    """Write a run to its place, with figures or without, and print its result or its summary.
 
     Raises:
         OutputError: as `write_run`, and `output-is-the-spec`.
@@ -54,7 +62,7 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
         if figures:
             from inputdesign_cli.figures.plots import draw_all
 
-            drawings = draw_all(results)
+            drawings = draw_all(results, figure_format)
         files = write_run(results, directory, drawings, sources=place.sources, overwrite=place.overwrite)
     show(results, files, json_output=json_output, quiet=quiet)
 

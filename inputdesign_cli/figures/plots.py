@@ -19,7 +19,7 @@ from inputdesign_cli.figures.nyquist import draw_nyquist
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
-from inputdesign_cli.figures.style import FileType, painted, rendered
+from inputdesign_cli.figures.style import FILE_TYPES, FileType, painted, rendered
 from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands, draw_loss
 from inputdesign_cli.runs import curves as of
 from inputdesign_cli.runs.curves import Curves
@@ -67,6 +67,9 @@ def figure(results: Results, name: str) -> Figure:
     return painted(lambda page: _DRAWN_BY[type(curves)](page, curves, results.time_unit))
 
 
-def draw_all(results: Results) -> dict[str, bytes]:
-    """The figures of a run by their file names: bound.png, spectrum.png, .."""
-    return {f"{stem}.png": draw(curves, results.time_unit) for stem, curves in results.curves.items()}
+def draw_all(results: Results, file_type: str = "png") -> dict[str, bytes]:
+    """The figures of a run by their file names: bound.png, spectrum.png, .., or in another format."""
+    kind = FILE_TYPES[file_type]
+    return {
+        f"{stem}.{kind}": draw(curves, results.time_unit, kind) for stem, curves in results.curves.items()
+    }

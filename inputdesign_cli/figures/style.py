@@ -20,6 +20,7 @@ from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator
 from inputdesign_cli.runs.results import Array
 
 FileType = Literal["png", "svg", "pdf"]
+FILE_TYPES: dict[str, FileType] = {"png": "png", "svg": "svg", "pdf": "pdf"}
 
 SIZE = (7.0, 4.5)  # inches
 NARROW = (5.0, 3.7)  # of a page, where text is to be as large on a phone

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.figures.plots import draw, draw_all
 from inputdesign_cli.runs.curves import (
     BoundCurves,
     BoundPanel,
@@ -30,6 +30,7 @@ from inputdesign_cli.runs.curves import (
     SignalCurves,
     SpectrumCurves,
 )
+from inputdesign_cli.runs.results import Results
 
 W = np.geomspace(1e-3, np.pi, 200)
 Z = np.exp(-1j * W)
@@ -321,3 +322,12 @@ def test_where_runs_leave_what_is_admitted_is_marked(page):
     (marked,) = [part for label, part in lines_by_label(axes).items() if "leave r_adm" in label]
     assert marked.get_paths()[0].vertices[:, 0].min() >= 0.99
     assert lines_by_label(axes)["r_adm, admitted"].get_linestyle() == "--"
+
+
+@pytest.mark.parametrize(("kind", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
+def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kind, begins):
+    results = Results({}, "", curves={"bound": CURVES["bound"]})
+    drawn = draw_all(results, kind)
+    assert list(drawn) == [f"bound.{kind}"]
+    assert drawn[f"bound.{kind}"].startswith(begins)
+    assert draw_all(results, kind) == drawn
