@@ -37,7 +37,7 @@ PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what is admitted
 
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
-_LETTERS_PER_INCH, _BESIDE_LABEL = 11.5, 6
+_LETTERS_PER_INCH, _BESIDE_LABEL = 12.0, 6
 
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))

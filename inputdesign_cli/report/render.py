@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 
 from inputdesign_cli.errors import DataError
@@ -53,9 +54,13 @@ def _filled(
     page, trail = environment.get_template(template), Trail()
     try:
         digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
+        # That of the record, not of the page: the same run gives the same page.
+        date = datetime.fromtimestamp((directory / record).stat().st_mtime).strftime("%Y-%m-%d %H:%M")
         content = content_of(directory, trail)
         source = directory.name or directory.resolve().name
-        return page.render(version=__version__, source=source, record=record, digest=digest, **content)
+        return page.render(
+            version=__version__, source=source, record=record, digest=digest, date=date, **content
+        )
     except _BROKEN as error:
         what = f'"{trail.last}" is' if trail.last else "its entries are"
         raise unreadable(directory / record, f"{what} not what idesign writes") from error

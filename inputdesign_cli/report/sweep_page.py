@@ -41,6 +41,14 @@ def sweep_page(root: Path, trail: Trail) -> dict[str, Json]:
     question, result = _first_run(table, root)
     return {
         "title": summary.get("title") or root.resolve().name,
+        "contents": [
+            "The question",
+            "The answer",
+            "The points",
+            *(["Points without a result"] if any(table.columns["code"]) else []),
+            "How to reproduce it",
+            *(["Methods"] if question and citations(question, result) else []),
+        ],
         "question": question.sentences if question else (),
         "zipped": summary.get("zip", False),
         "axes": [(axis["key"], _values(axis["values"]), "") for axis in summary["axes"]],
