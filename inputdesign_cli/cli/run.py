@@ -53,18 +53,29 @@ def keep(
     if place.nowhere:
         show(results, [], json_output=json_output, quiet=quiet)
         return
-    directory = place.directory
-    with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.runs.run_directory import write_run
-
-        results = _spare_the_spec(results, place)
-        drawings = {}
-        if figures:
-            from inputdesign_cli.figures.plots import draw_all
-
-            drawings = draw_all(results, figure_format)
-        files = write_run(results, directory, drawings, sources=place.sources, overwrite=place.overwrite)
+    with status(f"{place.directory}: writing ...", quiet=quiet):
+        results, files = written(results, place, figures=figures, figure_format=figure_format)
     show(results, files, json_output=json_output, quiet=quiet)
+
+
+def written(
+    results: Results, place: Place, *, figures: bool, figure_format: str = "png"
+) -> tuple[Results, list[Path]]:
+    """Write a run to its place; what was written of the results, and the files.
+
+    Raises:
+        OutputError: as `write_run`, and `output-is-the-spec`.
+    """
+    from inputdesign_cli.runs.run_directory import write_run
+
+    results = _spare_the_spec(results, place)
+    drawings = {}
+    if figures:
+        from inputdesign_cli.figures.plots import draw_all
+
+        drawings = draw_all(results, figure_format)
+    files = write_run(results, place.directory, drawings, sources=place.sources, overwrite=place.overwrite)
+    return results, files
 
 
 def show(results: Results, files: Sequence[Path], *, json_output: bool, quiet: bool) -> None:
