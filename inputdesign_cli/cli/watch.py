@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Overrides, Overwrite
-from inputdesign_cli.cli.run import Place, written
+from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.errors import IdesignError
 
 if TYPE_CHECKING:
@@ -77,9 +77,11 @@ def _follow_spec(
             with _given_up_when_saved(files, before):
                 files = [spec, *_named_files(spec, overrides)]
                 before = stamp(files)
-                results = run_verb("solve", read_spec(spec, overrides, confine))
+                asked = read_spec(spec, overrides, confine)
+                place = place.checked(asked)
+                results = run_verb("solve", asked)
             if stamp(files) == before:
-                written(results, place, figures=figures)
+                keep(results, place, figures=figures, json_output=False, quiet=True)
                 clock, seconds = time.strftime("%H:%M:%S"), time.monotonic() - started
                 followed = followed.solved(place.directory, clock, seconds)
         except IdesignError as error:
