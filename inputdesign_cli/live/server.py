@@ -98,7 +98,7 @@ class _Handler(BaseHTTPRequestHandler):
     server_version, sys_version = "idesign", ""
     timeout = _SLOWEST
 
-    def do_GET(self) -> None:  # noqa: N802
+    def do_GET(self) -> None:
         """One of three answers, or none."""
         asked = urlsplit(self.path)
         if not self._from_here():
@@ -116,7 +116,7 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             self._answer("text/plain", "there is nothing here\n", HTTPStatus.NOT_FOUND)
 
-    do_HEAD = do_GET  # noqa: N815
+    do_HEAD = do_GET
 
     def _from_here(self) -> bool:
         """Whether the browser asked for this machine by its own name, and for no page of another site."""
