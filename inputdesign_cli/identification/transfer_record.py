@@ -20,6 +20,8 @@ _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
 _STEP = 1e-6
+# Of a sample: a dead time of zero would be none, and no parameter.
+_LEAST_DELAY = 1e-12
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:
@@ -66,23 +68,33 @@ class TransferRecord:
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): a level, and what the states of its entries do without an input.
 
-        Inputs before the record that come late by a dead time move the states, sample by sample, as if from
-        anywhere.
+        A level of the input, of which an integrator makes a ramp, is unknown as well. Inputs before the
+        record that come late by a dead time move the states, sample by sample, as if from anywhere.
         """
         model = self.structure.at(theta)
         found = [[np.ones((1, self.samples))] for _ in range(model.outputs)]
         for i, j in model.active:
-            found[i].append(self._begun(model, i, j))
+            found[i].append(self._begun(model, i, j, ramp=self._ramps(model, i, j)))
         return tuple(np.concatenate(parts) for parts in found)
 
-    def _begun(self, model: ContinuousModel, i: int, j: int) -> NDArray[np.float64]:
+    def _begun(self, model: ContinuousModel, i: int, j: int, *, ramp: bool) -> NDArray[np.float64]:
         """(m, N): those of one entry."""
         entry = self._entry(model, i, j)
-        impulses = np.eye(min(entry.order + self.late, self.samples), self.samples)
-        if not len(impulses):
-            return impulses
+        entering = np.eye(min(entry.order + self.late, self.samples), self.samples)
+        if ramp:
+            entering = np.concatenate([entering, np.ones((1, self.samples))])
+        if not len(entering):
+            return entering
         poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
-        return filtered([1.0], poles, impulses)
+        return filtered([1.0], poles, entering)
+
+    def _ramps(self, model: ContinuousModel, i: int, j: int) -> bool:
+        """Whether an entry makes a ramp of a level."""
+        return bool(integrators(model.denominator[i][j]))
+
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """None: the noise is white."""
+        return (np.zeros((0, self.samples)),) * self.structure.outputs
 
     def lateness(self, theta: Array) -> int:
         """The longest dead time, in samples, those that are begun counted whole."""
@@ -110,14 +122,16 @@ class TransferRecord:
         slowest = 1.0 / (self.samples * self.intersample.sample_time)
         size = _STEP * max(abs(theta[index]), slowest ** (order - parameter.power))
         step = size * np.eye(self.size)[index]
+        here = self.structure.at(theta)
         ends = self.structure.at(theta + step), self.structure.at(theta - step)
         found = [[np.zeros((1, self.samples))] for _ in range(self.structure.outputs)]
         for place in self.structure.active:
+            ramp = self._ramps(here, *place)
             if place in parameter.places:
-                above, below = (self._begun(end, *place) for end in ends)
+                above, below = (self._begun(end, *place, ramp=ramp) for end in ends)
                 found[place[0]].append((above - below) / (2.0 * size))
             else:
-                unmoved = min(self._order(*place) + self.late, self.samples)
+                unmoved = min(self._order(*place) + self.late, self.samples) + ramp
                 found[place[0]].append(np.zeros((unmoved, self.samples)))
         return tuple(np.concatenate(parts) for parts in found)
 
@@ -149,13 +163,14 @@ class TransferRecord:
     def stabilised(self, theta: Array) -> Array:
         """theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
 
-        Poles that are exactly zero are those of integrators, and stay. Dead times are kept between
-        zero and the length of the record.
+        Poles that are exactly zero are those of integrators, and stay. Dead times are kept
+        positive and below the length of the record.
         """
         step = self.intersample.sample_time
         slowest, fastest = _LEAST_DECAY / (self.samples * step), _FASTEST / step
         out = theta.copy()
-        out[self.dead_times] = np.clip(out[self.dead_times], 0.0, (self.samples - 1) * step)
+        late = self.dead_times
+        out[late] = np.clip(out[late], _LEAST_DELAY * step, (self.samples - 1) * step)
         for every in self._denominators:
             columns = every[integrators(np.append(theta[every], 1.0)) :]
             poles = polynomial_roots(np.append(theta[columns], 1.0))

@@ -40,6 +40,7 @@ _BESIDE = (-0.75, -0.25, 0.25)
 _FASTEST = 1e-3
 _SLOWEST = 1.0 - 1e-4
 _ZERO = 0.5
+_LEAST = 0.05
 # A dead time this near below a whole number of samples is that number.
 _ROUNDED = 0.01
 _NORMAL = 1.96  # 95 % of a Gaussian estimate
@@ -135,7 +136,7 @@ class Process:
         for beside in _BESIDE:
             theta: list[float] = []
             for gain, delay in zip(gains, quick.delays, strict=True):
-                late = max(delay - 1 + beside, 0.0) * self.step
+                late = max(delay - 1 + beside, _LEAST) * self.step
                 theta += [gain, *below, *([_ZERO * below[0]] if self.zero else []), late]
             found.append([*theta, *np.zeros(2 * self.noise)])
         return np.array(found)
