@@ -1,4 +1,4 @@
-"""The page of the three logs says what its commands say, and shows what they draw."""
+"""The page of the converter says what its commands say, and shows what they draw."""
 
 import importlib.util
 import re
