@@ -56,9 +56,7 @@ def test_an_experiment_without_a_length_takes_all_that_it_may():
     heater = parse_spec(HEATER % (1, "criterion: D"))
     assert heater.experiment.samples == 720
     assert heater.with_(**{"experiment.duration": 1800}).experiment.samples == 360
-    shortest = heater.with_(
-        objective="shortest_experiment", accuracy={"standard_deviation": {"gain": 0.1}}
-    )
+    shortest = heater.with_(objective="shortest_experiment", accuracy={"standard_deviation": {"gain": 0.1}})
     assert shortest.experiment.samples == 1
 
 
