@@ -21,7 +21,7 @@ ORDER = [
     {"runs"},
     {"monte_carlo"},
     {"tasks"},
-    {"sweep", "campaign", "figures"},
+    {"sweep", "campaign", "figures", "wizard"},
     {"report"},
     {"cli", "__main__"},
 ]

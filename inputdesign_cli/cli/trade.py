@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from inputdesign_cli.cli.terminal import status
@@ -67,7 +67,7 @@ def trade_table(trade: Trade) -> str:
     heads = [f"{length:g} {trade.unit}" for length in trade.lengths]
     rows = [["criterion" if trade.criterion else "error / asked", *heads]]
     for text, values in zip(trade.amplitudes, trade.values, strict=True):
-        cells = [f"{value:.3g}" if np.isfinite(value) else "none" for value in values]
+        cells = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
         rows.append([f"amplitude {text}" if text else "best record", *cells])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
