@@ -148,7 +148,7 @@ BAD = [
     ("unused-parameter", "{parameters: {K: 1, T: 2}, continuous: {numerator: [K], denominator: [3, 1]}}"),
     (
         "unused-parameter",
-        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*z, K], denominator: [3, 1]}}",
+        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*(1 + z**2)], denominator: [3, 1]}}",
     ),
     ("undefined-expression", "{parameters: {K: 0}, continuous: {numerator: [1/K], denominator: [3, 1]}}"),
     ("bad-expression", "{parameters: {K: 1}, continuous: {numerator: ['K^2'], denominator: [3, 1]}}"),

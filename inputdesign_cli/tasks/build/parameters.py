@@ -12,24 +12,26 @@ from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.named import leading, present
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
     """A list of one dead time for each entry that has one, empty lists for the others; empty if none has.
 
-    An entry has one where it is not zero, or an expression.
+    See `present`.
     """
-    values = plant.continuous.delays
-    texts = plant.texts.delay if plant.named_parameters else None
+    texts = plant.stated_texts.delay
     rows = tuple(
-        tuple(
-            np.array([value] if value or (texts and Expression(texts[i][j]).names) else [])
-            for j, value in enumerate(row)
-        )
-        for i, row in enumerate(values)
+        tuple(np.array([value] if present(texts[i][j]) else []) for j, value in enumerate(row))
+        for i, row in enumerate(plant.continuous.delays)
     )
     return rows if any(entry.size for row in rows for entry in row) else ()
+
+
+def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
+    """Of each numerator, -1 where the entry is absent; see `present`."""
+    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_texts.numerator]
 
 
 def reparametrised(
