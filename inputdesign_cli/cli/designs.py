@@ -11,6 +11,7 @@ import typer
 from inputdesign_cli.cli.options import (
     Confine,
     Fast,
+    FigureFormat,
     Figures,
     Json,
     KeepPartial,
@@ -50,6 +51,7 @@ def solve(
     fast: Fast = False,
     trade: TradeWords = "",
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -66,7 +68,9 @@ def solve(
         overrides = [*(overrides or []), "solver.any_spectrum=false"]
     if not keep_partial:
         results, place = _results("solve", place, overrides, confine, quiet)
-        keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+        keep(
+            results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet
+        )
         if trade:
             read = read_spec(spec, overrides, confine)
             beside = place.directory.with_name(f"{place.directory.name}-trade")
@@ -75,7 +79,7 @@ def solve(
         return
     with stoppable() as stop, ending_early(stop) as came:
         results, place = _results("solve", place, overrides, confine, quiet)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
     if came:
         raise typer.Exit(128 + came[0])
 
@@ -88,6 +92,7 @@ def analyse(
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -98,7 +103,7 @@ def analyse(
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
     results, place = _results("analyse", place, overrides, confine, quiet)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def simulate(
@@ -112,6 +117,7 @@ def simulate(
     cluster: ClusterAddress = None,
     worker_timeout: WorkerTimeout = None,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -125,7 +131,7 @@ def simulate(
     results, place = _results(
         "simulate", place, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
     )
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def _results(

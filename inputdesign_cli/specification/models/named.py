@@ -88,7 +88,7 @@ def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
             yield PathDiagnostic(
                 "bad-name",
                 f"{clip(name)} is no name of a parameter",
-                "a name is a letter, then letters, digits and _; functions and pi are taken",
+                "a name is a letter, then letters, digits and _; functions, pi and lambda are taken",
                 ("parameters", name),
                 at_key=True,
             )

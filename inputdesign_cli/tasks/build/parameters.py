@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -73,10 +74,12 @@ def _of_named(
     """The named parameters of the plant, and those of the noise as they are."""
     named = plant.named_parameters
     noise = [p for p in parameters if p.letter in "cd"]
-    symbols = {p.name: f"noise_{i}" for i, p in enumerate(noise)}
+    # No name of a parameter of the plant: those are in ASCII.
+    symbols = {p.name: f"\N{GREEK SMALL LETTER EPSILON}{i}" for i, p in enumerate(noise)}
     terms = [symbols[p.name] if p.letter in "cd" else _term(plant, p) for p in parameters]
     labels = (*(one.label for one in named), *symbols)
-    known = (*(plant.known or ()), *(spec.noise.known or ()))
+    fixed = [one.label in (plant.known or ()) for one in named]
+    fixed += [name in (spec.noise.known or ()) for name in symbols]
     made = Parametrisation(
         labels,
         (*(one.symbol for one in named), *symbols.values()),
@@ -92,9 +95,7 @@ def _of_named(
                 hint="look for a factor that is zero there, or a leading coefficient that vanishes",
                 key="plant.parameters",
             )
-    return Parametrisation(
-        made.labels, made.symbols, made.values, np.array([x not in known for x in labels]), made.terms
-    )
+    return replace(made, free=~np.array(fixed))
 
 
 def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> str:
