@@ -184,8 +184,8 @@ def make_record(
 
 def _binding(design: Design) -> list[int]:
     """The nominal plant, and the scenarios that bind the design."""
-    weight = np.trace(design.result.certificate.weights, axis1=1, axis2=2)
-    return [n for n, share in enumerate(weight) if n == 0 or share > _TAKES_PART * weight.sum()]
+    shares = design.result.certificate.shares
+    return [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
 
 
 def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Record) -> float:

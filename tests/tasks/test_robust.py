@@ -68,14 +68,14 @@ def test_limits_hold_at_every_plant():
     assert limit["value"] == pytest.approx(5.0, rel=1e-6)
 
 
-def test_the_cost_is_that_of_the_nominal_plant_or_the_mean():
+def test_the_cost_is_that_of_the_nominal_plant_the_mean_or_the_largest():
     scenarios = "uncertainty={scenarios: [{f1: -0.75}, {f1: -0.85}], cost: %s}"
-    for cost in ("nominal", "mean"):
+    of_each = {"nominal": lambda paid: paid[0], "mean": np.mean, "worst": max}
+    for cost, of in of_each.items():
         found = build_convex(parse_spec(LOOP, overrides=[scenarios % cost])).designed()[0]
         at, x = found.problem, found.design.result.x
         paid = [sum(at.power(kind, None, s).at(x) for kind in ("input", "output")) for s in range(3)]
-        expected = paid[0] if cost == "nominal" else np.mean(paid)
-        assert found.design.result.objective == pytest.approx(expected, rel=1e-9)
+        assert found.design.result.objective == pytest.approx(of(paid), rel=1e-9)
     assert solved(LOOP, scenarios.replace(", cost: %s", ""))["robust"]["cost"] == "mean"
 
 
@@ -88,6 +88,22 @@ def test_fresh_draws_are_missed_no_more_often_than_wait_and_judge_says():
     assert low <= robust["fresh"]["share"] <= high
     assert robust["fresh"]["share"] <= robust["risk"]["after"] <= robust["risk"]["before"]
     assert found["cost"] > 1.05 * solved(FIRST)["cost"]
+
+
+def test_a_plant_that_costs_more_than_the_worst_one_is_missed():
+    """Cost worst: beside the accuracy the cost is promised, at the plants drawn and to most of the others."""
+    prior = "covariance: [[0.001, 0], [0, 4.0e-4]], scenarios: 30, fresh: 60"
+    found = solve(parse_spec(LOOP, overrides=[f"uncertainty={{{prior}, cost: worst}}"])).result
+    mean = solved(LOOP, f"uncertainty={{{prior}, cost: mean}}")
+    robust = found["robust"]
+    assert robust["cost"] == "worst"
+    assert found["cost"] == pytest.approx(found["objective"]["value"], rel=1e-9)
+    assert found["cost"] > 1.05 * mean["cost"]
+    assert robust["dearest"]["cost"] == pytest.approx(found["cost"], rel=1e-6)
+    assert robust["dearest"]["scenario"] in [one["scenario"] for one in robust["active"]]
+    assert 0 <= robust["fresh"]["dearer"] <= robust["fresh"]["missed"]
+    assert robust["fresh"]["share"] <= robust["risk"]["after"]
+    assert "dearest" not in mean["robust"]
 
 
 def test_leaving_out_the_dearest_plants_makes_it_cheaper():

@@ -129,7 +129,7 @@ class State:
         self.idle = idle[kept].tolist()
         self.keys = [self.keys[i] for i in kept]
         self.cuts = [self.cuts[i] for i in kept]
-        self.proof = Proof(tuple(proof.cuts[i] for i in kept), proof.rows)
+        self.proof = replace(proof, cuts=tuple(proof.cuts[i] for i in kept))
 
     def _definite(self, z: Array, s: float) -> tuple[Array, float]:
         """(z, s), or halfway to the best design when z leaves some parameter without information."""

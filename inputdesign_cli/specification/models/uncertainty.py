@@ -97,10 +97,10 @@ class Uncertainty(Section):
     floor: Annotated[NonNegative, Field(lt=1)] = Field(
         default=0.1, description="Least admissible error of a plant, as a share of that of the nominal plant."
     )
-    cost: Literal["nominal", "mean"] | None = Field(
+    cost: Literal["nominal", "mean", "worst"] | None = Field(
         default=None,
-        description="The powers that are paid for: of the nominal plant, or their mean over all (default in "
-        "closed loop).",
+        description="The powers that are paid for: of the nominal plant, their mean over all (default in "
+        "closed loop), or those of the plant where they cost most.",
     )
     fresh: Annotated[Index, SIZES["uncertainty.fresh"]] = Field(
         default=1000, description="Plants drawn afresh that the finished design is tried on."

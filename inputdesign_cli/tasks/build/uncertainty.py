@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.design.convex.cost import Paid
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
@@ -52,10 +53,10 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
     if stated is None:
         return None
     scenario = _Scenarios(spec, stated, experiment)
-    mean_cost = spec.closed_loop if stated.cost is None else stated.cost == "mean"
+    paid: Paid = stated.cost or ("mean" if spec.closed_loop else "nominal")
     names = experiment.model.names
     if isinstance(stated.scenarios, tuple):
-        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, mean_cost)
+        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
     number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
     draw = drawing(spec, stated, experiment)
     batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
@@ -68,7 +69,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         stated.stated(*SOURCES)[0],
         names,
         stated.r_adm,
-        mean_cost,
+        paid,
         discard=int(stated.discard * number),
         afresh=afresh if stated.fresh else None,
         unknowns=None if basis.free else _unknowns(spec, basis),
@@ -100,8 +101,9 @@ def _needed(spec: Spec, basis: Basis) -> int | None:
 
 
 def _unknowns(spec: Spec, basis: Basis) -> int:
-    """Of the program: those of the spectrum, and the factor or the length where that is sought."""
-    return basis.size + int(spec.goal != "least_cost")
+    """Of the program: those of the spectrum, and the factor, length or largest cost that is sought."""
+    stated = spec.uncertainty
+    return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
 
 
 def farthest_radius(spec: Spec, experiment: Experiment) -> float:

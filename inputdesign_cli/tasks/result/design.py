@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, Sensitivity, model_errors
 from inputdesign_cli.design.convex.candidate import candidate_at
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import Weight, paid_for, weighted_sum
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
@@ -170,11 +170,14 @@ def powers(problem: Problem, basis: Basis, x: Array, scenario: int = 0) -> dict[
 
 
 def _cost(done: Designed, basis: Basis, x: Array) -> float:
-    """At the nominal plant, or the mean over all plants where that is what is paid."""
+    """At the nominal plant, the mean over all plants or that of the dearest, as they are paid."""
+    return paid_for(done.design.problem.paid, costs_of(done, basis, x))
+
+
+def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
+    """What a spectrum costs at each plant that is paid for."""
     problem = done.design.problem
-    paid = range(len(problem.scenarios)) if problem.mean_cost else (0,)
-    costs = [weighted_sum(done.cost, powers(problem, basis, x, scenario)) for scenario in paid]
-    return sum(costs) / len(costs)
+    return [weighted_sum(done.cost, powers(problem, basis, x, scenario)) for scenario in problem.paying]
 
 
 def _objective(design: Design) -> dict[str, Json]:
