@@ -79,6 +79,7 @@ def solve_design(
     question = replace(question, basis=question.basis.in_units(np.sqrt(powers)))
     start = question.basis.spread(powers)
     whitened = whitened_problem(question, powers)
+    whitened = replace(whitened, seen=whitened.demands)
     problem = suited(whitened, question, start)
     flat = replace(problem.on(flat_basis(problem.experiment)), paid="nominal")
     if question.others and _begins_flat(question.basis):

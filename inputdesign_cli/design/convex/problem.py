@@ -60,7 +60,8 @@ class Problem:
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
     they can be met. `finer` is a problem of the same experiment on the same or a larger basis, of whose
-    integrals those of this basis are the head.
+    integrals those of this basis are the head. `seen` are the demands of a like problem, which are those of
+    this one where both ask the same of the same plants.
     """
 
     experiment: Experiment
@@ -75,6 +76,7 @@ class Problem:
     others: tuple[Scenario, ...] = field(default=(), repr=False)
     paid: Paid = "nominal"
     finer: Problem | None = field(default=None, repr=False)
+    seen: Demands | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
@@ -82,6 +84,8 @@ class Problem:
         """What is required at all S plants, the nominal one first."""
         if self._before:  # with what has been seen of them
             return self._before[0].demands
+        if self.seen is not None and self.seen.are_of(self.requirements, self.side, self.others):
+            return self.seen
         return Demands((Scenario(self.experiment, self.requirements, self.side), *self.others))
 
     @property
