@@ -47,8 +47,9 @@ def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
         return {"time": preparation.columns["time"]}
     timed = [name for name in sheet.header if is_time(name)]
     if len(timed) > 1:
-        message = f"{sheet.path.name} has several columns of times: {', '.join(timed)}"
-        hint = f"say which one counts: --columns time={timed[0]}"
+        listed = f": {', '.join(timed)}" if sheet.shown else ""
+        message = f"{sheet.path.name} has several columns of times{listed}"
+        hint = f"say which one counts: --columns time={timed[0] if sheet.shown else 'NAME'}"
         raise DataError(sheet.error("data-missing-column", message, hint))
     return {"time": timed[0]} if timed else {}
 
@@ -77,7 +78,7 @@ def with_headers(sheet: Sheet, preparation: Preparation) -> Preparation:
     whole = {}
     for channel, column in preparation.columns.items():
         at = named_columns(sheet, column.strip().lower())
-        name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names else ""
+        name = sheet.names[at[0]].strip() if len(at) == 1 and sheet.names and sheet.shown else ""
         whole[channel] = name if sheet.header.count(name.lower()) == 1 else column
     return replace(preparation, columns=whole)
 

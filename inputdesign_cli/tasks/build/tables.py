@@ -62,8 +62,8 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
         if fault is not None:
             row, text = fault
             shown = repr(text) if sheet.shown else "a value"
-            message = f"{shown} in column {wanted[role]} is not a finite number"
-            hint = "write plain numbers with a decimal point, one row a line"
+            message = f"{shown} in column {wanted[role]} {sheet.columns[at].wrong}"
+            hint = "write plain numbers with a decimal point, one row a line; dates as 2024-03-12 10:15:00"
             raise DataError(sheet.error("data-not-a-number", message, hint, row))
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
@@ -108,7 +108,7 @@ def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
     hint = f"name one column {' and one '.join(names)}"
     if not sheet.key:
         others = [name.strip() for name in sheet.names if not is_time(name.strip().lower())]
-        called = others if len(others) == len(names) else ["NAME"] * len(names)
+        called = others if sheet.shown and len(others) == len(names) else ["NAME"] * len(names)
         columns = ",".join(f"{name}={column}" for name, column in zip(names, called, strict=True))
         quoted = f'"{columns}"' if " " in columns else columns
         hint += f", or say which it is: --columns {quoted} (or its number)"

@@ -6,16 +6,16 @@ import io
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.tasks.build.files import isolated
 from inputdesign_cli.tasks.build.files.sheet import Array, Sheet, of_arrays, unreadable
 
 _MOST_BYTES = 2**30
 _SAMPLE_TIMES = ("ts", "sample_time", "dt")
-# The fields of a saved iddata, and how its columns are called here.
-_IDDATA = {"inputdata": "u", "outputdata": "y", "samplinginstants": "time"}
 _CONVERT = (
     "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  "
     "then: save('data.mat', '-struct', 's', '-v7')"
@@ -34,9 +34,11 @@ def read_npz(path: Path, key: str, raw: bytes) -> Sheet:
                 raise unreadable(path, key, "unpacks to more than 1 GiB", "keep to what is needed")
         with np.load(io.BytesIO(raw), allow_pickle=False) as found:
             arrays = {name: found[name] for name in found.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except DataError:
+        raise
+    except Exception:  # whatever a broken archive leads the reader to
         hint = "write it with numpy.savez(file, u=.., y=..)"
-        raise unreadable(path, key, f"is no .npz file of numbers: {error}", hint) from None
+        raise unreadable(path, key, "is no .npz file of numbers", hint) from None
     return _sheet(path, key, arrays)
 
 
@@ -46,57 +48,27 @@ def read_mat(path: Path, key: str, raw: bytes) -> Sheet:
     Raises:
         DataError: `data-unreadable`; of an object that only MATLAB reads, with the lines that convert it.
     """
-    import warnings
-
-    import scipy.io
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            found = scipy.io.loadmat(io.BytesIO(raw), simplify_cells=True)
-    except NotImplementedError:
+    found = isolated.arrays_of(raw)
+    if found.fault == isolated.NEWER:
         hint = "in MATLAB: save('data.mat', 'u', 'y', '-v7')"
-        raise unreadable(path, key, "is a .mat file of version 7.3", hint) from None
-    except Exception as error:  # the reader raises whatever a broken file leads it to
-        raise unreadable(path, key, f"is no .mat file: {error}", "save it in MATLAB anew") from None
-    arrays = {name: value for name, value in found.items() if not name.startswith("__")}
-    arrays = {name: _plain(value) for name, value in arrays.items()}
-    flat: dict[str, Any] = {}
-    for name, value in arrays.items():
-        flat |= value if isinstance(value, Mapping) else {name: value}
-    kept = {name: value for name, value in flat.items() if _numeric(value)}
-    if not any(np.size(value) > 1 for value in kept.values()):
-        opaque = "__function_workspace__" in found
-        what = "holds an object that only MATLAB reads" if opaque else "holds no arrays of numbers"
+        raise unreadable(path, key, "is a .mat file of version 7.3", hint)
+    if found.fault:
+        raise unreadable(path, key, "is no .mat file that can be read", "save it in MATLAB anew")
+    if not any(value.size > 1 for value in found.arrays.values()):
+        what = "holds an object that only MATLAB reads" if found.opaque else "holds no arrays of numbers"
         raise unreadable(path, key, what, _CONVERT)
-    return _sheet(path, key, kept)
+    return _sheet(path, key, found.arrays)
 
 
-def _plain(value: Any) -> Any:
-    """A struct by the names of this house, where it is a saved iddata."""
-    if not isinstance(value, Mapping):
-        return value
-    fields = {str(name).lower(): item for name, item in value.items()}
-    if "outputdata" not in fields:
-        return dict(value)
-    return {_IDDATA.get(name, name): item for name, item in fields.items() if np.size(item)}
-
-
-def _numeric(value: Any) -> bool:
-    array = np.asarray(value)
-    return array.dtype.kind in "fiub" and array.ndim <= 2
-
-
-def _sheet(path: Path, key: str, arrays: Mapping[str, Any]) -> Sheet:
+def _sheet(path: Path, key: str, arrays: Mapping[str, NDArray]) -> Sheet:
     """Scalars called Ts, sample_time or dt are the sample time; the signals are what has several rows."""
+    numbers = {name: value for name, value in arrays.items() if isolated.is_numeric(value)}
     times = [
         float(np.ravel(value)[0])
-        for name, value in arrays.items()
-        if name.lower() in _SAMPLE_TIMES and np.size(value) == 1 and _numeric(value)
+        for name, value in numbers.items()
+        if name.lower() in _SAMPLE_TIMES and value.size == 1
     ]
     signals: list[tuple[str, Array]] = [
-        (name, np.asarray(value, dtype=float))
-        for name, value in arrays.items()
-        if _numeric(value) and np.size(value) > 1
+        (name, np.asarray(value, dtype=float)) for name, value in numbers.items() if value.size > 1
     ]
     return of_arrays(path, key, signals, times[0] if times else None)

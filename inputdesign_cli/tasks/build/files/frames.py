@@ -28,7 +28,7 @@ def read_frame(path: Path, key: str, raw: bytes) -> Sheet:
     except ImportError:
         hint = 'install what reads it: pip install "inputdesign-cli[data]"; or save it as CSV'
         raise unreadable(path, key, f"is {kind}, and pandas is not installed", hint) from None
-    except Exception as error:  # whatever a broken file leads the reader to
-        raise unreadable(path, key, f"is not {kind} that can be read: {error}", "save it as CSV") from None
+    except Exception:  # whatever a broken file leads the reader to
+        raise unreadable(path, key, f"is not {kind} that can be read", "save it as CSV") from None
     numbers = frame.select_dtypes("number")
     return of_arrays(path, key, [(str(name), np.asarray(numbers[name], dtype=float)) for name in numbers])

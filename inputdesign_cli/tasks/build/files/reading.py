@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.tasks.build.files.arrays import read_mat, read_npz
+from inputdesign_cli.tasks.build.files.decoding import decoded
 from inputdesign_cli.tasks.build.files.frames import EXCEL, PARQUET, read_frame
 from inputdesign_cli.tasks.build.files.sheet import Sheet, unreadable
 from inputdesign_cli.tasks.build.files.text import read_text
@@ -25,28 +25,30 @@ def read_sheet(path: Path, *, key: str) -> Sheet:
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
+    raw = _bytes(path, key)
+    if len(raw) > _MOST_BYTES:
+        raise unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
+    kind = path.suffix.lower()
+    if kind == ".npz":
+        return read_npz(path, key, raw)
+    if kind == ".mat":
+        return read_mat(path, key, raw)
+    if kind in PARQUET + EXCEL:
+        return read_frame(path, key, raw)
+    if raw.startswith(_SHEETS):
+        hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
+        raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
+    return read_text(path, key, decoded(path, key, raw))
+
+
+def _bytes(path: Path, key: str) -> bytes:
     try:
-        raw = read_regular(path, _MOST_BYTES + 1)
-        if len(raw) > _MOST_BYTES:
-            raise unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
-        kind = path.suffix.lower()
-        if kind == ".npz":
-            return read_npz(path, key, raw)
-        if kind == ".mat":
-            return read_mat(path, key, raw)
-        if kind in PARQUET + EXCEL:
-            return read_frame(path, key, raw)
-        if raw.startswith(_SHEETS):
-            hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
-            raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)
-        return read_text(path, key, raw.decode("utf-8-sig"))
+        return read_regular(path, _MOST_BYTES + 1)
     except FileNotFoundError:
         hint = "paths are relative to the folder of the spec" if key else "check the name and the folder"
         raise unreadable(path, key, "does not exist", hint) from None
     except IsADirectoryError:
         raise unreadable(path, key, "is a folder", "name a CSV file") from None
-    except UnicodeDecodeError:
-        raise unreadable(path, key, "is not UTF-8", "name a CSV file in UTF-8") from None
-    except (OSError, ValueError, csv.Error) as error:
+    except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file in UTF-8") from None
+        raise unreadable(path, key, f"cannot be read: {reason}", "name a CSV file") from None

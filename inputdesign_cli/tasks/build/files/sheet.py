@@ -18,12 +18,13 @@ Array = NDArray[np.float64]
 class Column:
     """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
 
-    Dates, as ISO 8601 writes them, are `dated`: seconds since the first.
+    Dates and times are `dated`: seconds since the first. What is `wrong` with a fault goes into messages.
     """
 
     numbers: Array
     fault: tuple[int, str] | None = None
     dated: bool = False
+    wrong: str = "is not a finite number"
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,10 @@ class Sheet:
         )
 
 
-def unreadable(path: Path, key: str, what: str, hint: str) -> DataError:
-    """The error about a file that cannot be read at all."""
-    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key)
+def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = None) -> DataError:
+    """The error about a file that cannot be read at all, in a line of it where one is at fault."""
+    location = None if line is None else Location(str(path), line, 1)
+    return DataError.because("data-unreadable", f"the file {path} {what}", hint, key, location)
 
 
 def of_arrays(

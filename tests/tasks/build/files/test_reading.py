@@ -1,13 +1,18 @@
 """The same numbers come out of every kind of file; what cannot be read is said with its line."""
 
+import codecs
+import contextlib
 import io
 
 import numpy as np
 import pytest
 import scipy.io
+from hypothesis import HealthCheck, given, settings, strategies as st
 
-from inputdesign_cli.errors import DataError
+from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.log import read_log
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, read_columns
 
 TIME, U, Y = np.arange(4.0), np.array([1.5, -2.0, 3.25, 0.0]), np.array([10.0, 11.5, 12.0, 13.75])
@@ -121,3 +126,171 @@ def test_parquet_and_excel_are_read_where_pandas_is(name, writer, tmp_path):
     frame = pandas.DataFrame({"time": TIME, "u": U, "y": Y, "note": list("abcd")})
     getattr(frame, writer)(tmp_path / name, index=False)
     np.testing.assert_array_equal(read_columns(tmp_path / name, {"u": "u"}, key="")["u"], U)
+
+
+# What loggers write: a preamble, names, units, dates; one moment after the other.
+LOGGERS = {
+    "a preamble of keys": "Logger X1\nSerial,42\nOperator,Bob\n\ntime,u,y\n{rows}",
+    "a preamble as wide as the table": "a,b,c\nd,e,f\ntime,u,y\n{rows}",
+    "a preamble above names and units": "Logger,X1\n\ntime,u,y\ns,V,degC\n{rows}",
+    "a preamble without names": "Logger X1\nwritten by hand\n{rows}",
+    "a separator at every end": "time,u,y\n{trailing}",
+    "quotes": '"time","u","y"\n{rows}',
+    "a name of two lines": 'time,"u\n(V)",y\n{rows}',
+    "bars": "time|u|y\n{bars}",
+    "zeros after the end": "time,u,y\n{rows}\x00\x00",
+}
+
+
+@pytest.mark.parametrize("layout", LOGGERS.values(), ids=LOGGERS)
+def test_what_loggers_write_around_the_table(layout, tmp_path):
+    rows = table(",", header="")
+    trailing, bars = rows.replace("\n", ",\n"), rows.replace(",", "|")
+    path = tmp_path / "log.csv"
+    path.write_text(layout.format(rows=rows, trailing=trailing, bars=bars))
+    unnamed = "without names" in layout or "by hand" in layout
+    wanted = {"time": "1", "u": "2", "y": "3"} if unnamed else {"time": "time", "u": "u", "y": "y"}
+    found = read_columns(path, wanted, key="")
+    for name, expected in (("time", TIME), ("u", U), ("y", Y)):
+        np.testing.assert_array_equal(found[name], expected)
+
+
+ENCODINGS = {
+    "utf-8": ("utf-8", b""),
+    "windows": ("cp1252", b""),
+    "utf-16": ("utf-16-le", codecs.BOM_UTF16_LE),
+    "utf-16 the other way": ("utf-16-be", codecs.BOM_UTF16_BE),
+    "utf-16 unmarked": ("utf-16-le", b""),
+    "utf-16 unmarked the other way": ("utf-16-be", b""),
+    "utf-32": ("utf-32-le", codecs.BOM_UTF32_LE),
+}
+
+
+@pytest.mark.parametrize(("encoding", "mark"), ENCODINGS.values(), ids=ENCODINGS)
+def test_names_keep_their_letters_in_every_encoding(encoding, mark, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(mark + table(",", header="time,u (°C),y größe").encode(encoding))
+    sheet = read_sheet(path, key="")
+    assert sheet.names == ("time", "u (°C)", "y größe")
+    np.testing.assert_array_equal(columns_of(sheet, {"u": "u"})["u"], U)
+
+
+DATES = {
+    "points": ["12.03.2024 10:15:00", "12.03.2024 10:15:30", "13.03.2024 10:15:00"],
+    "two digits of the year": ["12.03.24 10:15", "12.03.24 10:15:30", "13.03.24 10:15"],
+    "a day that is no month": ["12/03/2024 10:15:00", "12/03/2024 10:15:30", "13/03/2024 10:15:00"],
+    "a month before the day": ["03/12/2024 10:15:00 AM", "03/12/2024 10:15:30 AM", "03/13/2024 10:15:00 AM"],
+    "ISO": ["2024-03-12T10:15:00", "2024-03-12T10:15:30", "2024-03-13T10:15:00"],
+    "slashes, the year first": ["2024/03/12 10:15:00", "2024/03/12 10:15:30.000", "2024/03/13 10:15:00"],
+}
+
+
+@pytest.mark.parametrize("dates", DATES.values(), ids=DATES)
+def test_dates_are_seconds_since_the_first(dates, tmp_path):
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{date};{k},5;{k},25" for k, date in enumerate(dates))
+    path.write_text(f"Time;u;y\n{rows}\n")
+    sheet = read_sheet(path, key="")
+    np.testing.assert_array_equal(columns_of(sheet, {"time": "time"})["time"], [0.0, 30.0, 86400.0])
+    assert sheet.columns[0].dated
+    np.testing.assert_array_equal(columns_of(sheet, {"u": "u"})["u"], [0.5, 1.5, 2.5])
+
+
+def test_times_of_a_day_between_blanks(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text("Date Time u y\n12.03.2024 10:15:00 1 2\n12.03.2024 10:16:00.5 3 4\n")
+    found = columns_of(read_sheet(path, key=""), {"time": "time", "y": "y"})
+    np.testing.assert_array_equal(found["time"], [0.0, 60.5])
+    np.testing.assert_array_equal(found["y"], [2.0, 4.0])
+
+
+def test_dates_of_two_meanings_are_refused(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u\n03/04/2024 10:00,1\n04/04/2024 10:00,2\n05/04/2024 10:00,3\n")
+    with pytest.raises(DataError, match="day or the month first"):
+        read_columns(path, {"time": "time"}, key="")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('u,y\n1,2\n3,"4\n5,6\n', 3),
+        ('u,y\n1,2\n"3,4\n' + "5,6\n" * 60_000, 3),  # beyond the largest field
+        ('u,y\n1,"2\n3,4\n5,"6\n', 2),
+        ('secret "of a kind\nu,"y\n1,2\n', 2),
+    ],
+)
+def test_quotes_that_nothing_closes_are_told_with_their_line(text, line, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(DataError, match=f"quote that opens in line {line} ") as caught:
+        read_sheet(path, key="")
+    (told,) = caught.value.diagnostics
+    assert (told.code, told.location.line, told.location.text) == ("data-unreadable", line, "")
+
+
+CELLS = st.sampled_from(
+    [*(f"{x:g}" for x in (0.0, 1.5, -2e300, 1e-320)), "1,5", "nan", "", '"', '""', "12.03.2024", "10:15", "u"]
+)
+PIECES = st.one_of(
+    st.binary(max_size=40),
+    CELLS.map(str.encode),
+    st.sampled_from(
+        [b"\n", b"\r\n", b",", b";", b"\t", b"#", b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"PK\x03\x04"]
+    ),
+)
+
+
+@pytest.mark.parametrize("ending", ["csv", "npz", "xlsx", "parquet"])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(pieces=st.lists(PIECES, max_size=40))
+def test_no_bytes_lead_to_another_error(ending, pieces, tmp_path):
+    path = tmp_path / f"log.{ending}"
+    path.write_bytes(b"".join(pieces))
+    with contextlib.suppress(IdesignError):
+        read_log(path, Preparation(columns={"u1": "1", "y1": "2"}))
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    cells=st.lists(st.lists(CELLS, min_size=2, max_size=3), min_size=1, max_size=30),
+    mark=st.sampled_from(",;\t"),
+)
+def test_no_table_leads_to_another_error(cells, mark, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(mark.join(row) for row in cells))
+    with contextlib.suppress(IdesignError):
+        read_log(path, Preparation(columns={"u1": "1", "y1": "2"}))
+
+
+@pytest.mark.parametrize("kind", ["mat", "npz", "xlsx", "parquet"])
+def test_no_damage_to_a_file_leads_to_another_error(kind, tmp_path):
+    path = tmp_path / f"log.{kind}"
+    if kind == "mat":
+        scipy.io.savemat(path, {"u": U, "y": Y, "Ts": 0.5})
+    elif kind == "npz":
+        np.savez_compressed(path, u=U, y=Y)
+    else:
+        pandas = pytest.importorskip("pandas")
+        frame = pandas.DataFrame({"u": U, "y": Y})
+        getattr(frame, "to_parquet" if kind == "parquet" else "to_excel")(path, index=False)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(3)
+    for _ in range(8 if kind == "mat" else 40):
+        broken = bytearray(whole[: rng.integers(1, len(whole) + 1)])
+        for at in rng.integers(0, len(broken), 4):
+            broken[at] = rng.integers(256)
+        path.write_bytes(broken)
+        with contextlib.suppress(IdesignError):
+            read_log(path, Preparation(columns={"u1": "u", "y1": "y"}))
+
+
+def test_a_file_that_ends_its_reader_is_refused(tmp_path):
+    """Sizes of a .mat file that do not fit its bytes lead SciPy's reader beyond its memory."""
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"u": U, "y": Y, "Ts": 0.5})
+    broken = bytearray(path.read_bytes())
+    broken[176] = 0  # the kind of the numbers of u
+    path.write_bytes(broken)
+    with pytest.raises(DataError, match=r"no \.mat file that can be read"):
+        read_sheet(path, key="")

@@ -1,0 +1,79 @@
+"""Dates and times as loggers write them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Points and slashes stand between day, month and year; which comes first, the dates themselves must tell.
+_DAYS = (
+    *("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%d/%m/%y", "%d-%m-%Y", "%m/%d/%Y", "%m/%d/%y", "%m-%d-%Y"),
+    *("%Y/%m/%d", "%Y.%m.%d", "%d-%b-%Y", "%d %b %Y"),
+)
+_TIMES = ("%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
+# How they all begin, those of ISO 8601 included.
+_BEGIN = re.compile(r"\d{1,4}([./-]\d|[- ]\w{3}[- ]|:\d\d)|\d{8}T|\d{4}-?W\d")
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Seconds (n,) since the first; None where dates can be read in two ways that differ."""
+
+    seconds: NDArray[np.float64] | None
+
+
+def moments_of(cells: Sequence[str]) -> Moments | None:
+    """Dates and times, or times of a day; None where some cell is neither.
+
+    As ISO 8601 writes them, or with points, slashes or hyphens, day or month first.
+    """
+    texts = [cell.strip() for cell in cells]
+    if not all(map(_BEGIN.match, texts)):
+        return None
+    iso = _iso(texts)
+    if iso is not None:
+        return Moments(iso)
+    found: list[NDArray[np.float64]] = []
+    for day in ("", *_DAYS):
+        moments = _parsed(texts, [f"{day} {time}".strip() for time in ("", *_TIMES) if day or time])
+        if moments is not None and not any(np.array_equal(moments, other) for other in found):
+            found.append(moments)
+    return Moments(found[0] if len(found) == 1 else None) if found else None
+
+
+def is_moment(text: str) -> bool:
+    """Whether a text is a date or a time of a day."""
+    return moments_of([text]) is not None
+
+
+def _iso(texts: Sequence[str]) -> NDArray[np.float64] | None:
+    try:
+        return _since_first([datetime.fromisoformat(text) for text in texts])
+    except (ValueError, TypeError, OverflowError):  # no dates, or some with and some without a time zone
+        return None
+
+
+def _parsed(texts: Sequence[str], formats: Sequence[str]) -> NDArray[np.float64] | None:
+    """Of one order of day, month and year; fractions of a second may be left out in some cells."""
+    found, last = [], formats[0]
+    for text in texts:
+        for form in dict.fromkeys((last, *formats)):
+            try:
+                found.append(datetime.strptime(text, form))
+            except ValueError:
+                continue
+            last = form
+            break
+        else:
+            return None
+    return _since_first(found)
+
+
+def _since_first(moments: Iterable[datetime]) -> NDArray[np.float64]:
+    every = list(moments)
+    return np.array([(moment - every[0]).total_seconds() for moment in every])

@@ -1,0 +1,96 @@
+"""MATLAB's files, read in a process of its own: on a damaged one SciPy's reader may end the process."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+BROKEN, NEWER = "broken", "version 7.3"
+# The fields of a saved iddata, and how its columns are called here.
+_IDDATA = {"inputdata": "u", "outputdata": "y", "samplinginstants": "time"}
+_COMMAND = f"from {__name__} import answer; answer()"
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """The arrays of numbers in a file; a `fault` where it cannot be read, `opaque` if MATLAB alone can."""
+
+    arrays: Mapping[str, NDArray] = field(default_factory=dict)
+    fault: str = ""
+    opaque: bool = False
+
+
+def arrays_of(raw: bytes) -> Arrays:
+    """What a .mat file holds, fields of structs by their own names."""
+    done = subprocess.run(
+        [sys.executable, "-c", _COMMAND],
+        input=raw,
+        capture_output=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    if done.returncode != 0:
+        return Arrays(fault=BROKEN)
+    head, _, rest = done.stdout.partition(b"\n")
+    told = json.loads(head)
+    if told["fault"]:
+        return Arrays(fault=told["fault"])
+    with np.load(io.BytesIO(rest), allow_pickle=False) as found:
+        arrays = {name: found[f"arr_{i}"] for i, name in enumerate(told["names"])}
+    return Arrays(arrays, opaque=told["opaque"])
+
+
+def answer() -> None:
+    """In that process: a file on standard input, its arrays on standard output."""
+    found = _loaded(sys.stdin.buffer.read())
+    told = {"fault": found.fault, "opaque": found.opaque, "names": list(found.arrays)}
+    sys.stdout.buffer.write(json.dumps(told).encode() + b"\n")
+    buffer = io.BytesIO()
+    np.savez(buffer, *found.arrays.values())
+    sys.stdout.buffer.write(buffer.getvalue())
+
+
+def _loaded(raw: bytes) -> Arrays:
+    import warnings
+
+    import scipy.io
+
+    warnings.simplefilter("ignore")
+    try:
+        found = scipy.io.loadmat(io.BytesIO(raw), simplify_cells=True)
+    except NotImplementedError:
+        return Arrays(fault=NEWER)
+    except Exception:  # the reader raises whatever a broken file leads it to
+        return Arrays(fault=BROKEN)
+    flat: dict[str, Any] = {}
+    for name, value in found.items():
+        if not name.startswith("__"):
+            plain = _plain(value)
+            flat |= plain if isinstance(plain, Mapping) else {name: plain}
+    kept = {name: np.asarray(value) for name, value in flat.items() if is_numeric(value)}
+    return Arrays(kept, opaque="__function_workspace__" in found)
+
+
+def _plain(value: Any) -> Any:
+    """A struct by the names of this house, where it is a saved iddata."""
+    if not isinstance(value, Mapping):
+        return value
+    fields = {str(name).lower(): item for name, item in value.items()}
+    if "outputdata" not in fields:
+        return dict(value)
+    return {_IDDATA.get(name, name): item for name, item in fields.items() if np.size(item)}
+
+
+def is_numeric(value: Any) -> bool:
+    """Whether a value is a number, or an array of them with rows and columns at most."""
+    array = np.asarray(value)
+    return array.dtype.kind in "fiub" and array.ndim <= 2

@@ -1,0 +1,226 @@
+"""How a text is laid out as a table: what separates the fields, and where the table begins."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+from inputdesign_cli.tasks.build.files.dates import is_moment
+
+Rows = list[tuple[int, list[str]]]
+
+COMMENTS = ("#", "%", "//")
+_MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+")
+_LOOKED_AT = 200
+# What may separate fields; None stands for blanks. Of equally good ones the first.
+_SEPARATORS = ("\t", ";", "|", None, ",")
+_UNITS = frozenset(
+    [
+        "s",
+        "sec",
+        "ms",
+        "us",
+        "min",
+        "h",
+        "d",
+        "v",
+        "mv",
+        "kv",
+        "a",
+        "ma",
+        "w",
+        "kw",
+        "hz",
+        "khz",
+        "k",
+        "c",
+        "f",
+        "degc",
+        "degf",
+        "degk",
+        "celsius",
+        "kelvin",
+        "percent",
+        "pct",
+        "pa",
+        "kpa",
+        "mpa",
+        "bar",
+        "mbar",
+        "psi",
+        "m",
+        "mm",
+        "cm",
+        "um",
+        "n",
+        "nm",
+        "kg",
+        "g",
+        "rpm",
+        "rad",
+        "deg",
+        "l",
+        "ml",
+        "sample",
+        "samples",
+    ]
+)
+_SYMBOLS = re.compile(r"[%°/²³^℃℉]")
+
+
+class OpenQuoteError(ValueError):
+    """A quote that is opened in `line` and never closed."""
+
+    def __init__(self, line: int) -> None:
+        super().__init__(f"a quote that opens in line {line} is never closed")
+        self.line = line
+
+
+def separator_of(lines: Sequence[str]) -> str | None:
+    """What stands between the fields: that by which most cells are numbers."""
+    used = [line for line in lines if line.strip() and not line.strip().startswith(COMMENTS)]
+    sample = used[:_LOOKED_AT] + used[_LOOKED_AT:][-_LOOKED_AT:]
+
+    def numbers(mark: str | None) -> int:
+        rows = [line.split(mark) for line in sample]
+        return sum(is_plain(cell, comma=mark != ",") for row in rows if len(row) > 1 for cell in row)
+
+    best = max(_SEPARATORS, key=numbers)
+    return best if numbers(best) else next((m for m in "\t;" if used and m in used[0].strip()), ",")
+
+
+def rows_of(text: str, separator: str | None) -> Rows:
+    """Line numbers and fields of what is neither empty nor a comment.
+
+    Raises:
+        OpenQuoteError: the end of the text, or of a line, stands inside quotes that nothing closes.
+    """
+    if separator is None:
+        found = [(number, line.split()) for number, line in enumerate(text.splitlines(), start=1)]
+    else:
+        found = list(_quoted(text, separator))
+    return [
+        (line, row)
+        for line, row in found
+        if any(map(str.strip, row)) and not row[0].lstrip().startswith(COMMENTS)
+    ]
+
+
+def _quoted(text: str, separator: str) -> Rows:
+    """The rows of text with quotes, which may hold separators and ends of lines."""
+    # Outside quotes this is a row of its own; inside it would be part of the last field.
+    end = "\x00"
+    reader = csv.reader(io.StringIO(f"{text}\n{end}", newline=""), delimiter=separator)
+    lines = text.splitlines(keepends=True)
+    rows, begun = [], 1
+    try:
+        for row in reader:
+            if reader.line_num > begun and not _closed(lines[begun - 1 : reader.line_num], separator):
+                raise OpenQuoteError(begun)
+            rows.append((reader.line_num, row))
+            begun = reader.line_num + 1
+    except csv.Error:  # a field grew beyond all bounds: a quote that nothing closes
+        raise OpenQuoteError(begun) from None
+    if rows.pop()[1] != [end]:
+        raise OpenQuoteError(begun)
+    return rows
+
+
+def _closed(lines: Sequence[str], separator: str) -> bool:
+    """Whether quotes in these lines close where a field ends, as those of a field of several lines do."""
+    try:
+        return sum(1 for _ in csv.reader(lines, delimiter=separator, strict=True)) == 1
+    except csv.Error:
+        return False
+
+
+def table_begins(rows: Rows, separator: str | None) -> int:
+    """The row where the table begins, its names if it has any: loggers write other lines above it."""
+    comma = separator != ","
+    sample = rows[:_LOOKED_AT] + rows[_LOOKED_AT:][-_LOOKED_AT:]
+    widths = Counter(len(row) for _, row in sample if _of_numbers(row, comma))
+    if not widths:
+        return 0
+    width = widths.most_common(1)[0][0]
+    first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and _of_numbers(row, comma))
+    if first < 2:
+        return 0
+    names = [row for _, row in rows[first - 2 : first] if _of_words(row, width, comma)]
+    if not names or not _of_words(rows[first - 1][1], width, comma):
+        return first if any(len(row) != width for _, row in rows[:first]) else 0
+    both = len(names) == 2 and (first == 2 or all(map(_is_unit, names[1])))
+    return first - 2 if both else first - 1
+
+
+def _of_numbers(row: Sequence[str], comma: bool) -> bool:
+    filled = [cell for cell in row if cell.strip()]
+    plain = sum(is_plain(cell, comma=comma) for cell in filled)
+    return plain > 0 and len(filled) <= 2 * plain
+
+
+def _of_words(row: Sequence[str], width: int, comma: bool) -> bool:
+    return len(row) == width and not any(is_plain(cell, comma=comma) for cell in row)
+
+
+def _is_unit(cell: str) -> bool:
+    bare = cell.strip().strip("()[]").lower()
+    return bare in _MISSING or bare in _UNITS or _SYMBOLS.search(bare) is not None
+
+
+def decimal_commas(rows: Rows, separator: str | None) -> bool:
+    """Whether numbers are written 1,5: some cell is, and none has a decimal point."""
+    if separator == ",":
+        return False
+    cells = [cell.strip() for _, row in rows[1 : _LOOKED_AT + 1] for cell in row]
+    numbers = [cell for cell in cells if _COMMA.fullmatch(cell)]
+    return any("," in cell for cell in numbers) and not any(is_number(c) and "." in c for c in cells)
+
+
+def headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, str], list[str], Rows]:
+    """Line and text of the header, the names (none where there are none), and the rows below.
+
+    A row of units below the names joins them: `valve` over `%` is `valve (%)`.
+    """
+    if not rows:
+        return (1, ""), [], []
+    line, first = rows[0]
+    text = (separator or " ").join(first)
+    cells = [" ".join(cell.split()) for cell in first]
+    if any(map(is_number, cells)) and all(is_known(cell) or is_moment(cell) for cell in cells):
+        named = [part.strip() for part in (comment.split(separator) if comment else [])]
+        return (line, text), named if len(named) == len(first) else [], rows
+    units = [cell.strip() for cell in rows[1][1]] if len(rows) > 2 else []
+    wordy = bool(units) and len(units) == len(cells) and not any(is_known(unit) for unit in units if unit)
+    if wordy and any(units) and all(is_known(cell) or is_moment(cell) for cell in rows[2][1]):
+        named = [f"{n} ({u})" if u else n for n, u in zip(cells, units, strict=True)]
+        return (line, text), named, rows[2:]
+    return (line, text), cells, rows[1:]
+
+
+def is_plain(cell: str, *, comma: bool) -> bool:
+    """Whether a cell is a number, with a decimal comma where that may be, or a date."""
+    text = cell.strip()
+    return is_number(text) or (comma and _COMMA.fullmatch(text) is not None) or is_moment(text)
+
+
+def is_known(text: str) -> bool:
+    """Whether a cell is a number, or says that there is none."""
+    return is_number(text) or is_missing(text)
+
+
+def is_missing(text: str) -> bool:
+    """Whether a cell says that there is no number."""
+    return text.strip().lower() in _MISSING
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a finite number."""
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
