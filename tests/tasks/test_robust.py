@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from inputdesign_cli import load_spec, parse_spec, solve
 from inputdesign_cli.design.convex.designs import solve_design
@@ -189,3 +190,15 @@ def test_what_is_said_is_said_under_the_prior():
     assert any("9 plants drawn from its covariance" in sentence for sentence in question.sentences)
     assert "true plant" in assumptions(question, found.result)[0]
     assert sum("Campi" in source for source in citations(question, found.result)) == 2
+
+
+def test_limits_on_powers_bind_the_record_at_every_plant():
+    """The output answers most at the slower plant; records of several seeds, of the power of the design."""
+    asked = ("limits={output_power: 5}", "objective=best_accuracy", "uncertainty={scenarios: [{f1: -0.9}]}")
+    found = []
+    for seed in range(4):
+        u = solve(parse_spec(FIRST, overrides=[*asked, f"signal.seed={seed}"])).tables["signal"].columns["u1"]
+        found.append([np.mean(lfilter([0, 3.6], [1, pole], u) ** 2) for pole in (-0.7, -0.9)])
+    assert max(found)[0] < 4.0
+    assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
+    assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
