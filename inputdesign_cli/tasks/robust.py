@@ -19,6 +19,7 @@ from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
+from inputdesign_cli.tasks.region import Region
 
 CONFIDENCE = 0.999
 """Of the statements on plants that were not drawn."""
@@ -47,6 +48,32 @@ class Batch:
 
 
 @dataclass(frozen=True)
+class Kept:
+    """How near a plant comes to missing what is asked: ratio over what is admitted, and where.
+
+    `cost` is that of the design at the plant, where that is looked at.
+    """
+
+    share: float
+    frequency: float | None = None
+    cost: float = 0.0
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The worst plant that was found in a region, at `theta` (k,), and what it keeps.
+
+    `tried` plants were looked at in the last search; `added` were found before and are served by the design.
+    """
+
+    region: str
+    theta: Array
+    kept: Kept
+    tried: int
+    added: int
+
+
+@dataclass(frozen=True)
 class Plants:
     """The scenarios of a design.
 
@@ -59,6 +86,7 @@ class Plants:
         discard: how many of the plants the design may leave out.
         afresh: draws others from the same distribution; None where the plants were listed one by one.
         unknowns: of the program, None where they have no number.
+        region: where the design is to serve the worst plant that is found, too; `searched` what was found.
     """
 
     batch: Batch
@@ -69,18 +97,8 @@ class Plants:
     discard: int = 0
     afresh: Callable[[], Batch] | None = None
     unknowns: int | None = None
-
-
-@dataclass(frozen=True)
-class Kept:
-    """How near a plant comes to missing what is asked: ratio over what is admitted, and where.
-
-    `cost` is that of the design at the plant, where that is looked at.
-    """
-
-    share: float
-    frequency: float | None = None
-    cost: float = 0.0
+    region: Region | None = None
+    searched: Searched | None = None
 
 
 def without_dearest(question: Question, design: Design, discard: int) -> list[int]:
@@ -120,6 +138,13 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
             if share > worst[number].share:
                 worst[number] = Kept(share, violation.frequency)
     return worst
+
+
+def delivered_samples(design: Design) -> int:
+    """Of the experiment: a whole number where the shortest one is sought."""
+    if design.problem.goal != "samples":
+        return design.problem.experiment.samples
+    return max(int(np.ceil(design.result.s * (1 - 1e-9))), 1)
 
 
 def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.float64]:

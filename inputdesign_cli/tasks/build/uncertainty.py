@@ -21,10 +21,11 @@ from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertaint
 from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.build.demand import check_effects
 from inputdesign_cli.tasks.build.integrators import on_finite_information
-from inputdesign_cli.tasks.build.parameter_draws import Draw, drawing
+from inputdesign_cli.tasks.build.parameter_draws import Draw, drawing, reach
 from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked
 from inputdesign_cli.tasks.build.system import build_loop
+from inputdesign_cli.tasks.region import Region
 from inputdesign_cli.tasks.robust import CONFIDENCE, Batch, Plants
 
 _KEY = "uncertainty"
@@ -73,6 +74,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         discard=int(stated.discard * number),
         afresh=afresh if stated.fresh else None,
         unknowns=None if basis.free else _unknowns(spec, basis),
+        region=None if stated.worst_case is None else scenario.region(stated.worst_case),
     )
 
 
@@ -255,6 +257,18 @@ class _Scenarios:
                 ) from error
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
+
+    def region(self, confidence: float) -> Region:
+        """All plants that the draws are from, up to this confidence."""
+        name, centre, columns, box = reach(self.spec, self.stated, self.experiment, confidence)
+
+        def at(theta: Array) -> Alternative | None:
+            try:
+                return self.at(theta, self._radius)
+            except _NoPlantError:
+                return None
+
+        return Region(name, centre, columns, box, at)
 
     def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
         """So many plants, drawn again where they are unstable, or no plants.

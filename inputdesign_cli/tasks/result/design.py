@@ -21,6 +21,7 @@ from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
+from inputdesign_cli.tasks.robust import Plants
 
 # A limit binds when the design uses all but this share of it.
 _ROUNDING = 1e-9
@@ -39,7 +40,7 @@ _KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "acc
 class Designed:
     """A design with what it answers and the experiment of the delivered length.
 
-    `kept` are the numbers of the drawn plants that the design is for, without those that it leaves out.
+    `kept` are the numbers of the `plants` that the design is for, without those that it leaves out.
     """
 
     header: Header
@@ -49,6 +50,7 @@ class Designed:
     cost: dict[PowerKind, Weight]
     confidence: Confidence
     kept: Sequence[int] = ()
+    plants: Plants | None = None
 
     @property
     def units(self) -> Units:

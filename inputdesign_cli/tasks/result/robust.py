@@ -15,7 +15,7 @@ from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed, costs_of
 from inputdesign_cli.tasks.result.fan import fan_curves
-from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, kept_by, tried_on
+from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, Searched, kept_by, tried_on
 
 # A plant binds when it keeps all but this share of what is admitted.
 _BINDS = 1e-5
@@ -58,6 +58,8 @@ def robust_result(done: Designed, plants: Plants) -> RobustResult:
         costs = costs_of(done, found.basis, found.x)
         dearest = int(np.argmax(costs))
         entry["dearest"] = {"scenario": numbers[dearest], "cost": costs[dearest]}
+    if plants.searched is not None:
+        entry["searched"] = _searched(units, plants, plants.searched)
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
     if plants.afresh is not None and done.design.result.x.any():
@@ -86,10 +88,22 @@ def _active(units: Units, plants: Plants, number: int, kept: Kept) -> dict[str, 
     return item
 
 
+def _searched(units: Units, plants: Plants, found: Searched) -> dict[str, Json]:
+    """The worst plant that was found, which is no proof that there is no worse one."""
+    entry: dict[str, Json] = {"proved": False, "region": found.region, "share": found.kept.share}
+    if found.kept.frequency is not None:
+        entry["frequency"] = found.kept.frequency / units.frequency
+    entry["parameters"] = dict(zip(plants.names, found.theta.tolist(), strict=True))
+    return entry | {"added": found.added, "tried": found.tried}
+
+
 def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
-    """Shares of plants that may be missed; after discarding the theory is silent, and fresh draws count."""
+    """Shares of plants that may be missed.
+
+    Where some were left out, or sought, the theory is silent, and fresh draws count.
+    """
     drawn = len(plants.batch.plants)
-    if kept < drawn:
+    if kept < drawn or (plants.searched is not None and plants.searched.added):
         return {}
     beta = 1.0 - CONFIDENCE
     risk: dict[str, Json] = {"confidence": CONFIDENCE, "after": risk_after(drawn, beta, support)}
