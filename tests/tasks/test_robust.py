@@ -141,6 +141,14 @@ def test_the_flexible_transmission_is_missed_by_the_wrong_bound():
     oracle = build_convex(load_spec(path, true)).question
     assert solve_design(oracle, tolerance=1e-7).result.objective == pytest.approx(7.7804, abs=1e-3)
     design = solve_design(nominal.question, tolerance=1e-7)
+    # What it costs on the true plant: by numpy sums alone, with a plain program for the design, 12.444049.
+    spectrum, true_plant = design.result, oracle.experiment
+    cost = sum(
+        spectrum.basis.integrals(lambda w, k=k: true_plant.power_density(k, w), true_plant.singularities)
+        @ spectrum.x
+        for k in ("input", "output")
+    )
+    assert cost == pytest.approx(12.444049, rel=1e-5)
     own = Alternative(oracle.experiment, oracle.requirements)
     estimated = replace(own, requirements=nominal.question.requirements)
     by_own, by_estimate = tried_on(design, 500, Batch(np.zeros((2, 6)), (own, estimated), 2))
