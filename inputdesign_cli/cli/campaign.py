@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -22,13 +22,9 @@ from inputdesign_cli.cli.options import (
     SpecFile,
 )
 from inputdesign_cli.cli.reading import name_of, read_spec
+from inputdesign_cli.cli.run import Place, keep, renew
 from inputdesign_cli.cli.terminal import status as told
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from inputdesign_cli.runs.results import Results
 
 CampaignDirectory = Annotated[
     Path, typer.Argument(metavar="DIR", help="The directory that idesign campaign wrote.")
@@ -52,14 +48,15 @@ def campaign(
     estimates the model, plans the next part with all data so far, and stops as soon as they meet the target.
     The directory remembers every plan, record and decision.
     """
-    directory = output or Path("runs") / name_of(spec)
+    place = Place(output, name_of(spec), [spec], overwrite)
     with told(f"{spec}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.campaign.rounds import begun
 
         stated = read_spec(spec, overrides, confine)
-        results = begun(partial(tasks.next_round, stated), stated.resolve_path("."), directory)
-    _keep(results, directory, [spec], overwrite, figures=figures, json_output=json_output, quiet=quiet)
+        place = place.checked(stated)
+        results = begun(partial(tasks.next_round, stated), stated.resolve_path("."), place.directory)
+    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def proceed(
@@ -116,7 +113,7 @@ def proceed(
                 )
                 part = tasks.recorded_part(stated, data, taken)
                 results = advanced(decide, memory, data, part, unlike=as_applied)
-        _keep(results, directory, None, False, figures=figures, json_output=json_output, quiet=quiet)
+        renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
     code = _EXIT[results.result["status"]]
     if code:
         raise typer.Exit(code)
@@ -135,24 +132,3 @@ def status(directory: CampaignDirectory, json_output: Json = False) -> None:
     from inputdesign_cli.runs.record import load_result
 
     typer.echo(summary(load_result(directory), memory.time_unit, []))
-
-
-def _keep(
-    results: Results,
-    directory: Path,
-    sources: Sequence[Path] | None,
-    overwrite: bool,
-    *,
-    figures: bool,
-    json_output: bool,
-    quiet: bool,
-) -> None:
-    """Write the directory and print the decision; a campaign that goes on is not a run of another spec."""
-    from inputdesign_cli.cli.run import show
-    from inputdesign_cli.figures.plots import draw_all
-    from inputdesign_cli.runs.run_directory import write_run
-
-    with told(f"{directory}: writing ...", quiet=quiet):
-        drawn = draw_all(results) if figures else {}
-        files = write_run(results, directory, drawn, sources=sources, overwrite=overwrite)
-    show(results, files, json_output=json_output, quiet=quiet)

@@ -75,18 +75,22 @@ def identify(
     model.yaml, the estimate as blocks to paste into a spec, with figures of the fit, the residuals and the
     model error; prints a summary. In closed loop the direct method is used, from u and y alone.
     """
+    place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
+        from inputdesign_cli.runs.origin import check_counted_once
 
+        stated = read_spec(spec, overrides, confine, design=False)
+        place = place.checked(stated)
+        check_counted_once(spec, data)
         results = tasks.identify(
-            read_spec(spec, overrides, confine, design=False),
+            stated,
             data,
             remove_means=remove_means,
             operating_point=levels(operating_point),
             preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
             frequency_response=frequency_response,
         )
-    place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
@@ -118,17 +122,21 @@ def assess(
     that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where tests of
     the residuals refute the model structure; the note says what to change.
     """
+    place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output)
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
+        from inputdesign_cli.runs.origin import check_counted_once
 
+        stated = read_spec(spec, overrides, confine)
+        place = place.checked(stated)
+        check_counted_once(spec, data)
         assessment = tasks.assess(
-            read_spec(spec, overrides, confine),
+            stated,
             data,
             remove_means=remove_means,
             operating_point=levels(operating_point),
             preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
         )
-    place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output)
     keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
     if assessment.verdict != "met":
         raise typer.Exit({"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}[assessment.verdict])

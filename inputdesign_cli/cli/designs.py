@@ -59,11 +59,11 @@ def solve(
     if fast:
         overrides = [*(overrides or []), "solver.any_spectrum=false"]
     if not keep_partial:
-        results = _results("solve", spec, overrides, confine, quiet)
+        results, place = _results("solve", place, overrides, confine, quiet)
         keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
         return
     with stoppable() as stop, ending_early(stop) as came:
-        results = _results("solve", spec, overrides, confine, quiet)
+        results, place = _results("solve", place, overrides, confine, quiet)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
     if came:
         raise typer.Exit(128 + came[0])
@@ -85,8 +85,8 @@ def analyse(
     Nothing is optimised: the excitation stands in the spec under `spectrum.given`. Writes a run
     directory and prints a summary.
     """
-    results = _results("analyse", spec, overrides, confine, quiet)
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    results, place = _results("analyse", place, overrides, confine, quiet)
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
@@ -110,22 +110,26 @@ def simulate(
     noise, and adds to the run directory of `solve` what the models did; prints a summary.
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
-    results = _results(
-        "simulate", spec, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
-    )
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    results, place = _results(
+        "simulate", place, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
+    )
     keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
 
 
 def _results(
     verb: Verb,
-    file: Path,
+    place: Place,
     overrides: list[str] | None,
     confine: Path | None,
     quiet: bool,
     executor: Executor | None = None,
-) -> Results:
-    """What a verb makes of a spec file; the numerical libraries are imported behind the message."""
+) -> tuple[Results, Place]:
+    """What a verb makes of a spec file for its place, which is looked at before.
+
+    The numerical libraries are imported behind the message.
+    """
+    file = place.sources[0]
     with status(f"{file}: computing ...", quiet=quiet) as show:
         from inputdesign_cli.compute.watching import watching
         from inputdesign_cli.sweep.verbs import run_verb
@@ -136,5 +140,7 @@ def _results(
             if time.monotonic() - started > _PATIENCE:
                 show(f"{file}: {done} ...")
 
+        spec = read_spec(file, overrides, confine)
+        place = place.checked(spec)
         with watching(told):
-            return run_verb(verb, read_spec(file, overrides, confine), executor)
+            return run_verb(verb, spec, executor), place

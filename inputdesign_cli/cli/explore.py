@@ -56,15 +56,16 @@ def explore(
     judged on the other. Writes model.yaml, a commented spec.yaml for `idesign solve`, figures and
     report.html; prints a summary. Exits with 1, and says why, where no model deserves trust.
     """
+    ending = "explored" if validate is None else "validated"
+    sources = [*([validate] if validate is not None else []), *data]
+    place = Place(output, f"{data[0].stem}_{ending}", sources, overwrite, no_output)
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
 
         prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span)
         model = None if validate is None else read_spec(validate, None, None, design=False)
+        place = place.checked(model)
         found = tasks.explore(data, prepared, model=model)
-    ending = "explored" if validate is None else "validated"
-    sources = [*([validate] if validate is not None else []), *data]
-    place = Place(output, f"{data[0].stem}_{ending}", sources, overwrite, no_output)
     keep(found.results, place, figures=figures, json_output=json_output, quiet=quiet)
     if not no_output and validate is None:
         from inputdesign_cli.report.render import report_text

@@ -13,7 +13,9 @@ from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
+    from inputdesign_cli.runs.origin import Origin
     from inputdesign_cli.runs.results import Results
+    from inputdesign_cli.specification import Spec
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class Place:
     sources: Sequence[Path]
     overwrite: bool = False
     nowhere: bool = False  # nothing is written
+    asked: str = ""  # the spec as it was read
 
     def __post_init__(self) -> None:
         if self.nowhere and self.output is not None:
@@ -34,6 +37,52 @@ class Place:
     def directory(self) -> Path:
         """The run directory."""
         return self.output or Path("runs") / self.name
+
+    @property
+    def origin(self) -> Origin:
+        """What the run is made from."""
+        from inputdesign_cli.runs.origin import Origin
+
+        return Origin(self.sources, self.asked, self.overwrite)
+
+    def checked(self, spec: Spec | None) -> Place:
+        """The same for the run of a spec that was read; to be asked for before anything is computed.
+
+        Raises:
+            OutputError: the directory cannot take the run, see `check_place`, and `output-is-the-spec`.
+        """
+        place = self if spec is None else replace(self, asked=spec.to_yaml())
+        if not place.nowhere:
+            from inputdesign_cli.runs.origin import check_place
+
+            check_place(place.directory, place.origin, place.spared(place.asked))
+        return place
+
+    def spared(self, spec: str) -> str:
+        """The `spec.yaml` of the run: the user's own text where the spec is that of the directory itself.
+
+        Args:
+            spec: what it would be otherwise.
+
+        Raises:
+            OutputError: `output-is-the-spec`, it would say something else.
+        """
+        from inputdesign_cli.runs.record import SPEC
+        from inputdesign_cli.specification import same_content
+        from inputdesign_cli.specification.yaml.files import read_text
+
+        target = self.directory / SPEC
+        named = self.sources[0]
+        if not (target.exists() and named.exists() and target.samefile(named)):
+            return spec
+        text = read_text(target)
+        if not same_content(text, spec):
+            message = (
+                f"{target} is the spec itself, and what it includes or --set changes would be written into it"
+            )
+            hint = "choose another directory with -o, or write the changes into the file"
+            raise OutputError.because("output-is-the-spec", message, hint)
+        return text
 
 
 def keep(results: Results, place: Place, *, figures: bool, json_output: bool, quiet: bool) -> None:
@@ -45,22 +94,49 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
     if place.nowhere:
         show(results, [], json_output=json_output, quiet=quiet)
         return
-    directory = place.directory
+    results = replace(results, resolved_spec=place.spared(results.resolved_spec))
+    renew(results, place.directory, place.origin, figures=figures, json_output=json_output, quiet=quiet)
+
+
+def renew(
+    results: Results,
+    directory: Path,
+    origin: Origin | None = None,
+    *,
+    figures: bool,
+    json_output: bool,
+    quiet: bool,
+) -> None:
+    """Write a run directory, and print its result or its summary.
+
+    Args:
+        origin: what the run is made from; None for one that goes on with what is in the directory.
+
+    Raises:
+        OutputError: as `write_run`.
+    """
     with status(f"{directory}: writing ...", quiet=quiet):
+        from inputdesign_cli.runs.origin import has_other_values
         from inputdesign_cli.runs.run_directory import write_run
 
-        results = _spare_the_spec(results, place)
         drawings = {}
         if figures:
             from inputdesign_cli.figures.plots import draw_all
 
             drawings = draw_all(results)
-        files = write_run(results, directory, drawings, sources=place.sources, overwrite=place.overwrite)
-    show(results, files, json_output=json_output, quiet=quiet)
+        replaced = has_other_values(directory, results.resolved_spec)
+        files = write_run(results, directory, drawings, origin=origin)
+    show(results, files, replaced=replaced, json_output=json_output, quiet=quiet)
 
 
-def show(results: Results, files: Sequence[Path], *, json_output: bool, quiet: bool) -> None:
-    """Print the result as it was written, if it was, or its summary."""
+def show(
+    results: Results, files: Sequence[Path], *, replaced: bool = False, json_output: bool, quiet: bool
+) -> None:
+    """Print the result as it was written, if it was, or its summary.
+
+    Args:
+        replaced: whether a run with other values stood there before.
+    """
     if json_output and files:
         typer.echo(files[-1].read_text(encoding="utf-8"), nl=False)
     elif json_output:
@@ -71,24 +147,4 @@ def show(results: Results, files: Sequence[Path], *, json_output: bool, quiet: b
     elif not quiet:
         from inputdesign_cli.cli.summary import summary
 
-        typer.echo(summary(results.result, results.time_unit, files))
-
-
-def _spare_the_spec(results: Results, place: Place) -> Results:
-    """The results with the user's own text where the spec is the spec.yaml of the run itself."""
-    from inputdesign_cli.runs.record import SPEC
-    from inputdesign_cli.specification import same_content
-    from inputdesign_cli.specification.yaml.files import read_text
-
-    target = place.directory / SPEC
-    spec = place.sources[0]
-    if not (target.exists() and spec.exists() and target.samefile(spec)):
-        return results
-    text = read_text(target)
-    if not same_content(text, results.resolved_spec):
-        message = (
-            f"{target} is the spec itself, and what it includes or --set changes would be written into it"
-        )
-        hint = "choose another directory with -o, or write the changes into the file"
-        raise OutputError.because("output-is-the-spec", message, hint)
-    return replace(results, resolved_spec=text)
+        typer.echo(summary(results.result, results.time_unit, files, replaced=replaced))

@@ -23,10 +23,13 @@ _NONE = Rows((), ())
 Line = tuple[str, str]
 
 
-def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
+def summary(result: Result, time_unit: str, files: Sequence[Path], *, replaced: bool = False) -> str:
     """What was asked, what it costs, what is proved, how close the error comes, and where the files are.
 
     Lines whose numbers the result does not have are left out.
+
+    Args:
+        replaced: whether a run with other values stood there before.
     """
     lines = [
         *campaign_facts(result),
@@ -37,6 +40,7 @@ def summary(result: Result, time_unit: str, files: Sequence[Path]) -> str:
         *_simulated(result),
         *(("note", text) for text in result.get("notes", [])),
         *(("files", f"{files[-1].parent}: {', '.join(file.name for file in files)}") for _ in files[:1]),
+        *([("replaced", "a run of the same files with other values in the spec")] if replaced else []),
     ]
     title = result.get("title")
     return "\n".join([*([title, ""] if title else []), *aligned(lines, gap=3, wrap=True)])

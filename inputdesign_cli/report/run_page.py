@@ -35,7 +35,9 @@ _SECTIONS = (
 )
 _OF_DATA = ("data_fit", "fit", "data_residuals", "residuals", "data_bound", "frequency_response")
 _OF_RUNS = ("errors_", "cloud_", "disturbance_")
-_NOT_NUMBERS = frozenset({"format", "title", "files", "environment", "spec_sha256", "made_from"})
+_NOT_NUMBERS = frozenset(
+    {"format", "title", "files", "environment", "spec_sha256", "asked_sha256", "made_from"}
+)
 _MOST_ENTRIES = 16
 # What these fields of a result are, where it has them: somebody else may have written it.
 _FIELDS = {

@@ -1,7 +1,8 @@
 """What a run was made from, so that it is not lost to a run of something else that has the same name.
 
 `made_from` in `result.json` names the spec and the data as they are seen from the run directory: a project
-that is moved as a whole keeps its runs.
+that is moved as a whole keeps its runs. `asked_sha256` is the digest of the spec as it was read, where the
+`spec.yaml` of the run is another one.
 """
 
 from __future__ import annotations
@@ -9,26 +10,141 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
+from filecmp import cmp
 from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_INPUT, DataError, OutputError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.record import SPEC, load_result
+from inputdesign_cli.runs.record import RESULT, SPEC, load_result, owned_files
+from inputdesign_cli.runs.results import Json
 
 
-def made_from(files: Sequence[Path], target: Path) -> list[str]:
-    """The paths of a spec (`-` if it came from standard input) and of data relative to `target`."""
-    return [
-        STANDARD_INPUT if str(file) == STANDARD_INPUT else os.path.relpath(os.path.realpath(file), target)
-        for file in files
-    ]
+@dataclass(frozen=True)
+class Origin:
+    """What a run is made from: files, the spec first, and the spec as it was read, with overrides.
+
+    `overwrite` is whether the run of something else may be replaced.
+    """
+
+    files: Sequence[Path]
+    asked: str = ""
+    overwrite: bool = False
+
+    def seen_from(self, target: Path) -> list[str]:
+        """The paths of a spec (`-` if it came from standard input) and of data relative to `target`."""
+        return [
+            STANDARD_INPUT if str(file) == STANDARD_INPUT else os.path.relpath(os.path.realpath(file), target)
+            for file in self.files
+        ]
+
+    def entry(self, target: Path, written: str) -> dict[str, Json]:
+        """What `result.json` says of it.
+
+        Args:
+            written: the `spec.yaml` of the run.
+        """
+        asked = {"asked_sha256": digest(self.asked)} if self.asked and self.asked != written else {}
+        return {"made_from": self.seen_from(target), **asked}
 
 
-def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -> None:
+def digest(text: str) -> str:
+    """The SHA-256 of a text as it is written to a file."""
+    return hashlib.sha256(text.encode(errors="backslashreplace")).hexdigest()
+
+
+def check_directory(directory: Path) -> Path:
+    """The directory of a run with links followed; there may be none yet.
+
+    Raises:
+        OutputError: `output-not-a-directory`.
+    """
+    target = Path(os.path.realpath(directory))
+    if target.exists() and not target.is_dir():
+        message = f"{directory} is a file, and a run is written into a directory"
+        raise OutputError.because("output-not-a-directory", message, hint="choose another directory with -o")
+    return target
+
+
+def check_place(directory: Path, origin: Origin, spec: str) -> None:
+    """Refuse a directory that could not take a run, before the run is computed.
+
+    What may change in the meantime is looked at again when the run is written.
+
+    Args:
+        spec: the `spec.yaml` of the run, as far as it is known beforehand.
+
+    Raises:
+        OutputError: `output-not-a-directory`, `output-not-writable`, `output-not-a-run`; as `check_origin`.
+    """
+    target = check_directory(directory)
+    there = next(parent for parent in (target, *target.parents) if parent.exists())
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        why = "it may not be written to" if there.is_dir() else "it is a file"
+        raise OutputError.because(
+            "output-not-writable",
+            f"{directory} cannot be written: {there}: {why}",
+            hint="choose another place, or change the permissions",
+        )
+    owned = owned_files(target)
+    certain = [name for name in (SPEC, RESULT) if name not in owned and os.path.lexists(target / name)]
+    foreign = [name for name in certain if name == RESULT or not _holds(target / name, spec)]
+    if foreign:
+        raise not_a_run(foreign, directory)
+    if not origin.overwrite:
+        check_origin(origin, spec, target, shown=directory)
+
+
+def has_other_values(directory: Path, spec: str) -> bool:
+    """Whether a run stands there whose `spec.yaml` is another one."""
+    try:
+        return load_result(directory).get("spec_sha256") not in (None, digest(spec))
+    except DataError:
+        return False
+
+
+def check_counted_once(spec: Path, data: Sequence[Path]) -> None:
+    """No file is given whose information the spec of a top-up has as its prior.
+
+    Raises:
+        DataError: `data-repeated`.
+    """
+    try:
+        result = load_result(spec.parent) if spec.name == SPEC else {}
+    except DataError:
+        return
+    assessment, counted = result.get("assessment"), result.get("made_from")
+    if not (isinstance(assessment, dict) and "top_up_status" in assessment and isinstance(counted, list)):
+        return
+    before = [spec.parent / str(name) for name in counted[1:]]
+    for file in data:
+        if any(one.is_file() and file.is_file() and cmp(one, file, shallow=False) for one in before):
+            raise DataError.because(
+                "data-repeated",
+                f"{file} counts as experiment.prior of {spec} already, and would count twice",
+                "give only the records since then, or all of them with the spec that was assessed first",
+            )
+
+
+def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
+    """The error about files of the user's that would be written over."""
+    message = f"{directory} already has {', '.join(foreign)}, written by something other than an earlier run"
+    hint = "choose another directory with -o, or move these files away"
+    return OutputError.because("output-not-a-run", message, hint)
+
+
+def _holds(path: Path, text: str) -> bool:
+    try:
+        return read_regular(path) == text.encode(errors="backslashreplace")
+    except OSError:
+        return False
+
+
+def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> None:
     """Refuse to replace the run in `target` unless it was made from the same files, or from the same spec.
 
     Args:
-        ours: what the new run was made from.
+        origin: what the new run is made from.
         spec: its `spec.yaml`.
         target: the directory of the run.
         shown: how the user calls it.
@@ -56,8 +172,10 @@ def check_origin(ours: Sequence[str], spec: str, target: Path, *, shown: Path) -
         message = f"{shown / SPEC} has been changed since its run was written, and would be lost"
         hint = "solve that file, choose another directory with -o, or give up the changes with --overwrite"
         raise OutputError.because("output-spec-changed", message, hint)
-    theirs = result.get("made_from")
+    ours, theirs = origin.seen_from(target), result.get("made_from")
     known = theirs if isinstance(theirs, list) else []
+    if known[:1] != [SPEC] and origin.asked:  # or else spec.yaml is the user's own text
+        same |= digest(origin.asked) == result.get("asked_sha256", result.get("spec_sha256"))
     same_file = ours[:1] == known[:1] and ours[:1] not in ([], [STANDARD_INPUT])
     if known[1:] != ours[1:] or not (same or same_file or ours[:1] == [SPEC]):
         of = f" of {', '.join(map(str, known))} (as seen from there)" if known else " of something else"

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import errno
 import filecmp
-import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 
 from inputdesign_cli.errors import DataError, OutputError
-from inputdesign_cli.runs.origin import check_origin, made_from
+from inputdesign_cli.runs.origin import Origin, check_directory, check_origin, digest, not_a_run
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.record import RESULT, SPEC, load_result, owned_files
 from inputdesign_cli.runs.replacing import heal, put_in_place, sync, workplace
@@ -37,9 +36,7 @@ def finished_result(results: Results) -> dict[str, Json]:
     if not result.get("environment"):
         result["environment"] = environment()
     if not result.get("spec_sha256"):
-        result["spec_sha256"] = hashlib.sha256(
-            results.resolved_spec.encode(errors="backslashreplace")
-        ).hexdigest()
+        result["spec_sha256"] = digest(results.resolved_spec)
     return result
 
 
@@ -48,8 +45,7 @@ def write_run(
     directory: Path,
     figures: Mapping[str, bytes] = MappingProxyType({}),
     *,
-    sources: Sequence[Path] | None = None,
-    overwrite: bool = False,
+    origin: Origin | None = None,
 ) -> list[Path]:
     """Write a run directory and return the paths of its files, `result.json` last.
 
@@ -62,8 +58,7 @@ def write_run(
         results: what a verb of the package returned.
         directory: where to write it.
         figures: file name ("bound.png") -> content, as `figures.plots.draw_all` draws them.
-        sources: the spec and the data that the run was made from; a run of others is then not replaced.
-        overwrite: replace it all the same.
+        origin: what the run was made from; a run of something else is then not replaced.
 
     Raises:
         OutputError: `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a
@@ -71,18 +66,14 @@ def write_run(
             `output-busy`.
     """
     result = finished_result(results)
-    target = Path(os.path.realpath(directory))
     with output_errors(directory):
-        if target.exists() and not target.is_dir():
-            message = f"{directory} is a file, and a run is written into a directory"
-            hint = "choose another directory with -o"
-            raise OutputError.because("output-not-a-directory", message, hint)
+        target = check_directory(directory)
         target.parent.mkdir(parents=True, exist_ok=True)
-        if sources is not None:
-            result["made_from"] = made_from(sources, target)
+        if origin is not None:
+            result |= origin.entry(target, results.resolved_spec)
         with workplace(target) as work:
-            if sources is not None and not overwrite:
-                check_origin(result["made_from"], results.resolved_spec, target, shown=directory)
+            if origin is not None and not origin.overwrite:
+                check_origin(origin, results.resolved_spec, target, shown=directory)
             names = _write_files(results, result, work / "new", figures)
             if work.parent == target:
                 owned = owned_files(target)
@@ -189,9 +180,7 @@ def _keep_foreign(names: list[str], owned: list[str], work: Path, target: Path, 
         and (not (target / name).is_file() or differs(name))
     ]
     if foreign:
-        message = f"{shown} already has {', '.join(foreign)}, written by something other than an earlier run"
-        hint = "choose another directory with -o, or move these files away"
-        raise OutputError.because("output-not-a-run", message, hint)
+        raise not_a_run(foreign, shown)
 
 
 @contextmanager

@@ -45,12 +45,18 @@ class Record:
 
 
 def best_record(
-    generator: SignalGenerator, plant: FiniteRecord, target: Target, bounds: Bounds | None = None
+    generator: SignalGenerator,
+    plant: FiniteRecord,
+    target: Target,
+    bounds: Bounds | None = None,
+    *,
+    first: bool = False,
 ) -> Record:
     """The best of several records of a designed spectrum, each from its own stream of the seed.
 
     Args:
         plant: for records of the length of the generator's.
+        first: whether the first that meets the target is enough.
 
     Raises:
         OutOfTimeError: the time limit passed before the first was made.
@@ -60,7 +66,7 @@ def best_record(
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
     best = candidates.record(_stream(settings.seed, 0))
     for number in range(1, max(settings.candidates, settings.most_candidates)):
-        if number >= settings.candidates and candidates.suffices(best):
+        if (first and best.met) or (number >= settings.candidates and candidates.suffices(best)):
             break
         try:
             other = candidates.record(_stream(settings.seed, number))

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inputdesign_cli.errors import bad_spec
+from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.transfer_of_states import Entry, transfer_functions
 from inputdesign_cli.specification.yaml.plain import Plain
 
 if TYPE_CHECKING:
     import control
 
 Place = tuple[str, int, int]
-_CANCELS = 1e-7
 
 
 def from_control(
@@ -42,7 +43,8 @@ def from_control(
 
     Raises:
         SpecError: `not-supported` for another kind of object; `not-sampled` for one in discrete time that
-            does not say its dt; what is wrong with the spec.
+            does not say its dt; `bad-argument` for an argument that does not go with the system;
+            `improper-transfer`, `inaccurate-conversion`; what is wrong with the spec.
     """
     import control
 
@@ -54,47 +56,103 @@ def from_control(
     if discrete and system.dt is True:
         message = "the system is in discrete time and does not say its sampling time"
         raise bad_spec("not-sampled", message, hint="give it one: tf(num, den, 0.1)", key="sample_time")
-    data: dict[str, Plain] = {"sample_time": float(system.dt)} if discrete else {}
-    if not discrete and sample_time is not None:
-        data["sample_time"] = float(sample_time)
-    if parameters is not None and isinstance(system, control.StateSpace):
+    _check_arguments(discrete, sample_time, delay, known, blocks)
+    if parameters is None:
+        plant = _transfer(_entries(system), discrete=discrete)
+    elif isinstance(system, control.StateSpace):
         plant = _states(system, parameters, discrete=discrete)
     else:
-        plant = _transfer(system, discrete=discrete)
+        hint = "leave it out: its coefficients are the parameters; or give it as control.ss(..)"
+        raise _bad_argument("parameters", "names entries of a system in state space", hint)
     if delay is not None:
-        if discrete:
-            message = "a delay of a system in discrete time is among its own delays"
-            raise bad_spec("unsuitable-key", message, hint="multiply it by z^-d", key="plant")
-        inside = plant["state_space" if parameters is not None else "continuous"]
-        inside["delay"] = np.asarray(delay, dtype=float).tolist()
+        plant["continuous" if parameters is None else "state_space"]["delay"] = delay
     if not discrete and sample_time is not None:
         plant["sample"] = "zoh"
-    if known:
+    if len(known):
         plant["known"] = list(known)
-    data |= {"plant": plant, "noise": dict(noise or {"variance": 1.0}), **blocks}
-    return Spec.from_dict(data, design="accuracy" in blocks)
+    time = system.dt if discrete else sample_time
+    data = {"plant": plant, "noise": {"variance": 1.0} if noise is None else noise, **blocks}
+    return Spec.from_dict(
+        data if time is None else {"sample_time": time, **data}, design="accuracy" in blocks
+    )
+
+
+def _bad_argument(name: str, message: str, hint: str) -> SpecError:
+    return bad_spec("bad-argument", f"{name} {message}", hint=hint, key=name)
+
+
+def _check_arguments(
+    discrete: bool, sample_time: object, delay: object, known: object, blocks: Mapping[str, Plain]
+) -> None:
+    """Raise `SpecError` where an argument would be ignored, or does not go with the others."""
+    if discrete and sample_time is not None:
+        hint = "leave it out, or resample the system"
+        raise _bad_argument("sample_time", "is of a system in continuous time; this one has its dt", hint)
+    if discrete and delay is not None:
+        message = "is of a system in continuous time; in discrete time it is among the poles"
+        raise _bad_argument("delay", message, "multiply the system by z^-d")
+    if isinstance(known, str) or not isinstance(known, Sequence):
+        raise _bad_argument("known", "must be a list of names of parameters", "write known=['b0']")
+    if "plant" in blocks:
+        raise _bad_argument("plant", "is the system itself", "leave it out, or use Spec.from_dict")
 
 
 def _states(
     system: control.StateSpace, parameters: Mapping[str, Place], *, discrete: bool
 ) -> dict[str, Plain]:
-    matrices = {
-        "A": system.A.tolist(),
-        "B": system.B.tolist(),
-        "C": system.C.tolist(),
-        "D": system.D.tolist(),
-    }
-    values = {}
-    for name, (letter, i, j) in parameters.items():
-        values[name], matrices[letter][i][j] = matrices[letter][i][j], name
+    arrays = {"A": system.A, "B": system.B, "C": system.C, "D": system.D}
+    if not isinstance(parameters, Mapping):
+        raise _bad_parameter("must be a mapping of names to entries")
+    matrices: dict[str, Plain] = {letter: array.tolist() for letter, array in arrays.items()}
+    values: dict[str, Plain] = {}
+    taken: dict[tuple[str, int, int], str] = {}
+    for name, place in parameters.items():
+        letter, i, j = _place(name, place, {letter: array.shape for letter, array in arrays.items()})
+        other = taken.setdefault((letter, i, j), str(name))
+        if other != name:
+            raise _bad_parameter(f"names the entry {letter}[{i}, {j}] twice: {other} and {name}")
+        values[str(name)], matrices[letter][i][j] = matrices[letter][i][j], str(name)
     return {
         "parameters": values,
         "state_space": matrices | {"time": "discrete" if discrete else "continuous"},
     }
 
 
-def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete: bool) -> dict[str, Plain]:
-    rows = [[_entry(system, i, j) for j in range(system.ninputs)] for i in range(system.noutputs)]
+def _place(name: str, place: object, shapes: Mapping[str, tuple[int, ...]]) -> Place:
+    """The entry of a parameter; indices below 0 count from the end, as in Python."""
+    if isinstance(place, str) or not isinstance(place, Sequence) or len(place) != 3:
+        raise _bad_parameter(f"{name} must be a matrix, a row and a column, not {place!r}")
+    letter, *indices = place
+    if not isinstance(letter, str) or letter not in shapes:
+        raise _bad_parameter(f"{name} is in {letter!r}: the matrices are {', '.join(shapes)}")
+    try:
+        i, j = (operator.index(k) + (n if k < 0 else 0) for k, n in zip(indices, shapes[letter], strict=True))
+    except TypeError:
+        raise _bad_parameter(f"{name}: row and column must be whole numbers, not {indices}") from None
+    rows, columns = shapes[letter]
+    if not (0 <= i < rows and 0 <= j < columns):
+        raise _bad_parameter(f"{name}: {letter} is {rows} x {columns} and has no entry {indices}, from 0")
+    return letter, i, j
+
+
+def _bad_parameter(message: str) -> SpecError:
+    return _bad_argument("parameters", message, "write parameters={'k': ('B', 1, 0)}: B, row 1, column 0")
+
+
+def _entries(system: control.TransferFunction | control.StateSpace) -> list[list[Entry]]:
+    """Rows of columns of numerators and denominators, descending."""
+    if hasattr(system, "A"):
+        return transfer_functions(system)
+    return [
+        [
+            (np.atleast_1d(system.num[i][j]).tolist(), np.atleast_1d(system.den[i][j]).tolist())
+            for j in range(system.ninputs)
+        ]
+        for i in range(system.noutputs)
+    ]
+
+
+def _transfer(rows: list[list[Entry]], *, discrete: bool) -> dict[str, Plain]:
     if not discrete:
         above, below = ([[entry[k] for entry in row] for row in rows] for k in (0, 1))
         return {"continuous": {"numerator": _plain(above), "denominator": _plain(below)}}
@@ -103,43 +161,22 @@ def _transfer(system: control.TransferFunction | control.StateSpace, *, discrete
     return {"B": _plain(B), "F": _plain(F)}
 
 
-def _entry(
-    system: control.TransferFunction | control.StateSpace, output: int, input: int
-) -> tuple[list[float], list[float]]:
-    """Numerator and denominator of an entry, descending, without what they have in common."""
-    import scipy.signal
+def _in_delays(top: list[float], bottom: list[float]) -> Entry:
+    """In q^-1, ascending, and monic; poles at 0 are delays and no coefficients to be estimated.
 
-    if hasattr(system, "A"):
-        # One output and one input at a time: an entry has no more poles than reach it.
-        top, bottom = scipy.signal.ss2tf(
-            system.A, system.B[:, [input]], system.C[[output]], system.D[[output]][:, [input]]
+    Raises:
+        SpecError: `improper-transfer`.
+    """
+    above, below = (np.trim_zeros(np.array(part, dtype=float), "f") for part in (top, bottom))
+    if above.size > below.size:
+        message = (
+            f"the system has degree {above.size - 1} in z above and {below.size - 1} below: its output "
+            "would come before its input"
         )
-        zeros, poles = np.roots(_trimmed(top[0])), np.roots(bottom)
-        gain = _trimmed(top[0])[0] if np.any(np.abs(top[0]) > 0) else 0.0
-        for zero in zeros.copy():
-            near = np.abs(poles - zero)
-            if near.size and near.min() <= _CANCELS * (1.0 + abs(zero)):
-                poles = np.delete(poles, int(np.argmin(near)))
-                zeros = np.delete(zeros, int(np.argmin(np.abs(zeros - zero))))
-        return tuple(np.atleast_1d(np.real(p)).tolist() for p in (gain * np.poly(zeros), np.poly(poles)))
-    above, below = (np.asarray(part[output][input], dtype=float) for part in (system.num, system.den))
-    return np.atleast_1d(above).tolist(), np.atleast_1d(below).tolist()
-
-
-def _trimmed(coefficients: np.ndarray) -> np.ndarray:
-    """Without leading coefficients that are rounding."""
-    size = np.abs(coefficients).max(initial=0.0)
-    large = np.flatnonzero(np.abs(coefficients) > 1e-12 * size)
-    return coefficients[large[0] :] if large.size else np.zeros(1)
-
-
-def _in_delays(top: list[float], bottom: list[float]) -> tuple[list[float], list[float]]:
-    """In q^-1, ascending, and monic."""
-    lead = next(i for i, c in enumerate(bottom) if c)
-    below = np.array(bottom[lead:])
-    above = np.trim_zeros(np.array(top), "f")
+        raise bad_spec("improper-transfer", message, hint="multiply it by z^-d", key="plant")
     late = [0.0] * (below.size - above.size)
-    return [*late, *(above / below[0]).tolist()] or [0.0], (below / below[0]).tolist()
+    ascending = np.trim_zeros(below / below[0], "b").tolist()
+    return [*late, *np.trim_zeros(above / below[0], "b")] if above.size else [0.0], ascending
 
 
 def _plain(rows: list[list[list[float]]]) -> Plain:

@@ -33,6 +33,7 @@ from inputdesign_cli.tasks.identification import (
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
+from inputdesign_cli.tasks.result.levels import level_notes
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
 from inputdesign_cli.tasks.result.refutations import (
@@ -49,6 +50,10 @@ _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
 _REACHED = 1e-6
 _MOST_EXPERIMENTS = 10**9
+_PRIOR_LEFT_OUT = (
+    "experiment.prior does not count for the experiment below either, since no verdict after it could rest "
+    "on that: spec.yaml has the information of the data in its place"
+)
 Part = TypeVar("Part", Table, Curves)
 Verdict = Literal["met", "missed", "undecided"]
 
@@ -85,11 +90,11 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
     if assessment.verdict != "missed" or found.question is None or found.question.top_up is None:
         return assessment
     try:
-        levels = found.preparation.levels
-        topped = _about(found.question.top_up(levels), levels)
+        topped = found.question.top_up(found.preparation.levels)
     except IdesignError as error:
         return replace(assessment, results=_without_top_up(assessment.results, told(error)))
     needed = partial(_experiments, found.question)
+    topped = _with_notes(topped, _remarks(task, found, topped))
     return Assessment(assessment.verdict, _topped_up(assessment.results, topped, needed))
 
 
@@ -167,17 +172,15 @@ def _rivals(units: Units, found: Identified, question: ModelQuestion) -> list[st
     return rival_notes(units, estimate, apart)
 
 
-def _about(topped: Results, levels: Mapping[str, float]) -> Results:
-    """The top-up with a note on what its record varies about."""
-    point = topped.result.get("signal", {}).get("operating_point")
-    if not levels or point is None:
-        return topped
-    told = ", ".join(f"u{j + 1} = {level:g}" for j, level in enumerate(point))
-    return _with_note(topped, f"signal.csv varies about the operating point, {told}")
-
-
-def _with_note(results: Results, note: str) -> Results:
-    return replace(results, result={**results.result, "notes": [*results.result.get("notes", []), note]})
+def _remarks(task: Identification, found: Identified, topped: Results) -> list[str]:
+    """What is to be known of a top-up: about what its record varies, and what it does not count on."""
+    notes = []
+    if "signal" in topped.tables and not task.header.units.closed_loop:
+        point, levels = topped.result["signal"].get("operating_point"), found.preparation.levels
+        notes += level_notes(levels, point, found.data.means, found.data.u.std(axis=0))
+    if task.has_prior and found.estimate.agreement is None:
+        notes.append(_PRIOR_LEFT_OUT)
+    return notes
 
 
 def _judged(identification: Results, verdict: Verdict, assessment: dict[str, Json]) -> Results:

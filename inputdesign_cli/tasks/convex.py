@@ -31,8 +31,15 @@ from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.grid_method import GridMethod
-from inputdesign_cli.tasks.record import RecordRequest, designed_spectrum, record_notes, redrawn, shortfall
-from inputdesign_cli.tasks.record_search import Made, fitting_record, samples_of_record
+from inputdesign_cli.tasks.record import (
+    Made,
+    RecordRequest,
+    designed_spectrum,
+    record_notes,
+    redrawn,
+    shortfall,
+)
+from inputdesign_cli.tasks.record_search import fitting_record, samples_of_record
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
@@ -113,7 +120,7 @@ class ConvexTask:
         else:
             notes = [] if done.design.any_spectrum else [no_other_spectra()]
         try:
-            made = fitting_record(self.record, done.question, done.design, done.experiment)
+            made = fitting_record(self.record, done.question, done.design, done.experiment.samples)
             if self.exact is not None:
                 made = self.exact.recorded(done, made, self.record, partial(self._known, done))
         except OutOfTimeError:
@@ -272,7 +279,7 @@ class ConvexTask:
         entry = signal_entry(
             made.request,
             self.header.units,
-            done.experiment,
+            replace(design.problem.experiment, samples=done.experiment.samples),
             record,
             design.problem.requirements,
             designed=done.information if design is done.design else design.result.information,

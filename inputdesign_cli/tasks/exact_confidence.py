@@ -17,8 +17,8 @@ from inputdesign_cli.runs.results import Json
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, settled_alpha
-from inputdesign_cli.tasks.record import RecordRequest, worst_ratio
-from inputdesign_cli.tasks.record_search import Made, fitting_record
+from inputdesign_cli.tasks.record import Made, RecordRequest, worst_ratio
+from inputdesign_cli.tasks.record_search import fitting_record
 from inputdesign_cli.tasks.result.design import Designed
 
 # A record that needs a larger alpha is made anew, this often at the most.
@@ -77,7 +77,7 @@ class ExactConfidence:
             alpha = needed
             stricter = tuple(with_alpha(design.problem.requirements, alpha))
             design = replace(design, problem=replace(design.problem, requirements=stricter))
-            made = fitting_record(request, done.question.at_alpha(alpha), design, done.experiment)
+            made = fitting_record(request, done.question.at_alpha(alpha), design, done.experiment.samples)
         information = known(made.record)
         if made.record is None or information is None:
             return made

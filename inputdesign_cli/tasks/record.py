@@ -15,6 +15,7 @@ from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import (
     Bounds,
@@ -27,7 +28,6 @@ from inputdesign_cli.signal import (
     limited_responses,
 )
 from inputdesign_cli.signal.evaluation import MET
-from inputdesign_cli.tasks.shortest_record import shortest_record
 
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
@@ -108,8 +108,27 @@ class RecordRequest:
         return samples <= self.longest and self.settings.period(samples) >= least
 
 
+@dataclass(frozen=True)
+class Made:
+    """A record with what it realises: the request that made it, and the design whose spectrum it has.
+
+    `input_power` limits that design, where it is not the one that was asked for.
+    """
+
+    record: Record | None
+    request: RecordRequest
+    design: Design
+    input_power: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def entry(self) -> dict[str, Json]:
+        """What `signal` of the result adds about another spectrum."""
+        return {} if self.input_power is None else {"spectrum_of": {"input_power": self.input_power}}
+
+
 def make_record(
-    request: RecordRequest, design: Design, experiment: Experiment, *, longer: bool = True
+    request: RecordRequest, design: Design, experiment_samples: int, *, first: bool = False
 ) -> Record | None:
     """The best of several records of the designed spectrum.
 
@@ -119,14 +138,14 @@ def make_record(
     `signal.samples`) or longer than any that is computed.
 
     Args:
-        longer: whether to look for a longer one where none of this length is found to meet the accuracy.
-
-    Raises:
-        InfeasibleError: no record of this length was found within the limits on single samples.
+        experiment_samples: samples of the experiment, and of the record where the request states no other.
+        first: whether to take the first that meets the requirements, whatever it costs.
     """
     problem, settings = design.problem, request.settings
-    samples = request.length(experiment.samples)
-    feasible = request.feasible(experiment.samples, least_period(experiment.inputs))
+    # In the coordinates of this design, which are those of its requirements.
+    experiment = replace(problem.experiment, samples=experiment_samples)
+    samples = request.length(experiment_samples)
+    feasible = request.feasible(experiment_samples, least_period(experiment.inputs))
     if not design.result.x.any() or not feasible:
         return None
     upper = tuple(
@@ -148,38 +167,24 @@ def make_record(
 
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
-    def made(samples: int, candidates: int | None = None) -> Record:
-        tried = settings
-        if candidates is not None:
-            tried = replace(settings, candidates=candidates, most_candidates=candidates)
-        limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
-        generator = SignalGenerator(spectrum, tried, samples, request.band, limited)
-        numbers = _binding(design)
-        while True:
-            at = FiniteRecords(
-                experiment, samples, request.step, others=tuple(plants[n] for n in numbers if n)
-            )
-            record = best_record(generator, at, target_at(numbers), bounds)
-            least = max(record.worst_ratio, MET) if meets else record.worst_ratio
-            left = [n for n in range(len(plants)) if n not in numbers]
-            others = {n: FiniteRecord(plants[n], samples, request.step) for n in left}
-            ratios = {n: _ratio_at(others[n], scores[n], record) for n in left}
-            shares = {n: _power_share(others[n], upper, record) for n in left}
-            missed = [n for n in left if ratios[n] > least]
-            beyond = [n for n in left if shares[n] > MET]
-            if not (missed or beyond):
-                return record
-            # What serves the worst few serves most of the others.
-            worst_few = sorted(missed, key=lambda n: -ratios[n])[:FEW]
-            numbers += [*worst_few, *sorted(set(beyond) - set(worst_few), key=lambda n: -shares[n])[:FEW]]
-
-    record = made(samples)
-    if record.met or not (request.searched and longer):
-        return record
-    allowed = request.most_samples if problem.goal == "samples" and request.samples is None else 0
-    return shortest_record(
-        record, settings.block, made, allowed, request.longest, request.limit_keys, request.units
-    )
+    limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
+    generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
+    numbers = _binding(design)
+    while True:
+        at = FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in numbers if n))
+        record = best_record(generator, at, target_at(numbers), bounds, first=first)
+        least = max(record.worst_ratio, MET) if meets else record.worst_ratio
+        left = [n for n in range(len(plants)) if n not in numbers]
+        others = {n: FiniteRecord(plants[n], samples, request.step) for n in left}
+        ratios = {n: _ratio_at(others[n], scores[n], record) for n in left}
+        shares = {n: _power_share(others[n], upper, record) for n in left}
+        missed = [n for n in left if ratios[n] > least]
+        beyond = [n for n in left if shares[n] > MET]
+        if not (missed or beyond):
+            return record
+        # What serves the worst few serves most of the others.
+        worst_few = sorted(missed, key=lambda n: -ratios[n])[:FEW]
+        numbers += [*worst_few, *sorted(set(beyond) - set(worst_few), key=lambda n: -shares[n])[:FEW]]
 
 
 def _binding(design: Design) -> list[int]:
@@ -293,8 +298,8 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
     asked = request.samples or experiment
     if record.method != "given" and len(record.samples) > asked + request.settings.block:
         notes.append(
-            f"within the limits on single samples a record of {len(record.samples)} samples was found; the "
-            f"spectrum alone would take {asked}, and experiment.samples designs for a length in between"
+            f"within the limits on single samples {len(record.samples)} samples are the shortest record that "
+            f"was found, by trying, to one per cent; the spectrum alone would take {asked}"
         )
     return notes
 

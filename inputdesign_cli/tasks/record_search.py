@@ -6,8 +6,9 @@ What costs least need not fit: where outputs are dear the inputs may be strong, 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -16,11 +17,10 @@ from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Question
-from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.information import Experiment
-from inputdesign_cli.runs.results import Json
 from inputdesign_cli.signal import Record
-from inputdesign_cli.tasks.record import RecordRequest, design_cost, make_record
+from inputdesign_cli.tasks.record import Made, RecordRequest, design_cost, designed_spectrum, make_record
+from inputdesign_cli.tasks.result.too_tight import too_tight
+from inputdesign_cli.tasks.shortest_record import ShortestRecord, Way, longest_search
 
 # From the design towards the least input power that meets the accuracy, with a little room there.
 _SHARES = (0.8, 0.6, 0.4, 0.2, 0.0)
@@ -28,55 +28,39 @@ _ROOM = 1.02
 _TOLERANCE = 1e-5
 # Where nothing meets the accuracy so many longer records are tried, with a little room, if not too long.
 _LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
+# Spectra are compared on so many frequencies, by the share of their power that lies elsewhere.
+_LINES, _SAME_SHAPE = 256, 0.01
 _WORDS = {"filtered_noise": "noise", "multisine": "a multisine", "binary": "a binary signal"}
 
 
-@dataclass(frozen=True)
-class Made:
-    """A record with what it realises: the request that made it, and the design whose spectrum it has.
-
-    `input_power` limits that design, where it is not the one that was asked for.
-    """
-
-    record: Record | None
-    request: RecordRequest
-    design: Design
-    input_power: float | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def entry(self) -> dict[str, Json]:
-        """What `signal` of the result adds about another spectrum."""
-        return {} if self.input_power is None else {"spectrum_of": {"input_power": self.input_power}}
-
-
-def fitting_record(
-    request: RecordRequest, question: Question, design: Design, experiment: Experiment
-) -> Made:
+def fitting_record(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:
     """The record of the design; where none is found that meets the accuracy, one that does.
 
-    Tried are spectra of less input power, and other kinds of signals. A kind that the spec states is not
-    replaced: the error names the one that would do.
+    Tried are spectra of less input power, and other kinds of signals; for a shortest experiment longer
+    records. A kind that the spec states is not replaced: the error names the one that would do.
+
+    Args:
+        samples: of the experiment.
 
     Raises:
         InfeasibleError: `limits-too-tight`, with what was tried and what would do.
     """
-    record = make_record(request, design, experiment, longer=False)
+    record = make_record(request, design, samples)
     plain = Made(record, request, design)
     if record is None or record.met or not request.searched:
         return plain
-    tried: Counter[str] = Counter()
-    hint = ""
+    misses, tried, remedy = [record], Counter[str](), ""
     for of, spectrum, power in _others(request, question, design):
-        other = Made(make_record(of, spectrum, experiment, longer=False), of, spectrum, power)
+        other = Made(make_record(of, spectrum, samples), of, spectrum, power)
         if other.record is not None and other.record.met:
             if not request.stated_method or of is request:
                 return _told(request, design, other)
             limited = "" if power is None else f" with limits.input_power: {power:.4g}"
-            hint = f"a record of this length does with signal.type: {of.settings.method}{limited}"
+            remedy = f"a record of this length does with signal.type: {of.settings.method}{limited}"
             break
         tried[_words(of)] += 1
-    return replace(plain, record=_longer(request, design, experiment, tried, hint))
+        misses += [other.record] if other.record is not None else []
+    return _longer(plain, misses, question, tried, remedy)
 
 
 def _others(
@@ -87,9 +71,9 @@ def _others(
     for power, spectrum in _of_less_power(question, design):
         spectra.append((spectrum, power))
         yield request, spectrum, power
-    for settings in request.others:
+    for kind in _kinds(request):
         for spectrum, limit in ((design, None), *spectra[:1], *spectra[-1:]):
-            yield replace(request, settings=settings), spectrum, limit
+            yield kind, spectrum, limit
 
 
 def _of_less_power(question: Question, design: Design) -> Iterator[tuple[float, Design]]:
@@ -115,10 +99,11 @@ def _told(request: RecordRequest, design: Design, other: Made) -> Made:
     spectrum = (
         "that spectrum" if limit is None else f"another spectrum, that of limits.input_power: {limit:.4g}"
     )
+    asked_for = "cheapest" if design.problem.goal == "cost" else "designed"
+    kind, limits = _WORDS.get(record.method, record.method), " and ".join(request.limit_keys)
     note = (
-        f"no record of {_words(request)} with the cheapest spectrum was found that meets the accuracy within "
-        f"{' and '.join(request.limit_keys)}; the record is {_WORDS.get(record.method, record.method)} with "
-        f"{spectrum}"
+        f"no record of {_words(request)} with the {asked_for} spectrum was found that meets the accuracy "
+        f"within {limits}; the record is {kind} with {spectrum}"
     )
     return replace(other, record=replace(record, extra_power=extra), notes=(note,))
 
@@ -129,19 +114,89 @@ def _words(request: RecordRequest) -> str:
 
 
 def _longer(
-    request: RecordRequest, design: Design, experiment: Experiment, tried: Counter[str], hint: str
-) -> Record | None:
-    """The longer record of a shortest experiment, or the error with what was tried besides."""
-    try:
-        return make_record(request, design, experiment)
-    except InfeasibleError as missed:
-        told = missed.diagnostics[0]
+    plain: Made, misses: Sequence[Record], question: Question, tried: Counter[str], remedy: str
+) -> Made:
+    """The longer record of a shortest experiment, or the error with what was tried besides.
+
+    Raises:
+        InfeasibleError: `limits-too-tight`.
+    """
+    request = plain.request
+    sought = question.goal == "samples" and request.samples is None
+    allowed = request.most_samples if sought else 0
+    search = ShortestRecord(
+        _ways(plain, question, sought),
+        request.settings.block,
+        longest_search(len(misses[0].samples), allowed, request.longest),
+    )
+    found = search.search(misses)
+    longer = None if found is None else found.record
+    if found is not None and longer is not None and (allowed is None or len(longer.samples) <= allowed):
+        other = found.request.settings.method != request.settings.method
+        return replace(found, notes=(f"the record is {_words(found.request)}",) if other else ())
+    raise too_tight(
+        request,
+        misses[0],
+        longer,
+        allowed,
+        tried=tried,
+        remedy=remedy,
+        needed=search.needed,
+        searched=search.longest,
+    )
+
+
+def _ways(plain: Made, question: Question, sought: bool) -> list[Way]:
+    """What is tried at a length: the kinds of signals, with the spectrum of the design, then the cheapest.
+
+    Where a length is only told, one record of each kind is enough.
+    """
+    request, design = plain.request, plain.design
+    kinds = [request, *([] if request.stated_method else _kinds(request))]
+    if not sought:
         kinds = [
-            f"{kind} of {count} {'spectrum' if count == 1 else 'spectra'}" for kind, count in tried.items()
+            replace(kind, settings=replace(kind.settings, candidates=1, most_candidates=1)) for kind in kinds
         ]
-        besides = f"; tried besides: {', '.join(kinds)}" if kinds else ""
-        hints = "; or ".join(text for text in (told.hint, hint) if text)
-        raise InfeasibleError(replace(told, message=told.message + besides, hint=hints)) from missed
+
+    @cache
+    def cheapest(samples: int) -> Design | None:
+        """That of a stated length, if it is another spectrum than that of the design."""
+        stated = replace(question.of_length(samples), goal="cost", cost=request.cost)
+        try:
+            found = solve_design(stated, tolerance=_TOLERANCE, any_spectrum_tolerance=None)
+        except UnreachableError:
+            return None
+        return None if _alike(request, design, found) else found
+
+    def way(kind: RecordRequest, spectrum: Callable[[int], Design | None]) -> Way:
+        of_any_length = replace(kind, samples=None)
+
+        def made(samples: int) -> Made | None:
+            of = spectrum(samples)
+            record = None if of is None else make_record(of_any_length, of, samples, first=True)
+            return None if of is None else Made(record, kind, of)
+
+        return made
+
+    spectra: list[Callable[[int], Design | None]] = [lambda _: design]
+    if sought:
+        spectra.append(cheapest)
+    return [way(kind, spectrum) for spectrum in spectra for kind in kinds]
+
+
+def _kinds(request: RecordRequest) -> list[RecordRequest]:
+    """Other kinds of signals that may stand in."""
+    return [replace(request, settings=settings) for settings in request.others]
+
+
+def _alike(request: RecordRequest, one: Design, other: Design) -> bool:
+    """Whether two designs have spectra of one shape."""
+    inputs = one.problem.experiment.inputs
+    lines = [designed_spectrum(request, design, inputs).lines(_LINES).powers for design in (one, other)]
+    if lines[0].shape != lines[1].shape:
+        return False
+    shapes = [powers / np.einsum("naa->", powers).real for powers in lines]
+    return float(np.abs(shapes[0] - shapes[1]).sum()) < _SAME_SHAPE
 
 
 def samples_of_record(request: RecordRequest, question: Question, samples: int) -> int | None:
@@ -154,7 +209,7 @@ def samples_of_record(request: RecordRequest, question: Question, samples: int) 
         try:
             design = solve_design(stated, tolerance=_ROUGH, any_spectrum_tolerance=_ANY)
             of_any_length = replace(request, samples=None)
-            record = make_record(of_any_length, design, design.problem.experiment, longer=False)
+            record = make_record(of_any_length, design, samples)
         except (OutOfTimeError, UnreachableError):
             return None
         if record is None or record.met:

@@ -1,123 +1,126 @@
-"""When the limits on single samples leave too little power: the shortest experiment that can, or why none."""
+"""When the limits on single samples leave too little power: the shortest record that can be found."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
-from inputdesign_cli.errors import InfeasibleError
-from inputdesign_cli.runs.units import Units
+from inputdesign_cli.compute.time_limit import OutOfTimeError
 from inputdesign_cli.signal import Record
+from inputdesign_cli.tasks.record import Made
 
-_LONGEST = 64  # times the length that was asked for
-_CANDIDATES = 1
-_GROWTH = 1.1
+# Lengths that are looked into: times the one that was asked for, or that many samples.
+_LONGEST, _AT_LEAST = 64, 20_000
+_LEAP = 8.0
+_GROWTH = 1.03
+_FAR = 1.5
 _FINE = 0.01
+_LENGTHS = 24
+_BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
+# A way that missed nearby, and by so much, is not tried: other phases change a ratio by less.
+_NEARBY, _HOPELESS = 1.2, 1.15
 
 
-class MakeRecord(Protocol):
-    """Makes the best record of a length, of so many candidates."""
+class Way(Protocol):
+    """A kind of signal with a rule for its spectrum."""
 
-    def __call__(self, samples: int, candidates: int | None = None) -> Record:
-        """The best record of `samples`; `candidates` are as many as usual when not given."""
+    def __call__(self, samples: int) -> Made | None:
+        """The first record of a length that is found to meet the accuracy, else the best of some, if any."""
 
 
-def shortest_record(
-    missed: Record,
-    block: int,
-    made: MakeRecord,
-    most_samples: int | None,
-    longest: int,
-    limit_keys: Sequence[str],
-    units: Units,
-) -> Record:
-    """The longer record that does what `missed` does not, or the error that says how long it would be.
+def reach(record: Record) -> float:
+    """The length that a record needs, were its information in proportion to its length."""
+    return len(record.samples) * (record.worst_ratio**2 if np.isfinite(record.worst_ratio) else 1.0)
 
-    The longer record has the shape of the designed spectrum at the lower power that it then needs.
+
+def longest_search(asked: int, most: int | None, longest: int) -> int:
+    """How long records are looked into where those of `asked` samples miss.
 
     Args:
-        block: its length is a multiple of this.
-        most_samples: the longest that may be delivered; None for any, 0 when no other length is wanted.
+        most: samples of the longest experiment, where there is a limit.
         longest: samples of the longest record that is computed at all.
-        limit_keys: of the spec, for what limits single samples.
-        units: in which lengths are told.
-
-    Raises:
-        InfeasibleError: `limits-too-tight`.
     """
-    found = _search(missed, block, made, min(_LONGEST * len(missed.samples), longest))
-    if found is not None and (most_samples is None or len(found.samples) <= most_samples):
+    return min(max(_LONGEST * asked, _AT_LEAST, most or 0), longest)
+
+
+@dataclass
+class ShortestRecord:
+    """The search for the shortest record, by trying lengths in several ways.
+
+    Args:
+        ways: what is tried at a length, until a record meets the accuracy.
+        block: lengths are multiples of this.
+        longest: samples of the longest that is looked for.
+    """
+
+    ways: Sequence[Way]
+    block: int
+    longest: int
+    needed: float = 0.0  # samples that would do, by the records that missed
+    _missed: dict[int, Record] = field(default_factory=dict)  # by way, its latest
+
+    def search(self, misses: Sequence[Record]) -> Made | None:
+        """The shortest record that meets the accuracy, to one per cent; None when none is found.
+
+        Out of time, the shortest so far.
+
+        Args:
+            misses: records of the length from which on longer ones are looked for.
+
+        Raises:
+            OutOfTimeError: before one is found.
+        """
+        low, found, lengths = len(misses[0].samples), None, 0
+        self.needed = min(map(reach, misses))
+        try:
+            while found is None and lengths < _LENGTHS:
+                high = self._rounded(min(max(self.needed, _GROWTH * low), _LEAP * low, self.longest))
+                if high <= low:
+                    return None
+                lengths += 1
+                found = self._met(high)
+                if found is None:
+                    self.needed = min((reach(record) for record in self._missed.values()), default=high)
+                    low = high
+                    if self.needed > _BEYOND * self.longest:
+                        return None
+            while found is not None and high - low > max(_FINE * high, self.block) and lengths < _LENGTHS:
+                lengths += 1
+                middle = self._rounded(np.sqrt(low * high) if high > _FAR * low else 0.5 * (low + high))
+                if middle in (low, high):
+                    break
+                tried = self._met(middle)
+                low, high, found = (middle, high, found) if tried is None else (low, middle, tried)
+        except OutOfTimeError:
+            if found is None:
+                raise
         return found
-    raise _too_tight(missed, found, most_samples, limit_keys, units)
 
-
-def _search(missed: Record, block: int, made: MakeRecord, longest: int) -> Record | None:
-    """The shortest record that meets the target, to one per cent, by trying; None when none does.
-
-    A record at its limits gathers information in proportion to its length: that is where the search begins.
-    """
-    start = len(missed.samples)
-    low, high = start, _rounded(max(_expected(missed), _GROWTH * start), block)
-    if high > longest:
+    def _met(self, samples: int) -> Made | None:
+        """A record of this length that meets the accuracy, the most promising way tried first."""
+        for number in sorted(range(len(self.ways)), key=self._promise):
+            missed = self._missed.get(number)
+            if (
+                missed is not None
+                and samples < _NEARBY * len(missed.samples)
+                and samples * _HOPELESS < reach(missed)
+            ):
+                continue
+            made = self.ways[number](samples)
+            if made is None or made.record is None:
+                continue
+            if made.record.met:
+                return made
+            self._missed[number] = made.record
         return None
-    found = made(high, _CANDIDATES)
-    while not found.met:
-        low, high = high, _rounded(high * _GROWTH, block)
-        if high > longest:
-            return None
-        found = made(high, _CANDIDATES)
-    shorter = _rounded(high / _GROWTH, block)
-    while low < shorter < high:
-        tried = made(shorter, _CANDIDATES)
-        if not tried.met:
-            low = shorter
-            break
-        high, found, shorter = shorter, tried, _rounded(shorter / _GROWTH, block)
-    while high - low > max(_FINE * high, block):
-        middle = _rounded(0.5 * (low + high), block)
-        if middle in (low, high):
-            break
-        tried = made(middle, _CANDIDATES)
-        if tried.met:
-            high, found = middle, tried
-        else:
-            low = middle
-    return found
 
+    def _promise(self, number: int) -> float:
+        """Where its latest record that missed would do; those that have not missed come first."""
+        missed = self._missed.get(number)
+        return 0.0 if missed is None else reach(missed)
 
-def _expected(missed: Record) -> float:
-    """The length that the record needs, were its information in proportion to its length."""
-    return len(missed.samples) * (missed.worst_ratio**2 if np.isfinite(missed.worst_ratio) else 1.0)
-
-
-def _rounded(length: float, block: int) -> int:
-    return int(np.ceil(length / block)) * block
-
-
-def _too_tight(
-    missed: Record, found: Record | None, most_samples: int | None, limit_keys: Sequence[str], units: Units
-) -> InfeasibleError:
-    names = " and ".join(limit_keys)
-    size = len(missed.samples)
-    message = (
-        f"no record of {size} samples within {names} was found that meets the accuracy: the best of those "
-        f"tried reaches r_u / r_adm = {missed.worst_ratio:.4g} with power {missed.power:.4g}"
-        if np.isfinite(missed.worst_ratio)
-        else f"no record of {size} samples within {names} was found that excites every parameter"
-    )
-    if found is None:
-        hint = (
-            f"raise the limits: about {_expected(missed):.3g} samples would be needed"
-            if _expected(missed) > _LONGEST * size
-            else f"raise the limits: {_LONGEST} times as many samples were not enough either"
-        )
-    else:
-        samples = len(found.samples)
-        set_to = units.length(samples, "limits") if most_samples else units.length(samples)
-        hint = (
-            f"{samples} samples can (power {found.power:.4g}): set {set_to} (and signal.samples, if stated), "
-            "raise the limits, or loosen the accuracy"
-        )
-    return InfeasibleError.because("limits-too-tight", message, hint, limit_keys[0])
+    def _rounded(self, length: float) -> int:
+        return int(np.ceil(length / self.block)) * self.block

@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from inputdesign_cli import tasks
 from inputdesign_cli.cli import main
+from inputdesign_cli.errors import OutputError
+from inputdesign_cli.runs.origin import Origin, check_place
+from inputdesign_cli.runs.results import Results
+from inputdesign_cli.runs.run_directory import write_run
 
 SPEC = """\
 title: {}
@@ -108,6 +113,106 @@ def test_a_spec_that_lies_in_the_directory_from_the_start(analyse, tmp_path):
     assert own.read_text() == SPEC.format("one")
     shutil.copy(own, tmp_path / "b.yaml")
     assert analyse("b.yaml", "-o", "r") == (2, "output-other-run")
+
+
+DESIGN = """\
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 1}
+experiment: {samples: 100}
+accuracy: {model_error: {relative: 0.1}}
+uncertainty: {intervals: {f1: [-0.6, -0.4]}}
+campaign: {block: 50}
+"""
+COMMANDS = {
+    "solve": ["a.yaml"],
+    "analyse": ["a.yaml"],
+    "simulate": ["a.yaml"],
+    "campaign": ["a.yaml"],
+    "identify": ["d.csv", "--spec", "a.yaml"],
+    "assess": ["a.yaml", "d.csv"],
+    "explore": ["d.csv"],
+}
+
+
+@pytest.fixture
+def computing(monkeypatch):
+    """The commands that have begun to compute something; they do not get to its end."""
+    begun = []
+
+    def computed(*_, **__):
+        begun.append(True)
+        raise SystemExit(99)
+
+    for verb in ("solve", "analyse", "simulate", "next_round", "identify", "assess", "explore"):
+        monkeypatch.setattr(tasks, verb, computed)
+    return begun
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_place_that_cannot_be_is_refused_before_anything_is_computed(
+    run, computing, monkeypatch, tmp_path, command
+):
+    def refused(place, *options):
+        code, out, _ = run(command, *COMMANDS[command], "-o", place, "--json", *options)
+        assert computing == ([True] if code == 99 else [])
+        computing.clear()
+        return json.loads(out)["errors"][0]["code"] if out else code
+
+    other, edited, foreign = (tmp_path / name for name in ("other", "edited", "foreign"))
+    Path("a.yaml").write_text(DESIGN)
+    Path("d.csv").write_text("u,y\n" + "1,1\n0,1\n" * 50)
+    Path("file").write_text("mine")
+    result = Results({"format": 1, "title": "x"}, "title: x\n")
+    write_run(result, other, origin=Origin([tmp_path / "b.yaml"]))
+    write_run(result, edited, origin=Origin([tmp_path / "a.yaml"]))
+    (edited / "spec.yaml").write_text("title: mine\n")
+    foreign.mkdir()
+    (foreign / "result.json").write_text("mine")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert refused("other") == "output-other-run"
+    assert refused("edited") == "output-spec-changed"
+    assert refused("foreign") == refused("foreign", "--overwrite") == "output-not-a-run"
+    assert refused("file") == "output-not-a-directory"
+    assert refused("file/below") == "output-not-writable"
+    assert refused("new") == refused("other", "--overwrite") == refused("edited", "--overwrite") == 99
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_a_run_of_the_same_file_that_is_replaced_is_told(run, tmp_path):
+    write(tmp_path / "a.yaml", "one")
+
+    def told(*options):
+        code, out, _ = run("analyse", "a.yaml", "--no-figures", *options)
+        assert code == 0
+        return "a run of the same files with other values" in " ".join(out.split())
+
+    assert [told(), told(), told("--set", "experiment.samples=50"), told()] == [False, False, True, True]
+
+
+def test_a_run_that_came_in_the_meantime_is_not_replaced(analyse, monkeypatch, tmp_path):
+    spec = write(tmp_path / "a.yaml", "one")
+    true = tasks.analyse
+
+    def slowly(stated):
+        origin = Origin([tmp_path / "b.yaml"])
+        write_run(Results({"format": 1, "title": "x"}, "title: x\n"), tmp_path / "r", origin=origin)
+        return true(stated)
+
+    monkeypatch.setattr(tasks, "analyse", slowly)
+    assert analyse(spec, "-o", "r") == (2, "output-other-run")
+    assert (tmp_path / "r" / "spec.yaml").read_text() == "title: x\n"
+
+
+def test_a_spec_that_was_replaced_by_a_top_up_is_known_again(tmp_path):
+    """The spec.yaml of a run may say something else than was asked."""
+    place, top_up = tmp_path / "r", Results({"format": 1, "title": "x"}, "title: top-up\n")
+    one, copy, other = (tmp_path / name for name in ("a.yaml", "copy.yaml", "d.csv"))
+    write_run(top_up, place, origin=Origin([one, other], "title: x\n"))
+    check_place(place, Origin([copy, other], "title: x\n"), "title: x\n")
+    write_run(top_up, place, origin=Origin([copy, other], "title: x\n"))
+    for origin in (Origin([one], "title: x\n"), Origin([one, other], "title: y\n")):
+        with pytest.raises(OutputError, match="would lose it"):
+            check_place(place, origin, origin.asked)
 
 
 def test_a_spec_from_standard_input(analyse, tmp_path, monkeypatch):

@@ -18,7 +18,22 @@ def test_a_prior_without_its_estimate_does_not_count(heater_record):
     prior = yaml.safe_dump({"information": (1e9 * np.eye(5)).tolist()}, default_flow_style=True)
     with_prior = assess(parse_spec(HEATER, overrides=[f"experiment.prior={prior}"]), path).results.result
     assert with_prior["assessment"]["requirements"] == plain["assessment"]["requirements"]
-    assert "experiment.prior does not count" in " ".join(with_prior["notes"])
+    assert "experiment.prior does not count for this" in " ".join(with_prior["notes"])
+
+
+def test_a_top_up_does_not_count_on_a_prior_that_no_verdict_can_rest_on(heater_record):
+    overrides = ["accuracy.model_error.relative=0.05", "signal.candidates=1"]
+    path = heater_record("a.csv", 300, 1, power=0.5)
+    plain = assess(parse_spec(HEATER, overrides=overrides), path)
+    prior = yaml.safe_dump({"information": (1e3 * np.eye(5)).tolist()}, default_flow_style=True)
+    stated = assess(parse_spec(HEATER, overrides=[*overrides, f"experiment.prior={prior}"]), path)
+    assert plain.verdict == stated.verdict == "missed"
+    assert plain.results.resolved_spec == stated.results.resolved_spec
+    written = yaml.safe_load(stated.results.resolved_spec)["experiment"]["prior"]
+    assert written["parameters"] == pytest.approx(stated.results.result["identification"]["theta"])
+    notes = " ".join(stated.results.result["notes"])
+    assert "experiment.prior does not count for the experiment below either" in notes
+    assert "does not count" not in " ".join(plain.results.result["notes"])
 
 
 def test_a_prior_with_its_estimate_counts_as_its_record_does(heater_record, tmp_path):

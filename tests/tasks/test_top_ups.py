@@ -2,6 +2,8 @@
 
 import html
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from typer.testing import CliRunner
 
 from inputdesign_cli import assess, identify, load_spec, parse_spec, solve
 from inputdesign_cli.cli import app
+from inputdesign_cli.tasks.result.levels import level_notes
 from tests.support.heater import HEATER, STRUCTURE, said
 
 
@@ -117,3 +120,64 @@ def test_a_top_up_varies_about_the_operating_point_and_the_page_tells_the_whole_
     assert CliRunner().invoke(app, ["report", str(out)]).exit_code == 0
     page = html.unescape((out / "report.html").read_text())
     assert "idesign assess spec.yaml 'first run.csv' --operating-point u1=40.0,y1=52.3" in page
+
+
+def test_the_level_of_the_data_is_told_where_the_spec_does_not_know_it(heater_record):
+    asked = (
+        "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0002}}\nsignal: {candidates: 1}\n"
+    )
+    path, spec = heater_record("a.csv", 300, 2, level=(40.0, 52.3)), parse_spec(STRUCTURE + asked)
+    recorded = np.loadtxt(path, delimiter=",", skiprows=1, usecols=range(2))
+    header = path.read_text().splitlines()[0].split(",")
+    mean = f"{recorded[:, [name.startswith('u') for name in header[:2]].index(True)].mean():.4g}"
+    for options in ({}, {"remove_means": True}):
+        found = assess(spec, path, **options).results
+        assert abs(np.mean(found.tables["signal"].columns["u1"])) < 1.0
+        assert f"the data lie about u1 = {mean} (their mean)" in said(found)
+        assert f"write signal.offset: {mean} and assess again" in said(found)
+    told = assess(parse_spec(STRUCTURE + asked, overrides=[f"signal.offset={mean}"]), path).results
+    assert told.result["signal"]["operating_point"] == [float(mean)]
+    assert "the data lie about" not in said(told)
+    assert "the data lie about" not in said(assess(spec, heater_record("b.csv", 300, 2)).results)
+
+
+@pytest.mark.parametrize(
+    ("levels", "point", "means", "expected"),
+    [
+        ({}, None, [7.0, 0.1], "about u1 = 7 .* write signal.offset: \\[7, 0\\]"),
+        ({"u1": 7.0}, [7.0, 0.0], [7.0, -30.0], "u1 = 7, u2 = 0.*about u2 = -30 .*: \\[7, -30\\]"),
+        ({}, [7.0, 1.0], [7.0, -30.0], "^$"),
+        ({}, None, [0.3, -0.3], "^$"),
+        ({}, None, None, "^$"),
+    ],
+)
+def test_each_input_has_its_level(levels, point, means, expected):
+    found = level_notes(levels, point, None if means is None else np.array(means), np.ones(2))
+    assert re.search(expected, "; ".join(found))
+
+
+def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, monkeypatch):
+    """With the second record alone it judges what the first spec judges with both."""
+    monkeypatch.chdir(tmp_path)
+    asked = "experiment: {samples: 400}\naccuracy: {standard_deviation: {b6: 0.0004}}\n"
+    Path("spec.yaml").write_text(STRUCTURE + asked + "signal: {candidates: 1}\n")
+    first, second = (heater_record(name, 300, seed) for name, seed in (("1.csv", 2), ("2.csv", 3)))
+
+    def ran(*arguments):
+        options = [*map(str, arguments), "--no-figures", "--json"]
+        return json.loads(CliRunner().invoke(app, ["assess", *options]).stdout)
+
+    ran("spec.yaml", first, "-o", "a")
+    joint, known = ran("spec.yaml", first, second, "-o", "b"), ran("a/spec.yaml", second, "-o", "c")
+    alone = ran("spec.yaml", second, "-o", "d")
+    ratio, by_prior, single = (
+        run["assessment"]["requirements"][0]["worst_ratio"] for run in (joint, known, alone)
+    )
+    assert by_prior == pytest.approx(ratio, rel=0.05)
+    assert ratio < 0.9 * single
+    assert any("experiment.prior counts" in note for note in known["notes"])
+    copied = tmp_path / "copied.csv"
+    copied.write_bytes(first.read_bytes())
+    for given in (first, copied):
+        (error,) = ran("a/spec.yaml", given, second, "-o", "e")["errors"]
+        assert error["code"] == "data-repeated"

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, Protocol, TypeVar
 
 from pydantic import Field, PrivateAttr
 
-from inputdesign_cli.errors import IdesignError, Location, SpecError
+from inputdesign_cli.errors import IdesignError, Location, SpecError, bad_spec
 from inputdesign_cli.specification.models.accuracy import Accuracy
 from inputdesign_cli.specification.models.campaign import Campaign
 from inputdesign_cli.specification.models.channels import Channels
@@ -120,6 +120,8 @@ class Spec(Section):
         Raises:
             SpecError: everything that is wrong with it.
         """
+        if folder is not None and not isinstance(folder, Path):
+            raise bad_spec("bad-argument", "folder must be a pathlib.Path", hint="Path(..)", key="folder")
         return cls.reader(to_yaml(plain(data)), "<dict>", (), folder=folder, design=design)
 
     def with_(self, **changes: object) -> Spec:
@@ -128,7 +130,10 @@ class Spec(Section):
         Raises:
             SpecError: everything that is wrong with the new one.
         """
-        overrides = [f"{key}={json.dumps(plain(value))}" for key, value in changes.items()]
+        for key in changes:
+            if "=" in key:
+                raise bad_spec("bad-argument", f"{key!r} is no key", hint="no key has =", key=key)
+        overrides = [f"{key}={json.dumps(plain(value, key))}" for key, value in changes.items()]
         return type(self).reader(
             self.to_yaml(), "<spec>", overrides, folder=self._source.folder, design=self._design
         )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+from inputdesign_cli.errors import SpecError, bad_spec
 
 Plain = Any
 """A number, a text, true, false or nothing, or lists and mappings of them: not checked by any model yet.
@@ -14,11 +17,37 @@ This is the one place where the type is open. A union that names itself would ha
 for the type of each step; the models do that once.
 """
 
+_DEEPEST = 50
 
-def plain(value: object) -> Plain:
-    """Mappings, lists and tuples, numbers and arrays of numpy as plain data."""
+
+def plain(value: object, where: str = "", depth: int = 0) -> Plain:
+    """Mappings, lists and tuples, numbers and arrays of numpy, names of files as plain data.
+
+    Args:
+        value: of any type.
+        where: its key.
+        depth: how many mappings and lists are around it.
+
+    Raises:
+        SpecError: `bad-argument` for what no file could hold.
+    """
+    if depth > _DEEPEST:
+        raise _no_data("holds itself, or is too deep", where)
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
     if isinstance(value, Mapping):
-        return {str(key): plain(part) for key, part in value.items()}
+        if len({str(key) for key in value}) < len(value):
+            raise _no_data("has two keys that are the same text", where)
+        return {str(k): plain(v, f"{where}.{k}" if where else str(k), depth + 1) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+        return [plain(part, f"{where}[{i}]", depth + 1) for i, part in enumerate(value)]
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    raise _no_data(f"is a {type(value).__name__}", where)
+
+
+def _no_data(message: str, where: str) -> SpecError:
+    hint = "a spec is made of mappings, lists, numbers, texts, true and false"
+    return bad_spec("bad-argument", f"{where or 'the spec'} {message}", hint=hint, key=where)

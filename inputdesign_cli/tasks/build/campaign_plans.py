@@ -240,7 +240,7 @@ class _Found:
     def planned(self) -> Planned:
         """With its record; zero where nothing needs to be applied."""
         done = self.done
-        made = fitting_record(self.request, done.question, done.design, done.experiment).record
+        made = fitting_record(self.request, done.question, done.design, done.experiment.samples).record
         silent = np.zeros((done.experiment.samples, done.experiment.inputs))
         record = silent if made is None else made.samples
         return Planned(record, len(record), _power(record), self.cost, self.kind, claim=self._claim)

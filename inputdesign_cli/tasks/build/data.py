@@ -47,6 +47,7 @@ class Data:
         files: the name of each file and its samples.
         time: (samples,), in the unit of the spec; counted from zero in a file that has none.
         notes: what was done to the record and what was seen in it.
+        means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
     """
 
     u: Array
@@ -56,6 +57,7 @@ class Data:
     lengths: tuple[int, ...]
     files: tuple[tuple[str, int], ...]
     notes: tuple[str, ...]
+    means: Array | None = None
 
 
 def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Data:
@@ -91,6 +93,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         tuple(length for part in parts for length in part.lengths),
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
+        np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
     )
 
 
@@ -177,6 +180,7 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         tuple(len(part.y) for part in segments),
         ((path.name, len(inputs)),),
         tuple(f"{path.name}: {note}" if named else note for note in told),
+        np.nanmean(signals.u[:, : units.inputs], axis=0),
     )
 
 

@@ -93,7 +93,9 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
     experiment = replace(raw, factor=factor)
 
     def topped_up(levels: Mapping[str, float]) -> Results:
-        prior = {"parameters": list(raw.model.names), "information": (factor @ factor.T).tolist()}
+        # With its values it counts for the estimate, too, when the spec is assessed with further records.
+        values = dict(zip(raw.model.names, raw.model.theta.tolist(), strict=True))
+        prior = {"parameters": values, "information": (factor @ factor.T).tolist()}
         task = build_convex(
             parse_spec(
                 spec.to_yaml(),

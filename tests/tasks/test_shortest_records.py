@@ -1,0 +1,131 @@
+"""The shortest record within limits on single samples: solving at shorter lengths finds none that meets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.compute.time_limit import OutOfTimeError
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.signal import Record
+from inputdesign_cli.tasks.record import Made
+from inputdesign_cli.tasks.shortest_record import ShortestRecord, Way
+
+# A lag whose spectrum alone would take five samples, and two inputs whose designs of stated length differ.
+LAG = """
+plant: {B: [0, 1.0], F: [1, -0.9]}
+noise: {variance: 0.1}
+accuracy: {model_error: {relative: 0.05}}
+spectrum: {type: fir, order: 4}
+limits: {amplitude: 1}
+signal: {candidates: 2}
+"""
+MOVES = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+accuracy: {model_error: {relative: 0.05, alpha: 2.45}}
+spectrum: {type: fir, order: 8}
+limits: {amplitude: 0.7, rate: 0.9}
+signal: {candidates: 2}
+"""
+TWO = """
+plant:
+  A: [1, -0.7]
+  B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]]
+noise: {variance: [[0.5, 0.1], [0.1, 0.4]]}
+accuracy: {model_error: {relative: 0.4}}
+spectrum: {type: fir, order: 3}
+limits: {amplitude: [1.0, 0.6]}
+signal: {candidates: 1}
+"""
+SHORTEST = "objective: shortest_experiment\n"
+
+
+def meets(text: str, samples: int, objective: str) -> bool:
+    """Whether `solve` at a stated length finds a record that meets the accuracy."""
+    stated = f"{text}experiment: {{samples: {samples}}}\nobjective: {objective}\n"
+    try:
+        signal = solve(parse_spec(stated)).result["signal"]
+    except IdesignError:
+        return False
+    return signal["worst_ratio"] <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("text", "objectives"),
+    [(LAG, ["least_cost", "best_accuracy"]), (MOVES, ["best_accuracy"]), (TWO, ["least_cost"])],
+    ids=["lag", "moves", "two inputs"],
+)
+def test_no_shorter_stated_length_meets_the_accuracy(text, objectives):
+    found = solve(parse_spec(text + SHORTEST)).result
+    samples = found["signal"]["samples"]
+    assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
+    assert samples > found["samples"]
+    for objective in objectives:
+        shorter = {int(samples * share) for share in (0.9, 0.96)} - {samples}
+        assert not [length for length in shorter if meets(text, length, objective)]
+
+
+@dataclass
+class Ways:
+    """Ways whose records meet from a length on, with information in proportion to it; what was tried."""
+
+    enough: Sequence[int]
+    until: int = 1000
+    tried: list[tuple[int, int]] = field(default_factory=list)
+
+    def record(self, number: int, samples: int) -> Record:
+        enough = self.enough[number]
+        ratio = float(np.sqrt(enough / samples))
+        return Record(np.zeros((samples, 1)), "binary", ratio, met=samples >= enough)
+
+    def way(self, number: int) -> Way:
+        def made(samples: int) -> Made:
+            if len(self.tried) >= self.until:
+                raise OutOfTimeError([])
+            self.tried.append((number, samples))
+            return Made(self.record(number, samples), Mock(), Mock())
+
+        return made
+
+    def found(self, start: int, block: int = 1, longest: int = 10**6) -> int | None:
+        """The length that the search finds from `start` on, where the first way misses."""
+        ways = [self.way(number) for number in range(len(self.enough))]
+        made = ShortestRecord(ways, block, longest).search([self.record(0, start)])
+        return None if made is None or made.record is None else len(made.record.samples)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    enough=st.lists(st.integers(20, 20_000), min_size=1, max_size=4),
+    start=st.integers(2, 19),
+    block=st.sampled_from([1, 4, 10]),
+)
+def test_the_length_is_that_of_the_best_way_to_one_per_cent(enough, start, block):
+    ways = Ways(enough)
+    start = block * max(start // block, 1)
+    if start >= min(enough):
+        return
+    found = ways.found(start, block)
+    assert found is not None
+    assert min(enough) <= found <= min(enough) * 1.011 + block
+    assert found % block == 0
+    lengths = {samples for _, samples in ways.tried}
+    assert len(lengths) <= 24
+    assert len(ways.tried) <= len(lengths) * len(enough)
+
+
+def test_a_search_ends_at_the_longest_record_and_with_its_time():
+    assert Ways([5000]).found(100, longest=4000) is None
+    assert Ways([4000]).found(100, longest=4000) == 4000
+    assert Ways([950]).found(100, longest=900) is None
+    with pytest.raises(OutOfTimeError):
+        Ways([5000], until=1).found(100)
+    cut = Ways([5000], until=4)
+    found = cut.found(4)
+    assert found is not None
+    assert found >= 5000
