@@ -91,13 +91,12 @@ class Demands:
             for requirement in listed
         )
 
-    def are_of(
-        self, required: Sequence[Requirement], side: Sequence[Requirement], others: Sequence[Scenario]
-    ) -> bool:
-        """Whether just this is asked of the nominal plant, and the rest of the same other plants."""
+    def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
+        """Whether just this is asked of the same nominal plant, and the rest of the same other plants."""
         nominal, *known = self.scenarios
         same = len(known) == len(others) and all(map(operator.is_, known, others))
-        return same and nominal.requirements is required and nominal.side is side
+        alike = nominal.requirements is asked.requirements and nominal.side is asked.side
+        return same and alike and nominal.experiment is asked.experiment
 
     @property
     def criterion(self) -> Criterion | None:

@@ -84,9 +84,10 @@ class Problem:
         """What is required at all S plants, the nominal one first."""
         if self._before:  # with what has been seen of them
             return self._before[0].demands
-        if self.seen is not None and self.seen.are_of(self.requirements, self.side, self.others):
+        asked = Scenario(self.experiment, self.requirements, self.side)
+        if self.seen is not None and self.seen.are_of(asked, self.others):
             return self.seen
-        return Demands((Scenario(self.experiment, self.requirements, self.side), *self.others))
+        return Demands((asked, *self.others))
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:

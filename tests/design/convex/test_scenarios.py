@@ -180,3 +180,12 @@ def test_the_certificate_of_the_worst_cost_holds_for_random_spectra():
         x = np.correlate(taps, taps, mode="full")[12:]
         worth = np.sum(certificate.weights * (problem.informations(x) - problem.baselines))
         assert max(cost.at(x) for cost in problem.costs) >= worth * (1 - 1e-9)
+
+
+def test_what_was_seen_belongs_to_the_plants_that_it_was_seen_of(first_order):
+    """A problem at another plant, or with other requirements, starts to look anew."""
+    problem = solve_design(question(first_order), tolerance=1e-6).problem
+    assert problem.on(LinesBasis.anywhere(0.0, np.pi, 1)).demands is problem.demands
+    elsewhere = dataclasses.replace(problem, experiment=problem.experiment.whitened(1.0))
+    assert elsewhere.scenarios[0].experiment is elsewhere.experiment
+    assert problem.with_requirements(lambda _: ()).scenarios[0].requirements == ()
