@@ -14,9 +14,11 @@ _SYNONYMS = {
     "numerator": ("num",),
     "denominator": ("den",),
     "variance": ("lambda", "sigma2"),
-    "s": ("sec", "second", "seconds"),
-    "min": ("minute", "minutes"),
-    "h": ("hour", "hours"),
+    "s": ("sec", "secs", "second", "seconds"),
+    "ms": ("msec", "milliseconds"),
+    "us": ("\u00b5s", "usec", "microseconds"),
+    "min": ("mins", "minute", "minutes"),
+    "h": ("hr", "hrs", "hour", "hours"),
     "d": ("day", "days"),
     "optimised": ("optimized",),
     "filtered_noise": ("gaussian",),
@@ -55,11 +57,16 @@ def choices(known: Sequence[str]) -> str:
     return known[0] if len(known) == 1 else ", ".join(known[:-1]) + " or " + known[-1]
 
 
+def synonym(word: str, known: Iterable[str]) -> str | None:
+    """The known word of which this one is another name."""
+    return next((ours for ours in known if word in _SYNONYMS.get(ours, ())), None)
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word that was probably meant, if there is one."""
     known = list(known)
-    if synonym := next((ours for ours in known if word in _SYNONYMS.get(ours, ())), None):
-        return synonym
+    if ours := synonym(word, known):
+        return ours
     lower = {k.lower(): k for k in known}
     flat = word[:80].lower().replace("-", "_").replace(" ", "_")
     near = difflib.get_close_matches(flat, lower, n=1, cutoff=0.6)

@@ -24,12 +24,14 @@ from inputdesign_cli.specification.models.fields import (
     Positive,
     SemidefiniteMatrix,
     StablePerOutput,
+    Time,
     Variance,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.specification.models.section import TAG, Section, tag
 from inputdesign_cli.specification.models.shapes import with_paths
+from inputdesign_cli.specification.models.units import FRACTION
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import count
 
@@ -75,6 +77,16 @@ class NoiseShape(Section):
         return (self.variance or 1.0) * np.eye(outputs)
 
     @property
+    def coefficients(self) -> tuple[str, ...]:
+        """The names of the coefficients of C and D."""
+        return tuple(
+            f"{letter}{power}{'' if depth(rows) == 1 else f'[{place[0] + 1}]'}"
+            for letter, rows in (("c", self.C), ("d", self.D))
+            for place, polynomial in with_paths(rows)
+            for power in range(1, len(polynomial))
+        )
+
+    @property
     def held(self) -> tuple[bool, ...]:
         """Of each D, whether all of its coefficients are known."""
         known, single = self.known or (), depth(self.D) == 1
@@ -109,7 +121,7 @@ class Noise(NoiseShape):
 class SimulationNoise(NoiseShape):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
-    relative_std: Positive | None = Field(
+    relative_std: Annotated[Positive, FRACTION] | None = Field(
         default=None, description="Standard deviation as a fraction of the smallest output rms."
     )
 
@@ -168,7 +180,7 @@ class Experiment(Section):
     """How the data will be collected."""
 
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
-    duration: Positive | None = Field(
+    duration: Time | None = Field(
         default=None, description="In place of samples: how long it lasts, in time_unit.", examples=[3600]
     )
     controller: Controller | None = Field(

@@ -166,7 +166,7 @@ def response_results(
     notes = _notes(terms, plan, result)
     if notes:
         result["notes"] = notes
-    table, drawn = signal_curves(request, units, plan.record)
+    signals, drawn = signal_curves(request, units, terms.experiment, plan.record)
     matrices = _matrices(plan.powers)
     spectrum = {units.frequency_header: terms.frequency, **hermitian_columns(matrices, "power")}
     deviations, curves = _deviations(terms, plan)
@@ -176,7 +176,7 @@ def response_results(
         result,
         terms.header.resolved_spec,
         units.time_unit,
-        {"deviations": Table(deviations), "spectrum": Table(spectrum), "signal": table},
+        {"deviations": Table(deviations), "spectrum": Table(spectrum), **signals},
         {
             "deviations": curves,
             "spectrum": SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True),
