@@ -24,6 +24,26 @@ _SYNONYMS = {
     "filtered_noise": ("gaussian",),
 }
 
+# Ways of sampling that other programs have.
+_OTHER_SAMPLING = {
+    *(
+        "foh",
+        "first_order_hold",
+        "linear",
+        "tustin",
+        "bilinear",
+        "trapezoidal",
+        "prewarp",
+        "matched",
+        "impulse",
+    ),
+    *("euler", "forward", "backward", "backward_diff"),
+}
+_IN_SAMPLES = (
+    " (an input that is held between samples, as converters do), or write what is sampled otherwise as "
+    "polynomials in q^-1"
+)
+
 
 def describe(value: object) -> str:
     """A value in words: "the number 5", "a list"."""
@@ -76,5 +96,11 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 def unknown_word(value: object, known: Sequence[str]) -> tuple[str, str]:
     """Message and hint for a value that is none of the known words."""
     message = f"{{key}} must be {choices(known)}, not {describe(value)}"
-    near = nearest(value, known) if isinstance(value, str) else None
+    word = value if isinstance(value, str) else ""
+    if "zoh" in known and word.lower() in _OTHER_SAMPLING:
+        supported = choices([f"sample: {method}" for method in known])
+        return message, f"{word} is not supported: write {supported}{_IN_SAMPLES if len(known) == 1 else ''}"
+    near = nearest(word, known)
+    if near is None and len(known) == 1:
+        return message, f"write {known[0]}"
     return message, f'did you mean "{near}"?' if near else ""
