@@ -10,7 +10,14 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all, log_axes
+from inputdesign_cli.figures.style import (
+    GREY,
+    frequency_axis,
+    legend_above,
+    legend_over_all,
+    log_axes,
+    lowered,
+)
 from inputdesign_cli.runs.results import Array
 
 
@@ -71,7 +78,7 @@ def draw_panels(
         longest = max(longest, plot(axes, panel), key=len)
         log_axes(axes, "x")
         axes.set_xlim(float(panel.frequency.min()), float(panel.frequency.max()))
-        axes.set_title(f"$G_{{{i + 1}{j + 1}}}$ {panel.names}".strip(), loc="left", color=GREY)
+        axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
     for i, j in product(range(rows), range(columns)):
         if (i, j) not in places:
             grid[i, j].set_axis_off()

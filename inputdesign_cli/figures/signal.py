@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLUE, DASHED, GREY, LOWERED, ORANGE
+from inputdesign_cli.figures.style import BLUE, DASHED, GREY, ORANGE, lowered
 from inputdesign_cli.runs.curves import SignalCurves
 from inputdesign_cli.runs.results import Array
 
@@ -24,7 +24,7 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
     grid = page.subplots(len(channels), 2, sharey="row", squeeze=False, width_ratios=[5, 1])
     for (name, values), (record, histogram) in zip(channels, grid, strict=True):
         _draw_record(record, curves.time[:shown], values[:shown])
-        label, symbol = curves.labels.get(name, ""), f"{name[0]}{name[1:].translate(LOWERED)}(t)"
+        label, symbol = curves.labels.get(name, ""), f"{name[0]}{lowered(name[1:])}(t)"
         nameless = not label or label.startswith("(")  # a unit alone
         record.set_ylabel(f"{symbol} {label}".strip() if nameless else label)
         _draw_histogram(histogram, values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -34,7 +35,7 @@ PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
 
-LOWERED = str.maketrans("ur0123456789", "ᵤᵣ₀₁₂₃₄₅₆₇₈₉")
+_LOWERED = str.maketrans("ur0123456789", "ᵤᵣ₀₁₂₃₄₅₆₇₈₉")
 _RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 _RC: dict[Any, Any] = {
@@ -50,8 +51,16 @@ _RC: dict[Any, Any] = {
     "lines.linewidth": 1.6,
     "legend.frameon": False,
     "legend.fontsize": 9.0,
-    "mathtext.fontset": "dejavusans",
+    # Names and units are the user's: no $ begins a formula, and ours are plain text too.
+    "text.parse_math": False,
 }
+
+
+def lowered(*indices: str | int) -> str:
+    """Indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
+    texts = [str(index) for index in indices]
+    apart = "," if len(texts) > 1 and any(len(text) > 1 for text in texts) else ""
+    return apart.join(texts).translate(_LOWERED)
 
 
 class _LogTicks(LogFormatterSciNotation):
@@ -71,7 +80,9 @@ def rendered(paint: Callable[[Figure], object], file_type: FileType = "png") -> 
     """
     narrow = file_type == "svg"
     buffer = io.BytesIO()
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(_RC), warnings.catch_warnings():
+        # A box stands for a letter of the user's that the font lacks; tables and pages have it.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
         canvas = FigureCanvasAgg(painted(paint, NARROW if narrow else SIZE))
         if narrow:
             # Without a date and with ids that do not change, the same figure is the same file.

@@ -18,10 +18,10 @@ LOG_FROM = 10.0
 _LOG_KEYS_FROM = 100.0
 _DECADES_IN_FULL = 3.0
 _NAMES = {
-    "experiment.samples": "number of samples $N$",
+    "experiment.samples": "number of samples N",
     "spectrum.order": "order of the FIR spectrum",
-    "accuracy.mean_squared_error.neglected_norm": r"bound $\alpha$ on the neglected parameters",
-    "accuracy.mean_squared_error.target": r"mean squared error $\gamma$ that is admitted",
+    "accuracy.mean_squared_error.neglected_norm": "bound α on the neglected parameters",
+    "accuracy.mean_squared_error.target": "mean squared error γ that is admitted",
 }
 
 

@@ -58,7 +58,7 @@ def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
 def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
     """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
     plot = partial(_bands, runs=curves.runs)
-    draw_panels(page, curves.panels, plot, time_unit, magnitude=r"$|\hat{G} - G_0|$", title=curves.name)
+    draw_panels(page, curves.panels, plot, time_unit, magnitude="|Ĝ − G₀|", title=curves.name)
 
 
 def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
@@ -96,7 +96,7 @@ def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
         axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
         if name in curves.theory:
             axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
-    axes.set_xlabel(r"loss of a run, $\sqrt{\Sigma_t |y - y_0|^2}$ (solid: mean of the runs, dashed: theory)")
+    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²) (solid: mean of the runs, dashed: theory)")
     axes.set_ylabel("share of the runs (%)")
     axes.set_xlim(0.0, top)
     legend_above(axes, handles)

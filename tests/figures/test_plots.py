@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.runs.curves import (
@@ -174,7 +175,7 @@ def test_the_spectrum_beside_the_white_level(page):
 
 def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
     panels = page(CURVES["bounds of entries"]).axes
-    assert [axes.get_title(loc="left") for axes in panels] == ["", "$G_{12}$", "$G_{21}$", ""]
+    assert [axes.get_title(loc="left") for axes in panels] == ["", "G₁₂", "G₂₁", ""]
     np.testing.assert_array_equal(lines_by_label(panels[1])["r_adm"].get_ydata(), 0.01 * G)
     assert "r_adm" not in lines_by_label(panels[2])
 
@@ -213,6 +214,26 @@ def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
     assert "first 1000 of 3000 samples, 4 of 6 channels" in record.get_title(loc="left")
     assert record.lines[0].get_xdata().size == 1000
     assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+NAMES = [r"$\frac{1}{0", "$$", "$x$", r"\$", "_u", "100 %", "{}", "日本", "a_b^c", "&<b>", "{0}", "°C"]
+
+
+def test_names_and_units_are_drawn_as_they_are():
+    """Warnings are errors in these tests: letters that the font lacks cause none."""
+    wave, long = np.sin(np.arange(50.0)), ["w" * 40, "$" * 40]
+    for names in (*zip(*[iter(NAMES)] * 4, strict=True), long):
+        labels = {f"u{i}": f"{name} ({name})" for i, name in enumerate(names)}
+        assert draw(SignalCurves(T[:50], dict.fromkeys(labels, wave), labels=labels))
+    for name in (NAMES[0], NAMES[7], *long):
+        assert draw(FitCurves(T, (replace(FIT, label=name),) * 2), "s", "svg")
+    assert draw(bound(BoundPanel(W, 0.008 * G, G, names=" → ".join(long))))
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_no_text_of_a_figure_is_a_formula(name, page):
+    texts = [text for text in page(CURVES[name]).findobj(Text) if text.get_text()]
+    assert not [text.get_text() for text in texts if text.get_parse_math() or "$" in text.get_text()]
 
 
 @pytest.mark.parametrize("name", CURVES)
