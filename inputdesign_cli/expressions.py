@@ -7,6 +7,7 @@ differentiation through the tree: every step carries its value and its slope in 
 from __future__ import annotations
 
 import ast
+import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -117,7 +118,8 @@ class Expression:
 
 def is_name(text: str) -> bool:
     """Whether a parameter may be called so."""
-    return text.isidentifier() and text.isascii() and text not in CONSTANTS and text not in FUNCTIONS
+    taken = text in CONSTANTS or text in FUNCTIONS or keyword.iskeyword(text)
+    return text.isidentifier() and text.isascii() and not taken
 
 
 def _check(tree: ast.expr) -> None:

@@ -81,6 +81,14 @@ def check_positive(admissible: AdmissibleError, grid: Array, *, unit: float, nam
 
     The message tells the frequency divided by `unit`, in the unit `named`.
     """
+    if not np.any(admissible.at(grid)):
+        raise bad_spec(
+            "admissible-not-positive",
+            "the admissible error is zero at every frequency: no model can be that good",
+            hint="an entry of G that is zero at the nominal parameters has no relative error: ask for an "
+            "absolute one, or for that of the norm (norm: frobenius)",
+            key="accuracy.model_error",
+        )
     w, negative = local_maxima(lambda w: -admissible.at(w), grid, -admissible.at(grid))
     scale = np.median(np.abs(admissible.at(grid)))
     bad = negative >= -1e-9 * scale

@@ -160,6 +160,7 @@ def largest_singular(half: NDArray[np.float64]) -> Array:
 
 
 def active_entries(model: Model, highest: float) -> list[Entry]:
-    """The entries of G that are not zero, probed below the frequency `highest`."""
-    probe = np.abs(model.plant_at(np.array([0.12, 0.39]) * highest)).max(axis=0)
-    return [(i, j) for i in range(model.outputs) for j in range(model.inputs) if probe[i, j] > 0.0]
+    """The entries of G that are not zero, or change with a parameter, probed below `highest`."""
+    w = np.array([0.12, 0.39]) * highest
+    there = np.any(model.plant_at(w), axis=0) | np.any(model.plant_gradient(w), axis=(0, 1))
+    return [(i, j) for i in range(model.outputs) for j in range(model.inputs) if there[i, j]]

@@ -140,6 +140,17 @@ class White:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
 
+def by_chance(point: Point, signals: NDArray[np.float64]) -> float:
+    """The probability that signals (m, N, p) explain so much of a right model's residuals; one of none."""
+    if not len(signals):
+        return 1.0
+    white = White.of(point)
+    columns = _scaled((signals @ white.root.T).reshape(len(signals), -1).T)
+    basis = _orthonormal(white.unexplained(columns))
+    statistic = float(np.sum((basis.T @ white.residuals) ** 2)) / white.variance
+    return float(scipy.special.chdtrc(basis.shape[1], statistic)) if basis.size else 1.0
+
+
 def score_tests(
     records: Records, point: Point, *, recent: int, feedback: bool = False, echoes: Echoes | None = None
 ) -> tuple[ScoreTest, ...]:

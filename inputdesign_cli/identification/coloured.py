@@ -62,10 +62,22 @@ class ColouredRecord(OverRecord):
         found = []
         raw = self.record.free_responses(self._of_plant(theta))
         for responses, (above, below) in zip(raw, model.inverse_filters, strict=True):
-            impulses = np.eye(max(above.size, below.size) - 1, responses.shape[1])
-            past = filtered([1.0], below, impulses) if len(impulses) else impulses
+            past = _impulses(max(above.size, below.size) - 1, below, len(self.y))
             found.append(np.concatenate([filtered(above, below, responses), past]))
         return tuple(found)
+
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): what the plant's own adds, filtered, and impulses through 1 / C."""
+        raw = self.record.past_noise(self._of_plant(theta))
+        return tuple(
+            np.concatenate(
+                [
+                    filtered(above, below, responses),
+                    _impulses(max(above.size, below.size) - 1 if below.size > 1 else 0, below, len(self.y)),
+                ]
+            )
+            for responses, (above, below) in zip(raw, self.structure.at(theta).inverse_filters, strict=True)
+        )
 
     def lateness(self, theta: Array) -> int:
         """That of the plant."""
@@ -247,6 +259,11 @@ class ColouredKind(OfModel):
 
 def _coloured(record: Callable[[Array, Array], Record], model: Coloured, u: Array, y: Array) -> Record:
     return ColouredRecord(record(u, y), model)
+
+
+def _impulses(number: int, below: Array, samples: int) -> NDArray[np.float64]:
+    """(number, samples), each a sample later, through 1 / C."""
+    return np.asarray(filtered([1.0], below, np.eye(number, samples)))
 
 
 def _of_plant(records: Records, plant: Kind) -> tuple[Record, ...]:

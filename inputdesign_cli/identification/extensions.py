@@ -18,9 +18,6 @@ from inputdesign_cli.plant.model import Listed
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 
-# A first coefficient of B that is zero would not count as free: this share of the largest is rounding.
-_NEARLY_ZERO = 1e-13
-
 
 @dataclass(frozen=True)
 class Extension:
@@ -126,10 +123,12 @@ def larger_polynomials(model: PolynomialModel, *, feedback: bool) -> Iterator[tu
         yield replace(model, B=_with(model.B, i, j, np.append(B, 0.0))), "coefficient in B"
         if model.A[0 if len(model.A) == 1 else i].size == 1 or F.size > 1:
             yield replace(model, F=_with(model.F, i, j, np.append(F, 0.0))), "pole in F"
-        first = int(np.flatnonzero(B)[0])
-        if first > int(feedback):
-            earlier = np.where(np.arange(B.size) == first - 1, _NEARLY_ZERO * np.max(np.abs(B)), B)
-            yield replace(model, B=_with(model.B, i, j, earlier)), "coefficient in B before the others"
+        if model.first[i][j] > int(feedback):
+            earlier = tuple(
+                tuple(first - ((o, n) == (i, j)) for n, first in enumerate(row))
+                for o, row in enumerate(model.first)
+            )
+            yield replace(model, delays=earlier), "coefficient in B before the others"
     for i, A in enumerate(model.A):
         if A.size > 1:
             yield replace(model, A=_longer(model.A, i)), "pole in A"

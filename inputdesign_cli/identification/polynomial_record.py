@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import errors_and_gradient
 from inputdesign_cli.identification.problem import PredictionErrors
+from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
@@ -49,10 +50,18 @@ class PolynomialRecord:
         """Of each output (m, N): a level, and as many impulses as the filters remember samples.
 
         (D/C)(A y - sum_j (B_j/F_j) u_j) is off by impulses through 1/C where y, u and the noise before the
-        record are missing, and by impulses through D/(C F_j) where the state of an entry is.
+        record are missing, by impulses through D/(C F_j) where the state of an entry is, and by a step
+        through it where F_j integrates the level of its input.
         """
         return tuple(
             _responses(row, theta[place], len(self.y))
+            for row, place in zip(self.structure.rows, self.structure.places, strict=True)
+        )
+
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): impulses through 1/C, if there is a C."""
+        return tuple(
+            _past_noise(row, theta[place], len(self.y))
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
         )
 
@@ -104,5 +113,12 @@ def _responses(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.floa
     impulses = np.eye(max([older + row.d, *(entry.f for entry in row.entries)], default=0), samples)
     through = [(p.D[0], p.C[0], np.ones((1, samples))), (np.ones(1), p.C[0], impulses[: older + row.d])]
     for entry, F in zip(row.entries, p.F, strict=True):
-        through.append((p.D[0], np.convolve(p.C[0], F[0]), impulses[: entry.f]))
+        integrates = without_integrators(F[0]).size < F[0].size
+        entering = [impulses[: entry.f], np.ones((int(integrates), samples))]
+        through.append((p.D[0], np.convolve(p.C[0], F[0]), np.concatenate(entering)))
     return np.concatenate([filtered(b, a, x) for b, a, x in through if len(x)])
+
+
+def _past_noise(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.float64]:
+    impulses = np.eye(max(row.c, row.a + row.d) if row.c else 0, samples)
+    return np.asarray(filtered(np.ones(1), row.polynomials(theta[None]).C[0], impulses))

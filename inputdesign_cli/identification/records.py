@@ -45,6 +45,12 @@ class Record(Protocol):
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): what m unknowns, its level and its past, add to its prediction errors."""
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): what noise before the record adds to its prediction errors from rest.
+
+        None where the predictor forgets it within its order.
+        """
+
     def lateness(self, theta: Array) -> int:
         """The samples after which inputs from before the record no longer act but through the states."""
 
@@ -159,6 +165,12 @@ class Records:
         if not self.free:
             return np.zeros((0, *self.y.shape))
         return self._placed([part.free_responses(theta) for part in self.parts])
+
+    def past_noise(self, theta: Array) -> NDArray[np.float64]:
+        """(m, N, p): what noise before the records adds to errors; none beside unknown starts, its part."""
+        if self.free:
+            return np.zeros((0, *self.y.shape))
+        return self._placed([part.past_noise(theta) for part in self.parts])
 
     def _placed(self, found: Sequence[tuple[NDArray[np.float64], ...]]) -> NDArray[np.float64]:
         """Responses of every part and output as (m, N, p)."""

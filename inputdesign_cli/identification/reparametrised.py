@@ -55,6 +55,10 @@ class ReparametrisedRecord(OverRecord):
         """Of each output (m, N): what an unknown start adds."""
         return self.record.free_responses(self.parametrisation.at(theta).coefficients)
 
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """That at the coefficients."""
+        return self.record.past_noise(self.parametrisation.at(theta).coefficients)
+
     def lateness(self, theta: Array) -> int:
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)
@@ -72,8 +76,7 @@ class ReparametrisedRecord(OverRecord):
     @property
     def in_starts(self) -> NDArray[np.int64]:
         """Those that move a coefficient on which the free responses depend."""
-        rows = self.parametrisation.jacobian[self.record.in_starts]
-        return np.flatnonzero(np.any(rows != 0.0, axis=0))
+        return np.flatnonzero(np.any(self.parametrisation.moves[self.record.in_starts], axis=0))
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p), see `Record`."""
@@ -86,17 +89,30 @@ class ReparametrisedRecord(OverRecord):
         return self.record.whitened(self.parametrisation.at(theta).coefficients, signals)
 
     def stabilised(self, theta: Array) -> Array:
-        """theta, moved towards the nominal parameters until its predictor is stable."""
-        home, share = self.parametrisation.theta, 1.0
-        for _ in range(_HALVINGS):
-            point = home + share * (theta - home)
-            coefficients = self.parametrisation.at(point).coefficients
-            if np.all(np.isfinite(coefficients)) and np.array_equal(
-                self.record.stabilised(coefficients), coefficients
-            ):
-                return point
-            share *= 0.5
-        return home.copy()
+        """theta; where its predictor is not stable, the nominal parameters moved there as far as it is.
+
+        One after the other, so that one which has reached its end, as a dead time of zero, holds no other.
+        """
+        if self._is_stable(theta):
+            return theta.copy()
+        point = self.parametrisation.theta.copy()
+        for index in range(theta.size):
+            home, share = point[index], 1.0
+            for _ in range(_HALVINGS):
+                point[index] = home + share * (theta[index] - home)
+                if self._is_stable(point):
+                    break
+                share *= 0.5
+            else:
+                point[index] = home
+        return point
+
+    def _is_stable(self, theta: Array) -> bool:
+        coefficients = self.parametrisation.at(theta).coefficients
+        return bool(
+            np.all(np.isfinite(coefficients))
+            and np.array_equal(self.record.stabilised(coefficients), coefficients)
+        )
 
 
 @dataclass(frozen=True)
@@ -124,7 +140,7 @@ class ReparametrisedKind(OfModel):
     @cached_property
     def _moved(self) -> NDArray[np.bool_]:
         """(K, k): which parameter moves which coefficient."""
-        return np.asarray(self.model.parametrisation.jacobian != 0.0)
+        return self.model.parametrisation.moves
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:
         """Those of the coefficients, by the chain rule."""
@@ -138,9 +154,7 @@ class ReparametrisedKind(OfModel):
             return lambda errors: sum((w * through(errors) for w, through in parts if w), 0.0 * errors)
 
         moved = [index for index, _ in of_all]
-        return tuple(
-            (j, chained(j)) for j in np.flatnonzero(np.any(here.jacobian[moved] != 0.0, axis=0)).tolist()
-        )
+        return tuple((j, chained(j)) for j in np.flatnonzero(np.any(self._moved[moved], axis=0)).tolist())
 
     def own(self) -> Array:
         """(p,): as many parameters as there are, shared by the outputs as the coefficients are."""

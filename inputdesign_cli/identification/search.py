@@ -9,6 +9,7 @@ import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.adequacy import by_chance
 from inputdesign_cli.identification.gauss_newton import best_run, minimise
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
@@ -17,6 +18,10 @@ from inputdesign_cli.plant.polynomial import Array
 
 # A record that begins at rest is taken for one that does not with this probability.
 _MISTAKEN = 0.01
+# Noise before the record matters where residuals show it with a smaller probability, or where this share of
+# the power that it leaves comes after the first tenth.
+_SILENT = 0.1
+_REMEMBERED = 0.1
 # Above this probability nothing is searched for.
 _UNLIKELY = 0.2
 # Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
@@ -123,6 +128,21 @@ def _unit(size: int, index: int) -> NDArray[np.bool_]:
     return np.arange(size) == index
 
 
+def _noise_before(records: Records, point: Point) -> bool:
+    """Whether noise before the records matters to residuals from rest."""
+    found = records.past_noise(point.theta)
+    power = np.concatenate(
+        [
+            np.sum(part**2, axis=(0, 2)) * (np.arange(length) > 0.1 * length)
+            for part, length in zip(
+                np.split(found, np.cumsum(records.lengths)[:-1], axis=1), records.lengths, strict=True
+            )
+        ]
+    )
+    late = float(np.sum(power)) > _REMEMBERED * float(np.sum(found**2))
+    return late or by_chance(point, found) < _SILENT
+
+
 def from_rest_or_free(
     records: Records,
     deviations: Records,
@@ -132,7 +152,8 @@ def from_rest_or_free(
     """The search from rest, unless unknown starts explain what it leaves better than chance.
 
     The likelihood ratio of the two is N p log(cost / cost), chi-squared with as many degrees of freedom as
-    there are unknowns.
+    there are unknowns. Noise never rests: where its zeros remember what was before the record, the start is
+    free as well.
 
     Args:
         records: from rest.
@@ -157,6 +178,7 @@ def from_rest_or_free(
         return at_rest
     late = deviations.lateness(at_rest.point.theta)
     late += _SPARE if late else 0
+    noisy = _noise_before(records, at_rest.point)
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
     unknowns = near.near.directions.shape[1]
@@ -169,7 +191,7 @@ def from_rest_or_free(
 
     # What one step promises is about what the search would find.
     step = np.linalg.lstsq(near.hessian, near.slope, rcond=1e-12)[0]
-    if probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
+    if not noisy and probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
         return at_rest
     begun = begun_free(at_rest.point.theta, late)
-    return begun if probability(begun.point.cost) < _MISTAKEN else at_rest
+    return begun if noisy or probability(begun.point.cost) < _MISTAKEN else at_rest

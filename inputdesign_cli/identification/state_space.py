@@ -23,6 +23,8 @@ from inputdesign_cli.plant.polynomial import Array
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
 _MARGIN = 1e-9
 _STEP = 1e-6
+# A pole this near to one integrates.
+_INTEGRATES = 1e-6
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class StateSpaceRecord:
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): what levels of the outputs and the states at the start add.
 
+        Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
         Inputs before the record that come late by the dead time move the states, sample by sample, along the
         directions in which inputs do; what they do at once, through D, is not counted.
         """
@@ -86,17 +89,23 @@ class StateSpaceRecord:
         closed = A - m.K @ m.C
         pushes = np.eye(n) if n <= 2 * model.inputs else np.concatenate([early, later], axis=1).T
         late = min(self.late, len(self.y) - 1)
-        size = n + p + late * len(pushes)
-        x, level = np.zeros((size, n)), np.zeros((size, p))
-        x[:n], level[n : n + p] = np.eye(n), np.eye(p)
+        steady = n if np.any(np.abs(model.poles - 1.0) < _INTEGRATES) else 0
+        size = n + p + late * len(pushes) + steady
+        x, level, driven = np.zeros((size, n)), np.zeros((size, p)), np.zeros((size, n))
+        x[:n], level[n : n + p], driven[size - steady :] = np.eye(n), np.eye(p), np.eye(steady, n)
         found = np.empty((size, len(self.y), p))
         for t in range(len(self.y)):
             if 0 < t <= late:
                 first = n + p + (t - 1) * len(pushes)
                 x[first : first + len(pushes)] += pushes
             found[:, t] = level - x @ m.C.T
-            x = x @ closed.T + level @ m.K.T
+            x = x @ closed.T + level @ m.K.T + driven
         return tuple(found[:, :, i] for i in range(p))
+
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """Of each output (m, N): what states at the start add, if past noise moves them."""
+        states = self.structure.order if np.any(self.structure.at(theta).matrices.K) else 0
+        return tuple(responses[:states] for responses in self.free_responses(theta))
 
     def lateness(self, theta: Array) -> int:
         """The dead time in samples, one that is begun counted whole."""

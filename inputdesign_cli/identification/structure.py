@@ -40,9 +40,9 @@ class Structure:
         rows, places = [], []
         for i in range(model.outputs):
             entries = tuple(
-                InputOrders(j, B.size - 1, F.size - 1, int(np.flatnonzero(B)[0]))
+                InputOrders(j, B.size - 1, F.size - 1, model.first[i][j])
                 for j, (B, F) in enumerate(zip(model.B[i], model.F[i], strict=True))
-                if np.any(B)
+                if (i, j) in model.active
             )
             a, c, d = (rows_[0 if len(rows_) == 1 else i].size - 1 for rows_ in (model.A, model.C, model.D))
             row = OutputOrders(a, c, d, entries)

@@ -20,6 +20,8 @@ _LEAST_DECAY = 0.01
 # A mode that decays or oscillates this many radians within a sample is a static gain to rounding.
 _FASTEST = 1e4
 _STEP = 1e-6
+# Of a sample: a dead time of zero would be none, and no parameter.
+_LEAST_DELAY = 1e-12
 
 
 def late_samples(dead_time: float, sample_time: float) -> int:
@@ -66,19 +68,25 @@ class TransferRecord:
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): a level, and what the states of its entries do without an input.
 
-        Inputs before the record that come late by a dead time move the states, sample by sample, as if from
-        anywhere.
+        A level of the input, of which an integrator makes a ramp, is unknown as well. Inputs before the
+        record that come late by a dead time move the states, sample by sample, as if from anywhere.
         """
         model, samples = self.structure.at(theta), self.samples
         found = [[np.ones((1, samples))] for _ in range(model.outputs)]
         for i, j in model.active:
             entry = self._entry(model, i, j)
-            impulses = np.eye(min(entry.order + self.late, samples), samples)
-            if not len(impulses):
+            entering = np.eye(min(entry.order + self.late, samples), samples)
+            if integrators(model.denominator[i][j]):
+                entering = np.concatenate([entering, np.ones((1, samples))])
+            if not len(entering):
                 continue
             poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else [1.0]
-            found[i].append(filtered([1.0], poles, impulses))
+            found[i].append(filtered([1.0], poles, entering))
         return tuple(np.concatenate(parts) for parts in found)
+
+    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
+        """None: the noise is white."""
+        return (np.zeros((0, self.samples)),) * self.structure.outputs
 
     def lateness(self, theta: Array) -> int:
         """The longest dead time, in samples, those that are begun counted whole."""
@@ -132,13 +140,13 @@ class TransferRecord:
     def stabilised(self, theta: Array) -> Array:
         """theta with poles in the right half plane mirrored, and kept off its edge and off infinity.
 
-        Poles that are exactly zero are those of integrators, and stay. Dead times are kept between
-        zero and the length of the record.
+        Poles that are exactly zero are those of integrators, and stay. Dead times are kept
+        positive and below the length of the record.
         """
         step = self.intersample.sample_time
         slowest, fastest = _LEAST_DECAY / (self.samples * step), _FASTEST / step
         out = theta.copy()
-        out[self._late] = np.clip(out[self._late], 0.0, (self.samples - 1) * step)
+        out[self._late] = np.clip(out[self._late], _LEAST_DELAY * step, (self.samples - 1) * step)
         for every in self._denominators:
             columns = every[integrators(np.append(theta[every], 1.0)) :]
             poles = polynomial_roots(np.append(theta[columns], 1.0))

@@ -73,6 +73,11 @@ class Coloured(Parametrised):
         """(p, p) of e."""
         return self.plant.covariance
 
+    @property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        return self.plant.at_once
+
     @cached_property
     def own_parameters(self) -> tuple[Parameter, ...]:
         """The coefficients of C and D."""

@@ -6,6 +6,7 @@ monic, and dG/dtau = -s G.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,11 +30,11 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     Parameters are named after their power of s: `b0[2,1]` is the constant of the numerator of entry
     (2, 1), `a1[2,1]` the coefficient of s in its denominator, `delay[2,1]` its dead time; `a1` and `delay`
-    of common ones, and without brackets for one input and output. Numerator coefficients are free up to the
-    highest nonzero one; an entry that is zero has no parameters.
+    of common ones, and without brackets for one input and output. All coefficients of a numerator are free;
+    an entry that is absent has none.
 
     `delay` holds a list of one dead time for each entry, an empty list for entries that act at once; it is
-    empty where all do.
+    empty where all do. `entries` are those that are not absent; None where zeros of the numerators say so.
     """
 
     numerator: Rows
@@ -42,6 +43,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
     common: bool = False
     delay: Rows = ()
     common_delay: bool = False
+    entries: tuple[tuple[int, int], ...] | None = None
 
     continuous = True
 
@@ -55,19 +57,25 @@ class ContinuousModel(Parametrised, WhiteNoise):
         common: bool = False,
         delay: Rows = (),
         common_delay: bool = False,
+        degrees: Sequence[Sequence[int]] | None = None,
     ) -> ContinuousModel:
-        """From any coefficients: trailing zeros dropped, each entry divided by its leading coefficient."""
+        """From any coefficients: each entry divided by the leading coefficient of its denominator.
+
+        Args:
+            degrees: (p, r), of the numerators, -1 of those that are absent; without them trailing zeros are
+                dropped.
+        """
+        tops = [[np.asarray(t, dtype=float) for t in row] for row in numerator]
+        sizes = (
+            [[np.trim_zeros(t, "b").size - 1 for t in row] for row in tops] if degrees is None else degrees
+        )
         low, high = [], []
-        for top, bottom in zip(numerator, denominator, strict=True):
+        for top, size, bottom in zip(tops, sizes, denominator, strict=True):
             bottoms = [np.trim_zeros(np.asarray(b, dtype=float), "b") for b in bottom]
             high.append(tuple(b / b[-1] for b in bottoms))
-            low.append(
-                tuple(
-                    np.trim_zeros(np.asarray(t, dtype=float), "b") / b[-1] if np.any(t) else np.zeros(1)
-                    for t, b in zip(top, bottoms, strict=True)
-                )
-            )
-        return cls(tuple(low), tuple(high), covariance, common, delay, common_delay)
+            low.append(tuple(t[: max(n, 0) + 1] / b[-1] for t, n, b in zip(top, size, bottoms, strict=True)))
+        entries = tuple((i, j) for i, row in enumerate(sizes) for j, size in enumerate(row) if size >= 0)
+        return cls(tuple(low), tuple(high), covariance, common, delay, common_delay, entries)
 
     @property
     def outputs(self) -> int:
@@ -81,9 +89,20 @@ class ContinuousModel(Parametrised, WhiteNoise):
 
     @cached_property
     def active(self) -> tuple[tuple[int, int], ...]:
-        """The entries that are not zero."""
+        """The entries that are not absent."""
+        if self.entries is not None:
+            return self.entries
         places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
         return tuple((i, j) for i, j in places if np.any(self.numerator[i][j]))
+
+    @cached_property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        found = np.zeros((self.outputs, self.inputs), dtype=bool)
+        for i, j in self.active:
+            equal = self.numerator[i][j].size == self.denominator[i][j].size
+            found[i, j] = equal and self.dead_time(i, j) == 0.0
+        return found
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -131,6 +150,7 @@ class ContinuousModel(Parametrised, WhiteNoise):
             denominator=below,
             delay=delay,
             covariance=self.covariance if covariance is None else covariance,
+            entries=self.active,
         )
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:

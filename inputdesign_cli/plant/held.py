@@ -274,7 +274,7 @@ class HeldEntry:
                 markov[k], state = self.gain[:n] @ state, self.transition[:n, :n] @ state
             above[self.lag + late : self.lag + late + n + 1] += np.convolve(below, markov)[: n + 1]
         above[self.direct_lag : self.direct_lag + n + 1] += self.direct * below
-        return np.trim_zeros(above, "b"), below
+        return (np.trim_zeros(above, "b") if np.any(above) else above[:1]), below
 
     @cached_property
     def roots(self) -> ComplexArray:
@@ -303,4 +303,5 @@ def polynomial_roots(coefficients: Array) -> ComplexArray:
     """Roots of a polynomial with ascending coefficients, those at zero exact."""
     trimmed = np.trim_zeros(coefficients)
     zeros = np.trim_zeros(coefficients, "b").size - trimmed.size
-    return np.concatenate([np.zeros(zeros), ascending.polyroots(trimmed)]).astype(complex)
+    others = ascending.polyroots(trimmed) if trimmed.size else trimmed
+    return np.concatenate([np.zeros(zeros), others]).astype(complex)

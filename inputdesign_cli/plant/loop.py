@@ -160,8 +160,8 @@ class Loop(ABC):
         Raises:
             SpecError: `algebraic-loop`.
         """
-        acting, p = self.instantaneous != 0.0, self.model.outputs
-        if np.any(acting[:p, p:] @ acting[p:, :p]):
+        answers = self.instantaneous[self.model.outputs :, : self.model.outputs] != 0.0
+        if np.any(self.model.at_once @ answers):
             raise bad_spec(
                 "algebraic-loop",
                 "plant and controller both act without delay: u(t) answers the noise of y(t) and changes "

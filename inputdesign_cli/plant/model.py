@@ -47,6 +47,10 @@ class Model(Protocol):
         """(p, p) of e; in continuous time of the noise on each of the N samples of the outputs."""
 
     @property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): the entries of G that may act without delay, whether or not they do at these parameters."""
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the k parameters."""
 

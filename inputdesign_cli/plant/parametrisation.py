@@ -67,6 +67,12 @@ class Parametrisation:
         """(K, k): of the coefficients in the free parameters."""
         return self._image[1]
 
+    @cached_property
+    def moves(self) -> NDArray[np.bool_]:
+        """(K, k): which coefficient is an expression in which free parameter, whatever its slope is here."""
+        listed = [[symbol in term.names for symbol in self.symbols] for term in self.terms]
+        return np.array(listed, dtype=bool).reshape(len(self.terms), len(self.symbols))[:, self.free]
+
     @property
     def undefined(self) -> str | None:
         """The first term that has no value or no derivative here; None where all have both."""

@@ -32,8 +32,12 @@ class PolynomialModel(Parametrised):
     """A_i y_i = sum_j (B_ij / F_ij) u_j + (C_i / D_i) e_i, e white with a full covariance (p, p).
 
     A, C and D hold one polynomial, common to all outputs with common parameters, or one an output. An
-    entry B_ij = 0 has no parameters. Otherwise the rules and names are those of `PolynomialModel`, with
-    output and input in brackets: `b1[2,1]`, `a1[2]`; common coefficients go without: `a1`.
+    entry B_ij that is absent has no parameters. Otherwise the rules and names are those of `PolynomialModel`,
+    with output and input in brackets: `b1[2,1]`, `a1[2]`; common coefficients go without: `a1`.
+
+    Attributes:
+        delays: (p, r), the power of the first coefficient of each B that is free, its length where the entry
+            is absent; None where zeros of B say so.
     """
 
     B: Rows
@@ -42,6 +46,7 @@ class PolynomialModel(Parametrised):
     C: tuple[Array, ...]
     D: tuple[Array, ...]
     covariance: Array
+    delays: tuple[tuple[int, ...], ...] | None = None
 
     continuous = False
 
@@ -87,9 +92,9 @@ class PolynomialModel(Parametrised):
         single = self.outputs == self.inputs == 1
         for i in range(self.outputs):
             for j in range(self.inputs):
-                if not np.any(self.B[i][j]):
+                if (i, j) not in self.active:
                     continue
-                first = int(np.flatnonzero(self.B[i][j])[0]) if letter == "b" else 1
+                first = self.first[i][j] if letter == "b" else 1
                 values = self.B[i][j] if letter == "b" else self.F[i][j]
                 label = entry_label(i, j, single=single)
                 found += [
@@ -100,9 +105,23 @@ class PolynomialModel(Parametrised):
 
     @cached_property
     def active(self) -> tuple[tuple[int, int], ...]:
-        """The entries (output, input) of G that are not zero."""
+        """The entries (output, input) of G that are not absent."""
         places = ((i, j) for i in range(self.outputs) for j in range(self.inputs))
-        return tuple((i, j) for i, j in places if np.any(self.B[i][j]))
+        return tuple((i, j) for i, j in places if self.first[i][j] < self.B[i][j].size)
+
+    @cached_property
+    def first(self) -> tuple[tuple[int, ...], ...]:
+        """(p, r): `delays`, also where zeros of B say them."""
+        if self.delays is not None:
+            return self.delays
+        return tuple(tuple(b.size - np.trim_zeros(b, "f").size for b in row) for row in self.B)
+
+    @cached_property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        return np.array(
+            [[(i, j) in self.active and not d for j, d in enumerate(row)] for i, row in enumerate(self.first)]
+        )
 
     @property
     def memory(self) -> float:
@@ -259,6 +278,7 @@ class PolynomialModel(Parametrised):
             tuple(rows["c"]),
             tuple(rows["d"]),
             self.covariance if covariance is None else covariance,
+            self.first,
         )
 
     def simulate(self, u: Array, e: Array, step: float) -> tuple[Array, Array]:
@@ -267,7 +287,7 @@ class PolynomialModel(Parametrised):
         for i, (a, c, d) in enumerate(zip(*map(self.per_output, (self.A, self.C, self.D)), strict=True)):
             v[..., i] = filtered(c, np.convolve(a, d), e[..., i])
             for j, (b, f) in enumerate(zip(self.B[i], self.F[i], strict=True)):
-                if np.any(b):
+                if (i, j) in self.active:
                     y[..., i] += filtered(b, np.convolve(a, f), u[..., j])
         return y, v
 
@@ -275,7 +295,7 @@ class PolynomialModel(Parametrised):
     def stable_outputs(self) -> tuple[bool, ...]:
         """Output by output, whether its row of G is stable."""
         rows = [
-            [a, *(f for b, f in zip(bs, fs, strict=True) if np.any(b))]
-            for a, bs, fs in zip(self.per_output(self.A), self.B, self.F, strict=True)
+            [a, *(f for j, f in enumerate(fs) if (i, j) in self.active)]
+            for i, (a, fs) in enumerate(zip(self.per_output(self.A), self.F, strict=True))
         ]
         return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)

@@ -68,6 +68,11 @@ class Reparametrised:
         return self.coefficients.covariance
 
     @property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        return self.coefficients.at_once
+
+    @property
     def names(self) -> tuple[str, ...]:
         """(k,): what the free parameters are called."""
         return self.parametrisation.names
@@ -86,12 +91,12 @@ class Reparametrised:
     @cached_property
     def in_plant(self) -> NDArray[np.bool_]:
         """(k,): the parameters on which G depends."""
-        return np.any(self.parametrisation.jacobian[self.coefficients.in_plant] != 0.0, axis=0)
+        return np.any(self.parametrisation.moves[self.coefficients.in_plant], axis=0)
 
     @cached_property
     def dead_times(self) -> NDArray[np.bool_]:
         """(k,): the parameters that move a dead time."""
-        return np.any(self.parametrisation.jacobian[self.coefficients.dead_times] != 0.0, axis=0)
+        return np.any(self.parametrisation.moves[self.coefficients.dead_times], axis=0)
 
     @property
     def memory(self) -> float:
@@ -116,8 +121,7 @@ class Reparametrised:
         """(k,): what the coefficients of `bends` follow from; all, unless these are affine."""
         if not self.parametrisation.affine:
             return np.ones(len(self.names), dtype=bool)
-        rows = self.parametrisation.jacobian[self.coefficients.bends(output, input)]
-        return np.any(rows != 0.0, axis=0)
+        return np.any(self.parametrisation.moves[self.coefficients.bends(output, input)], axis=0)
 
     def entry_fraction(self, output: int, input: int, w: ArrayLike) -> Fraction:
         """One entry of G as numerator over denominator, gradients (n, k)."""

@@ -45,6 +45,14 @@ class SampledModel(Parametrised, WhiteNoise):
         """(p, p) of e."""
         return self.continuous_plant.covariance
 
+    @cached_property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        found = np.zeros((self.outputs, self.inputs), dtype=bool)
+        for place, entry in self._entries.items():
+            found[place] = entry.biproper and not entry.direct_lag
+        return found
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The k parameters, those of the plant in s."""
@@ -80,14 +88,15 @@ class SampledModel(Parametrised, WhiteNoise):
         Of simple ones there are as many as the rank of their gains; no feedback moves the others, for they
         take no part in G.
         """
-        gains = np.zeros((self.outputs, self.inputs))
+        gains, simple = np.zeros((self.outputs, self.inputs)), 0
         for (i, j), entry in self._entries.items():
             count = integrators(entry.denominator)
             if count > 1:
                 return 0
             gains[i, j] = count and entry.numerator[0] / entry.denominator[1]
+            simple += count
         scale = max(float(np.abs(gains).max(initial=0.0)), 1e-300)
-        return int(np.count_nonzero(gains) - np.linalg.matrix_rank(gains / scale))
+        return simple - int(np.linalg.matrix_rank(gains / scale))
 
     @cached_property
     def realisation(self) -> StateSpace:

@@ -93,6 +93,15 @@ class StateSpaceModel(Parametrised):
             found.append(Parameter(letter, 0, ((i, j),), label, float(value)))
         return tuple(found)
 
+    @cached_property
+    def at_once(self) -> NDArray[np.bool_]:
+        """(p, r): see `Model`."""
+        found = self.matrices.D != 0.0
+        for letter, i, j in self.entries:
+            if letter == "D":
+                found[i, j] = True
+        return found & (self.direct_lag == 0)
+
     @property
     def _table(self) -> dict[str, Array]:
         m = self.matrices

@@ -97,3 +97,52 @@ def test_what_many_starts_hide_is_still_found():
     for seed in range(3):
         u, y, lengths = segmented(20, seed, colour=0.6)
         assert identify(model, u, y, lengths=lengths, rest=False).failed
+
+
+@pytest.mark.parametrize(("zero", "free"), [(0.97, True), (0.5, False)])
+def test_a_start_is_free_where_zeros_of_the_noise_remember_what_was_before(zero, free):
+    """A plant at rest; of noise that was there before, 0.97^20 = 0.54 is left after a tenth of the record."""
+    rng = np.random.default_rng(8)
+    model = PolynomialModel.single([0, 0.6], F=[1, -0.7], C=[1, -zero])
+    u, e = rng.standard_normal(200), rng.standard_normal(500)
+    y = scipy.signal.lfilter([0, 0.6], [1, -0.7], u) + scipy.signal.lfilter([1, -zero], [1], e)[300:]
+    assert identify(model, u[:, None], y[:, None]).free == free
+
+
+TANKS = {
+    "in s": "{parameters: {k: 0.03}, continuous: {numerator: [k], denominator: [1, 0]}, sample: zoh}",
+    "in s, states": ("{parameters: {k: 0.03}, state_space: {A: [[0]], B: [[k]], C: [[1]]}, sample: zoh}"),
+    "in q": "{B: [0, 0.03], F: [1, -1], known: [f1]}",
+}
+
+
+@pytest.mark.parametrize("plant", TANKS.values(), ids=TANKS.keys())
+def test_an_integrating_plant_may_be_measured_about_any_level(plant):
+    """y = 30 + 0.05 (sum of u - 50.2) + e: least squares of y on the sum of u, a level and a ramp."""
+    rng = np.random.default_rng(4)
+    u = 50.0 + np.repeat(rng.choice([-5.0, 5.0], 40), 10)
+    total, time = np.concatenate([[0.0], np.cumsum(u - 50.2)[:-1]]), np.arange(400.0)
+    y = 30.0 + 0.05 * total + 0.2 * rng.standard_normal(400)
+    regressors = np.column_stack([total, np.ones(400), time])
+    expected = np.linalg.lstsq(regressors, y, rcond=None)[0][0]
+    spread = np.sqrt(0.04 * np.linalg.inv(regressors.T @ regressors)[0, 0])
+    model = build_model(parse_spec(f"plant: {plant}\nnoise: {{variance: 0.04}}\n", design=False))
+    found = identify(model, u[:, None], y[:, None])
+    assert found.free
+    assert found.theta[0] == pytest.approx(expected, rel=1e-6)
+    assert np.sqrt(found.covariance[0, 0]) == pytest.approx(spread, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
+    rng = np.random.default_rng(seed)
+    pole = np.exp(-0.1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 100), 4)
+    y = scipy.signal.lfilter([0, 2.0 * (1.0 - pole)], [1, -pole], u) + 0.1 * rng.standard_normal(400)
+    found = [identify(model_of(words, 2), u[:, None], y[:, None], rest=True) for words in (IN_S, IN_STATES)]
+    for one in found:
+        assert one.converged
+        assert one.theta[:2] == pytest.approx(
+            [2.0, 10.0], abs=5.0 * np.sqrt(np.diag(one.covariance)[:2]).max()
+        )
+        assert 0.0 <= one.theta[2] < 5.0 * np.sqrt(one.covariance[2, 2])

@@ -29,7 +29,7 @@ def test_collinear_gradients_are_no_lack_of_excitation(seed):
 
 def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     u, y = simulated(SLOW, 400, np.random.default_rng(0))
-    found = identify(SLOW, u[0], y[0])
+    found = identify(SLOW, u[0], y[0], rest=True)
     theta = [float(x) for x in found.theta]
     B, C, F = [0.0, 0.0, 0.0, *theta[:3]], [1.0, theta[3]], [1.0, *theta[4:]]
     filtered = scipy.signal.lfilter([1], np.convolve(C, F), u[0, :, 0])

@@ -148,7 +148,7 @@ BAD = [
     ("unused-parameter", "{parameters: {K: 1, T: 2}, continuous: {numerator: [K], denominator: [3, 1]}}"),
     (
         "unused-parameter",
-        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*z, K], denominator: [3, 1]}}",
+        "{parameters: {K: 1, z: 0}, continuous: {numerator: [K*(1 + z**2)], denominator: [3, 1]}}",
     ),
     ("undefined-expression", "{parameters: {K: 0}, continuous: {numerator: [1/K], denominator: [3, 1]}}"),
     ("bad-expression", "{parameters: {K: 1}, continuous: {numerator: ['K^2'], denominator: [3, 1]}}"),
@@ -175,3 +175,36 @@ def test_accuracy_of_what_is_known_is_refused():
     rest = REST.replace("model_error: {relative: 0.1, band: [0.05, 1.5]}", "standard_deviation: {gain: 0.1}")
     with pytest.raises(SpecError, match="gain is known"):
         build_task(spec_of("{continuous: {gain: 1, time_constant: 1}, sample: zoh, known: [gain]}", rest))
+
+
+COLOURED = (
+    "{noise: {C: [1, 0.5], D: [1, -0.3], variance: 0.04, known: %s}, experiment: {samples: 300}, plant: "
+    "{parameters: {%s: 2.1, T: 18}, continuous: {gain: %s, time_constant: T}, sample: zoh, known: %s}}"
+)
+
+
+@pytest.mark.parametrize("name", ["c1", "d1"])
+def test_a_parameter_is_not_called_as_a_coefficient_of_the_noise(name):
+    with pytest.raises(SpecError) as caught:
+        parse_spec((COLOURED % ("[]", name, name, "[]")).replace(", known: []", ""), design=False)
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == ("bad-name", f"plant.parameters.{name}")
+
+
+@pytest.mark.parametrize("name", ["c2", "d0", "noise_0", "noise_1", "b0", "delay", "a1", "e0", "p0", "gain"])
+@pytest.mark.parametrize(
+    ("of_plant", "of_noise"), [((), ()), ((), ("c1",)), (("T",), ("d1",)), (("name",), ())]
+)
+def test_what_is_known_of_one_fixes_nothing_of_the_other(name, of_plant, of_noise):
+    """Whatever the parameter is called, the information is that of a plant with K in its place."""
+
+    def model_of(called):
+        listed = json.dumps([called if one == "name" else one for one in of_plant])
+        # An empty list is no list of names.
+        text = COLOURED % (json.dumps(of_noise), called, called, listed)
+        return build_model(parse_spec(text.replace(", known: []", ""), design=False))
+
+    w, found, other = np.array([0.1, 1.0]), model_of(name), model_of("K")
+    assert found.names == tuple(name if one == "K" else one for one in other.names)
+    np.testing.assert_array_equal(found.input_gradient(w), other.input_gradient(w))
+    np.testing.assert_array_equal(found.noise_gradient(w), other.noise_gradient(w))

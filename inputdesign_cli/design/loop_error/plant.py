@@ -20,7 +20,9 @@ class MatrixPlant(PolynomialModel):
     @classmethod
     def of(cls, channels: PolynomialModel) -> MatrixPlant:
         """The same plant."""
-        return cls(channels.B, channels.A, channels.F, channels.C, channels.D, channels.covariance)
+        return cls(
+            channels.B, channels.A, channels.F, channels.C, channels.D, channels.covariance, channels.first
+        )
 
     def disturbance_at(self, w: ArrayLike) -> ComplexArray:
         """Phi_v (K, n, n), the spectrum of the noise at the outputs."""

@@ -180,7 +180,8 @@ def embedded(model: PolynomialModel, inputs: int, moving: Sequence[int]) -> Poly
         return model
     B = [[np.zeros(1)] * inputs for _ in range(model.outputs)]
     F = [[np.ones(1)] * inputs for _ in range(model.outputs)]
+    delays = [[1] * inputs for _ in range(model.outputs)]  # of what is absent, the length of B
     for i in range(model.outputs):
         for k, j in enumerate(moving):
-            B[i][j], F[i][j] = model.B[i][k], model.F[i][k]
-    return replace(model, B=tuple(map(tuple, B)), F=tuple(map(tuple, F)))
+            B[i][j], F[i][j], delays[i][j] = model.B[i][k], model.F[i][k], model.first[i][k]
+    return replace(model, B=tuple(map(tuple, B)), F=tuple(map(tuple, F)), delays=tuple(map(tuple, delays)))

@@ -17,6 +17,7 @@ CHECKS: tuple[tuple[Check, tuple[str, ...]], ...] = (
     (loop.controller_fits, ("plant", "experiment.controller")),
     (loop.kept_loop_fits, ("plant", "accuracy.model_error.sensitivity")),
     (plant.noise_fits, ("plant", "noise")),
+    (plant.names_differ, ("plant.parameters", "noise")),
     (plant.true_system_fits, ("plant", "simulation.plant", "experiment.controller")),
     (plant.true_noise_fits, ("plant", "simulation.noise")),
     (plant.spectrum_fits, ("plant", "spectrum.type")),

@@ -56,6 +56,17 @@ def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagn
         yield PathDiagnostic("wrong-shape", message, hint, (*path, "variance"))
 
 
+def names_differ(spec: Spec) -> Iterator[PathDiagnostic]:
+    """No parameter of the plant is called as a coefficient of the noise is."""
+    if spec.plant.kind == "regression":
+        return
+    for name in spec.plant.parameters or ():
+        if name in spec.noise.coefficients:
+            message = f"{name} is the name of a coefficient of the noise as well"
+            hint = f"call the parameter otherwise, such as {name}_plant"
+            yield PathDiagnostic("bad-name", message, hint, ("plant", "parameters", name), at_key=True)
+
+
 def spectrum_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """Moments are for regressions, a FIR spectrum for discrete time."""
     spectrum = spec.spectrum

@@ -75,6 +75,16 @@ class NoiseShape(Section):
         return (self.variance or 1.0) * np.eye(outputs)
 
     @property
+    def coefficients(self) -> tuple[str, ...]:
+        """The names of the coefficients of C and D."""
+        return tuple(
+            f"{letter}{power}{'' if depth(rows) == 1 else f'[{place[0] + 1}]'}"
+            for letter, rows in (("c", self.C), ("d", self.D))
+            for place, polynomial in with_paths(rows)
+            for power in range(1, len(polynomial))
+        )
+
+    @property
     def held(self) -> tuple[bool, ...]:
         """Of each D, whether all of its coefficients are known."""
         known, single = self.known or (), depth(self.D) == 1

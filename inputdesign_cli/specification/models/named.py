@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +88,7 @@ def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
             yield PathDiagnostic(
                 "bad-name",
                 f"{clip(name)} is no name of a parameter",
-                "a name is a letter, then letters, digits and _; functions and pi are taken",
+                "a name is a letter, then letters, digits and _; functions, pi and lambda are taken",
                 ("parameters", name),
                 at_key=True,
             )
@@ -157,6 +157,22 @@ def texts_in(value: Plain) -> list[str]:
     listed = value if isinstance(value, list | tuple) else ()
     parts = [v for k, v in value.items() if k not in _WORDS] if isinstance(value, dict) else listed
     return [found for part in parts for found in texts_in(part)]
+
+
+def present(written: Plain) -> bool:
+    """Whether a coefficient exists: an expression in parameters, whatever its value, or what is not zero.
+
+    What a plant consists of is read off its words, so that it does not change with the nominal parameters.
+    """
+    if not isinstance(written, str):
+        return bool(written)
+    expression = Expression(written)
+    return bool(expression.names) or expression.at((), np.zeros(0))[0] != 0.0
+
+
+def leading(written: Sequence[Plain]) -> int:
+    """The place of the first coefficient that exists; the length where none does."""
+    return next((i for i, one in enumerate(written) if present(one)), len(written))
 
 
 def text(value: Plain) -> Plain:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
@@ -25,6 +26,7 @@ from inputdesign_cli.specification.models.named import (
     Texts,
     check_names,
     check_used,
+    leading,
     matrix,
     text,
     texts_in,
@@ -97,7 +99,13 @@ class NamedPlant(Section):
                 raise carry(*found)
         made = handler(numbers)
         made._written = dict(data)
+        if wrong := tuple(made.check_written()):
+            raise carry(*wrong)
         return made
+
+    def check_written(self) -> Iterator[PathDiagnostic]:
+        """What is wrong with what its coefficients are, whatever the values of its parameters."""
+        return iter(())
 
     @property
     def written(self) -> dict[str, Plain]:
@@ -132,8 +140,7 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """B is not zero, and A and F have its shape."""
-        yield from check_gain(self.B_matrix, "B")
+        """A and F have the shape of B."""
         yield from check_per_output(self.A, self.outputs, "A")
         if self.F is not None and (depth(self.F) != depth(self.B) or size_of(self.F) != size_of(self.B)):
             yield PathDiagnostic(
@@ -142,6 +149,17 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
                 "write [1] where an entry has no poles",
                 ("F",),
             )
+
+    def check_written(self) -> Iterator[PathDiagnostic]:
+        """Some coefficient of B exists."""
+        yield from check_gain(as_matrix(self.written["B"]), "B")
+
+    @property
+    def delays(self) -> tuple[tuple[int, ...], ...]:
+        """Entry by entry the power of the first coefficient of B that exists; its length where none does."""
+        return tuple(
+            tuple(leading(entry) for entry in row) for row in as_matrix(self.written.get("B", self.B))
+        )
 
     @property
     def outputs(self) -> int:
@@ -209,14 +227,21 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
             return self.continuous.own_parameters()
         return super().named_parameters
 
+    def check_written(self) -> Iterator[PathDiagnostic]:
+        """Some coefficient of a numerator exists, and none that does makes an entry improper."""
+        yield from self.continuous.check_present(self.stated_texts)
+
     @property
     def texts(self) -> CoefficientTexts:
         """The coefficients as expressions in the named parameters."""
-        if self.parameters is not None:
-            return self.continuous.texts(self.written["continuous"])
-        if self.continuous.kind == "process":
+        if self.parameters is None and self.continuous.kind == "process":
             return self.continuous.texts()
-        raise ValueError("the coefficients of this plant are its parameters")
+        return self.stated_texts
+
+    @cached_property
+    def stated_texts(self) -> CoefficientTexts:
+        """The coefficients as they are written."""
+        return self.continuous.texts(self.written["continuous"])
 
 
 class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):

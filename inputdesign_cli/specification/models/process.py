@@ -14,8 +14,8 @@ from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTexts,
     NamedParameter,
-    TextMatrix,
     Texts,
+    present,
     text,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
@@ -50,7 +50,7 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """It is of first or of second order, some gain is not zero, and all shapes are that of the gain."""
+        """It is of first or of second order, and all shapes are that of the gain."""
         if not self.stated("damping"):
             yield from self.exactly_one("time_constant", "natural_frequency")
         for one, other in (("damping", "natural_frequency"), ("natural_frequency", "damping")):
@@ -59,13 +59,17 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 yield PathDiagnostic("missing-key", message, f"add {other}", keys=(other,))
         if self.stated("time_constant") and self.stated("damping"):
             yield from self.at_most_one("time_constant", "damping")
-        if not any(any(row) for row in self.grid("gain")):
-            yield PathDiagnostic("zero-polynomial", "{key} is zero: the input has no effect", "", ("gain",))
         size = [len(row) for row in self.grid("gain")]
         for name in self.stated(*QUANTITIES):
             if [len(row) for row in self.grid(name)] != size or len(set(size)) > 1:
                 hint = "write one number, or rows (outputs) of columns (inputs), for all of them alike"
                 yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
+
+    def check_present(self, texts: CoefficientTexts) -> Iterator[PathDiagnostic]:
+        """Some gain exists."""
+        if not any(present(one) for row in texts.numerator for entry in row for one in entry):
+            message = "{key} is zero: the input has no effect"
+            yield PathDiagnostic("zero-polynomial", message, "", ("continuous", "gain"))
 
     def grid(self, name: str) -> Grid:
         """A quantity as rows of columns."""
@@ -75,12 +79,12 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     @property
     def numerator_matrix(self) -> PolynomialMatrix:
         """The numerators as rows of columns, descending in s."""
-        return self._numbers(self.texts().numerator)
+        return self._numbers(0)
 
     @property
     def denominator_matrix(self) -> PolynomialMatrix:
         """The denominators in the same form."""
-        return self._numbers(self.texts().denominator)
+        return self._numbers(1)
 
     @property
     def common(self) -> bool:
@@ -126,13 +130,20 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
             value = written[name]
             return f"({text(value[i][j] if isinstance(value, list | tuple) else value)})"
 
+        def there(name: str, i: int, j: int) -> bool:
+            if not self.stated(name):
+                return False
+            return self.grid(name)[i][j] != 0.0 if written is None else present(of(name, i, j))
+
         above, below, delays = [], [], []
         for i, row in enumerate(self.grid("gain")):
-            entries = [self._entry(of, i, j) if gain else (("0.0",), ("1.0",)) for j, gain in enumerate(row)]
-            above.append(tuple(top for top, _ in entries))
+            entries = [self._entry(of, i, j) for j in range(len(row))]
+            above.append(
+                tuple(top if there("gain", i, j) else ("0.0",) for j, (top, _) in enumerate(entries))
+            )
             below.append(tuple(bottom for _, bottom in entries))
             delays.append(
-                tuple(of("dead_time", i, j) if self._delayed(i, j) else "0.0" for j in range(len(row)))
+                tuple(of("dead_time", i, j) if there("dead_time", i, j) else "0.0" for j in range(len(row)))
             )
         return CoefficientTexts(tuple(above), tuple(below), tuple(delays))
 
@@ -143,17 +154,18 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
         gain, damping, w = (of(name, i, j) for name in ("gain", "damping", "natural_frequency"))
         return (f"{gain}*{w}**2",), ("1.0", f"2*{damping}*{w}", f"{w}**2")
 
-    def _delayed(self, i: int, j: int) -> bool:
-        """Whether an entry has a dead time, as a number that is not zero."""
-        return self.delays[i][j] != 0.0
+    def _numbers(self, part: int) -> PolynomialMatrix:
+        """The numerators (0) or the denominators (1) at the values of the quantities."""
 
-    def _numbers(self, rows: TextMatrix) -> PolynomialMatrix:
-        """The values of such expressions."""
-        own = self.own_parameters()
-        symbols, values = [one.symbol for one in own], np.array([one.value for one in own])
+        def of(name: str, i: int, j: int) -> str:
+            return f"({self.grid(name)[i][j]!r})"
+
         return tuple(
-            tuple(tuple(Expression(term).at(symbols, values)[0] for term in entry) for entry in row)
-            for row in rows
+            tuple(
+                tuple(Expression(term).at((), np.zeros(0))[0] for term in self._entry(of, i, j)[part])
+                for j in range(len(row))
+            )
+            for i, row in enumerate(self.grid("gain"))
         )
 
     @staticmethod

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from inputdesign_cli.specification.models.named import TextMatrix, Texts, leading, present
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import Polynomial, product
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
@@ -17,8 +18,7 @@ def as_matrix(value: tuple) -> PolynomialMatrix:
 
 
 def check_shapes(numerator: tuple, denominator: tuple) -> Iterator[PathDiagnostic]:
-    """The numerator is not zero, and denominators for each entry have its shape."""
-    yield from check_gain(as_matrix(numerator), "numerator")
+    """Denominators for each entry have the shape of the numerator."""
     if depth(denominator) == 3 and size_of(denominator) != size_of(as_matrix(numerator)):
         yield PathDiagnostic(
             "wrong-shape",
@@ -60,9 +60,9 @@ def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDia
         yield PathDiagnostic("wrong-shape", message, hint, path)
 
 
-def check_gain(entries: PolynomialMatrix, name: str) -> Iterator[PathDiagnostic]:
-    """Some entry is not zero."""
-    if not any(any(p) for row in entries for p in row):
+def check_gain(entries: TextMatrix | PolynomialMatrix, name: str) -> Iterator[PathDiagnostic]:
+    """Some coefficient exists."""
+    if not any(present(one) for row in entries for p in row for one in p):
         message = "all coefficients of {key} are zero: the input has no effect"
         yield PathDiagnostic("zero-polynomial", message, path=(name,))
 
@@ -82,11 +82,10 @@ def shape_words(value: tuple) -> str:
 
 
 def check_proper(
-    numerator: Polynomial, denominator: Polynomial, *path: str | int
+    numerator: Texts | Polynomial, denominator: Texts | Polynomial, *path: str | int
 ) -> Iterator[PathDiagnostic]:
     """In s, descending: the degree of the numerator is at most that of the denominator."""
-    zeros = next((i for i, c in enumerate(numerator) if c), len(numerator) - 1)
-    above, below = len(numerator) - zeros - 1, len(denominator) - 1
+    above, below = len(numerator) - leading(numerator) - 1, len(denominator) - 1
     if above > below:
         yield PathDiagnostic(
             "improper-transfer",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
@@ -20,6 +21,7 @@ from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
     CoefficientTexts,
     TextMatrix,
+    Texts,
     matrix,
     product_of,
     text,
@@ -36,6 +38,7 @@ from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.shapes import (
     as_matrix,
     check_each,
+    check_gain,
     check_proper,
     check_shapes,
     denominators_of,
@@ -97,7 +100,8 @@ class _Matrix(Section):
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """Numerator and denominator have one shape."""
+        """Some coefficient is not zero, and numerator and denominator have one shape."""
+        yield from check_gain(as_matrix(self.numerator), "numerator")
         yield from check_shapes(self.numerator, self.denominator)
 
     @property
@@ -122,6 +126,15 @@ class DiscreteMatrix(_Matrix, family="transfer", phrase="a transfer matrix in q^
     )
 
 
+def check_each_proper(
+    above: Sequence[Sequence[Texts | Polynomial]], below: Sequence[Sequence[Texts | Polynomial]], levels: int
+) -> Iterator[PathDiagnostic]:
+    """Every entry of a matrix in s is proper, whose numerator is written with so many levels of lists."""
+    for i, row in enumerate(above):
+        for j, entry in enumerate(row):
+            yield from check_proper(entry, below[i][j], "numerator", *((i, j) if levels == 3 else ()))
+
+
 class ContinuousMatrix(_Matrix):
     """A stable transfer matrix in s, coefficients in descending powers."""
 
@@ -130,19 +143,11 @@ class ContinuousMatrix(_Matrix):
         if shapes := list(super().check()):
             yield from shapes
             return
-        yield from check_each(self.denominator, self.check_poles, "denominator")
-        for i, row in enumerate(self.numerator_matrix):
-            for j, entry in enumerate(row):
-                where = (i, j) if depth(self.numerator) == 3 else ()
-                yield from check_proper(entry, self.denominator_matrix[i][j], "numerator", *where)
-
-    @staticmethod
-    def check_poles(denominator: Polynomial) -> PathDiagnostic | None:
-        """They lie in the open left half plane."""
-        return check_left_half_plane(denominator)
+        yield from check_each(self.denominator, check_left_half_plane, "denominator")
+        yield from check_each_proper(self.numerator_matrix, self.denominator_matrix, depth(self.numerator))
 
 
-class DelayedMatrix(ContinuousMatrix, family="continuous", phrase="a transfer matrix in s"):
+class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s"):
     """The same with dead times and integrators: those of a plant."""
 
     kind: ClassVar[Literal["rational"]] = "rational"
@@ -160,17 +165,21 @@ class DelayedMatrix(ContinuousMatrix, family="continuous", phrase="a transfer ma
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """As of every transfer matrix in s; dead times for each entry have its shape."""
-        yield from super().check()
+        """Numerator, denominator and dead times have one shape; poles lie on the left, or at zero."""
+        yield from check_shapes(self.numerator, self.denominator)
+        yield from check_each(self.denominator, check_no_growth_in_s, "denominator")
         sizes = [len(row) for row in self.delay] if isinstance(self.delay, tuple) else None
         if sizes is not None and sizes != [len(row) for row in self.numerator_matrix]:
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
 
-    @staticmethod
-    def check_poles(denominator: Polynomial) -> PathDiagnostic | None:
-        """They lie in the open left half plane, or at zero."""
-        return check_no_growth_in_s(denominator)
+    def check_present(self, texts: CoefficientTexts) -> Iterator[PathDiagnostic]:
+        """Some coefficient of the numerators exists, and every entry is proper."""
+        for found in (
+            *check_gain(texts.numerator, "numerator"),
+            *check_each_proper(texts.numerator, texts.denominator, depth(self.numerator)),
+        ):
+            yield replace(found, path=("continuous", *found.path))
 
     @property
     def common(self) -> bool:

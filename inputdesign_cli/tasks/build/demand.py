@@ -6,6 +6,7 @@ What a single key may ask for stands in `specification.models.sizes`.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
@@ -45,17 +46,30 @@ def check_model(spec: Spec, model: Model) -> None:
 def check_effects(spec: Spec, experiment: Experiment) -> None:
     """Whether every parameter of the plant leaves a trace in the samples, beyond the rounding of G.
 
+    One that is zero by nature has no size of its own: it must change something at all.
+
     Raises:
         SpecError: `without-effect`.
     """
     model, (lo, hi) = experiment.model, experiment.band
     w = np.union1d(np.linspace(lo, hi, _PROBES + 1)[1:-1], np.geomspace(max(lo, 1e-4 * hi), hi, _PROBES)[:-1])
     G, slope = np.abs(model.plant_at(w)), np.abs(model.plant_gradient(w))
-    share = np.max(slope / np.maximum(G, np.finfo(float).tiny)[:, None], axis=(0, 2, 3)) * np.abs(model.theta)
-    lost = model.in_plant & (model.theta != 0.0) & (share < _TRACE)
+    moved = slope * np.abs(model.theta)[:, None, None]
+    small = np.all((moved < _TRACE * G[:, None]) | (slope == 0.0), axis=(0, 2, 3)) & (model.theta != 0.0)
+    silent = ~np.any(slope, axis=(0, 2, 3)) & ~np.any(model.noise_gradient(w), axis=(0, 2, 3))
+    if np.any(model.in_plant & silent):
+        names = _names_of(model, model.in_plant & silent)
+        raise spec.complain(
+            "without-effect",
+            f"{names}: to change it by a little leaves G as it is at the nominal parameters, so that no data "
+            "tell it",
+            hint=f"choose nominal values at which G depends on it, or write plant.known: [{names}]",
+            key="plant",
+        )
+    lost = model.in_plant & small
     if not np.any(lost):
         return
-    names = ", ".join(name for name, gone in zip(model.names, lost, strict=True) if gone)
+    names = _names_of(model, lost)
     raise spec.complain(
         "without-effect",
         f"{names}: to change it by all of its value moves G by less than {_TRACE:g} of itself at every "
@@ -64,6 +78,10 @@ def check_effects(spec: Spec, experiment: Experiment) -> None:
         f"or write plant.known: [{names}]",
         key="plant",
     )
+
+
+def _names_of(model: Model, which: NDArray[np.bool_]) -> str:
+    return ", ".join(name for name, listed in zip(model.names, which, strict=True) if listed)
 
 
 def check_design(spec: Spec, experiment: Experiment, basis: Basis) -> None:

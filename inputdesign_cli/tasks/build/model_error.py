@@ -76,7 +76,7 @@ def build_model_errors(
 ) -> list[OnModelError]:
     """The bound on the model error, stated or of a loop, in raw coordinates.
 
-    One an entry of G that is not zero, or one of the norm; empty when it is not asked for.
+    One an entry of G that is not absent, or one of the norm; empty when it is not asked for.
 
     Args:
         nominal: where the experiment is on a scenario, the plant of the spec: r_adm may be that of the one or

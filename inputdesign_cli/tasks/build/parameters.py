@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,24 +13,26 @@ from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.named import leading, present
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
     """A list of one dead time for each entry that has one, empty lists for the others; empty if none has.
 
-    An entry has one where it is not zero, or an expression.
+    See `present`.
     """
-    values = plant.continuous.delays
-    texts = plant.texts.delay if plant.named_parameters else None
+    texts = plant.stated_texts.delay
     rows = tuple(
-        tuple(
-            np.array([value] if value or (texts and Expression(texts[i][j]).names) else [])
-            for j, value in enumerate(row)
-        )
-        for i, row in enumerate(values)
+        tuple(np.array([value] if present(texts[i][j]) else []) for j, value in enumerate(row))
+        for i, row in enumerate(plant.continuous.delays)
     )
     return rows if any(entry.size for row in rows for entry in row) else ()
+
+
+def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
+    """Of each numerator, -1 where the entry is absent; see `present`."""
+    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_texts.numerator]
 
 
 def reparametrised(
@@ -71,10 +74,12 @@ def _of_named(
     """The named parameters of the plant, and those of the noise as they are."""
     named = plant.named_parameters
     noise = [p for p in parameters if p.letter in "cd"]
-    symbols = {p.name: f"noise_{i}" for i, p in enumerate(noise)}
+    # No name of a parameter of the plant: those are in ASCII.
+    symbols = {p.name: f"\N{GREEK SMALL LETTER EPSILON}{i}" for i, p in enumerate(noise)}
     terms = [symbols[p.name] if p.letter in "cd" else _term(plant, p) for p in parameters]
     labels = (*(one.label for one in named), *symbols)
-    known = (*(plant.known or ()), *(spec.noise.known or ()))
+    fixed = [one.label in (plant.known or ()) for one in named]
+    fixed += [name in (spec.noise.known or ()) for name in symbols]
     made = Parametrisation(
         labels,
         (*(one.symbol for one in named), *symbols.values()),
@@ -90,9 +95,7 @@ def _of_named(
                 hint="look for a factor that is zero there, or a leading coefficient that vanishes",
                 key="plant.parameters",
             )
-    return Parametrisation(
-        made.labels, made.symbols, made.values, np.array([x not in known for x in labels]), made.terms
-    )
+    return replace(made, free=~np.array(fixed))
 
 
 def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> str:

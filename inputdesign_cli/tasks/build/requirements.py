@@ -163,7 +163,7 @@ def _target(
 
 
 def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementFactory]:
-    """`accuracy.weighted_variance` of every entry of G that is not zero."""
+    """`accuracy.weighted_variance` of every entry of G that is not absent."""
     stated, key = spec.accuracy.weighted_variance, "accuracy.weighted_variance"
     assert stated is not None
     weight = build_weight(spec, stated.weight, f"{key}.weight")

@@ -37,7 +37,7 @@ from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.demand import check_effects, check_model
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.integrators import on_finite_information
-from inputdesign_cli.tasks.build.parameters import delays_of, reparametrised
+from inputdesign_cli.tasks.build.parameters import degrees_of, delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.state_space import state_space_model
 from inputdesign_cli.tasks.build.tables import read_columns
@@ -66,6 +66,7 @@ def build_model(spec: Spec) -> Model:
                 common=matrix.common,
                 delay=delays_of(plant),
                 common_delay=matrix.common_delay,
+                degrees=degrees_of(plant),
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
             C, D = _rows(spec.noise.C), _rows(spec.noise.D)
@@ -104,6 +105,7 @@ def polynomial_model(
         C=_rows(noise.C),
         D=_rows(noise.D) if D is None else tuple(D),
         covariance=covariance,
+        delays=plant.delays,
     )
 
 

@@ -188,10 +188,6 @@ class _Scenarios:
         flaw = model.flaw
         if flaw is not None:
             raise _NoPlantError("not-a-plant", flaw)
-        if model.names != self._nominal.names:
-            raise _NoPlantError(
-                "not-a-plant", "a first coefficient of B is zero, which would be a known delay"
-            )
         lost = self._acting(self._nominal) & ~self._acting(model)
         if np.any(lost):
             output, input = np.argwhere(lost)[0] + 1

@@ -8,12 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.identification import Estimate, ResidualTest, ScoreTest
+from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
 from inputdesign_cli.tasks.result.rivals import rival_entries
+
+# A first residual beyond so many standard deviations is named.
+_SEEN_AT_ONCE = 3.0
 
 
 def identification_entry(estimate: Estimate) -> dict[str, Json]:
@@ -83,9 +87,14 @@ def _free_start(estimate: Estimate) -> list[str]:
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = estimate.first[which, output], np.sqrt(estimate.noise[output, output])
     records = "the record does" if len(estimate.first) == 1 else "the records do"
+    seen = (
+        f"a first residual of {first:.3g} where the noise has {noise:.3g}"
+        if np.max(ratio) > _SEEN_AT_ONCE
+        else "the first residuals together are larger than noise would make them"
+    )
     return [
-        f"{records} not begin at rest about zero (a first residual of {first:.3g} where the noise has "
-        f"{noise:.3g}): the level of every output and the state at the start were estimated along"
+        f"{records} not begin at rest about zero ({seen}): the level of every output and the state at the "
+        "start were estimated along"
     ]
 
 
@@ -100,7 +109,7 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
     at_the_edge = [
         letter
         for letter, polynomials in predictor.items()
-        if any(np.any(np.abs(roots_in_z(p)) > 1.0 - 1.0 / samples) for p in polynomials)
+        if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
     ]
     if at_the_edge:
         notes.append(

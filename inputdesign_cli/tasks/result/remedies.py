@@ -8,19 +8,26 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
-_LAG = "one more lag, denominator: [[T1, 1], [T2, 1]] with both in parameters,"
+_LAG = "one more lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
 def remedies_of(model: Model) -> dict[str, str]:
     """By what the tests find, `plant`, `noise` or `drift`, the keys to change."""
     blocks = blocks_of(model)
-    return {"plant": _of_plant(blocks["plant"]), **_of_noise(model, blocks)}
+    plant, known = _of_plant(blocks["plant"]), blocks["plant"].get("known")
+    if known:
+        plant = f"see whether what is known is right (plant.known: {', '.join(known)}; without it, it is "
+        plant += f"estimated), or {_of_plant(blocks['plant'])}"
+    return {"plant": plant, **_of_noise(model, blocks)}
 
 
 def _of_plant(plant: Mapping[str, Json]) -> str:
     stated = plant.get("continuous", {})
     if "gain" in stated:
-        return f"write plant.continuous with numerator: [K] and {_LAG} in place of gain and time_constant"
+        return (
+            "write plant.continuous with numerator: [K], denominator: [[T1, 1], [T2, 1]] and all three in "
+            "parameters, in place of gain and time_constant"
+        )
     if "state_space" in plant:
         return "give A, B and C of the state space one more state"
     if "parameters" not in plant:
