@@ -7,7 +7,7 @@ PYTHON = $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 py
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test slow fuzz lint golden bench docs papers clean
+.PHONY: help setup run test browser slow fuzz lint golden bench docs papers clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F '|' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -25,6 +25,11 @@ run: $(READY)  ## solve specs/first_order.yaml into runs/first_order
 
 test: $(READY)  ## the tests, but for the slow ones
 	$(PY) -m pytest -n auto --maxprocesses 4
+
+browser: $(READY)  ## the tests of pages in a real browser (Debian: apt-get install chromium)
+	$(PY) -m pip install --quiet --disable-pip-version-check -c .ci/constraints.txt -e '.[browser]'
+	@command -v chromium chromium-browser google-chrome >/dev/null || { echo "no Chromium was found" >&2; exit 1; }
+	$(PY) -m pytest -m browser
 
 slow: $(READY)  ## the slow tests: random plants, Monte Carlo
 	$(PY) -m pytest -m slow

@@ -23,6 +23,7 @@ ORDER = [
     {"tasks"},
     {"sweep", "campaign", "figures"},
     {"report"},
+    {"live"},
     {"cli", "__main__"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(ORDER) for room in rooms}

@@ -34,6 +34,10 @@ class AdmissibleError(Protocol):
     def knots(self) -> Array:
         """Frequencies at which r_adm may have a kink."""
 
+    @property
+    def kept(self) -> Sensitivity | None:
+        """The loop whose margins this keeps; None where it is about no loop."""
+
     def at(self, w: ArrayLike) -> Array:
         """r_adm (n,) at frequencies `w` (n,)."""
 
@@ -46,6 +50,7 @@ class Relative:
     fraction: float
     entry: tuple[int, int] | None = None
     knots = _NOWHERE
+    kept = None
 
     @cached_property
     def singularities(self) -> ComplexArray:
@@ -68,6 +73,7 @@ class Absolute:
 
     level: float
     knots = _NOWHERE
+    kept = None
     singularities = _NOWHERE.astype(complex)
 
     def at(self, w: ArrayLike) -> Array:
@@ -84,6 +90,7 @@ class Table:
 
     frequency: Array  # (n,) ascending, rad/sample
     value: Array  # (n,) positive
+    kept = None
     singularities = _NOWHERE.astype(complex)
 
     @property
@@ -113,6 +120,11 @@ class Sensitivity:
     weight: ScalarTransfer
     settings: Mapping[str, float] | None = None
     knots = _NOWHERE
+
+    @property
+    def kept(self) -> Sensitivity:
+        """Itself."""
+        return self
 
     def nominal(self, w: ArrayLike) -> Array:
         """The largest singular value of S (n,) with the nominal plant."""
@@ -152,6 +164,11 @@ class Weighted:
     weight: ScalarTransfer
 
     @property
+    def kept(self) -> Sensitivity | None:
+        """That of the error without the weight."""
+        return self.inner.kept
+
+    @property
     def knots(self) -> Array:
         """Frequencies at which r_adm may have a kink."""
         return self.inner.knots
@@ -176,6 +193,11 @@ class Floored:
     own: AdmissibleError
     nominal: AdmissibleError
     share: float
+
+    @property
+    def kept(self) -> Sensitivity | None:
+        """That of the scenario."""
+        return self.own.kept
 
     @cached_property
     def singularities(self) -> ComplexArray:

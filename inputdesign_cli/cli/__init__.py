@@ -23,6 +23,7 @@ from inputdesign_cli.cli.streams import prepare_signals, prepare_streams
 from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
+from inputdesign_cli.cli.watch import watch
 from inputdesign_cli.compute.threads import use_one_thread
 from inputdesign_cli.version import __version__
 
@@ -68,6 +69,7 @@ COMMANDS = (
     status,
     sweep,
     report,
+    watch,
     validate,
     check,
     signal,

@@ -14,6 +14,7 @@ from inputdesign_cli.cli.options import (
     DataFiles,
     DetrendWord,
     EstimateOutput,
+    FigureFormat,
     Figures,
     Json,
     Means,
@@ -66,6 +67,7 @@ def identify(
         ),
     ] = False,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -91,7 +93,7 @@ def identify(
             preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
             frequency_response=frequency_response,
         )
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def assess(
@@ -112,6 +114,7 @@ def assess(
     skip: Skip = 0,
     span: Span = "",
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -137,7 +140,14 @@ def assess(
             operating_point=levels(operating_point),
             preparation=preparation(columns, sample_time, time_unit, resample, detrend, skip, span),
         )
-    keep(assessment.results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(
+        assessment.results,
+        place,
+        figures=figures,
+        figure_format=figure_format,
+        json_output=json_output,
+        quiet=quiet,
+    )
     if assessment.verdict != "met":
         raise typer.Exit({"missed": EXIT_MISSED, "undecided": EXIT_UNDECIDED}[assessment.verdict])
 

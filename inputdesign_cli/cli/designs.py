@@ -11,6 +11,7 @@ import typer
 from inputdesign_cli.cli.options import (
     Confine,
     Fast,
+    FigureFormat,
     Figures,
     Json,
     KeepPartial,
@@ -47,6 +48,7 @@ def solve(
     keep_partial: KeepPartial = False,
     fast: Fast = False,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -60,11 +62,13 @@ def solve(
         overrides = [*(overrides or []), "solver.any_spectrum=false"]
     if not keep_partial:
         results, place = _results("solve", place, overrides, confine, quiet)
-        keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+        keep(
+            results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet
+        )
         return
     with stoppable() as stop, ending_early(stop) as came:
         results, place = _results("solve", place, overrides, confine, quiet)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
     if came:
         raise typer.Exit(128 + came[0])
 
@@ -77,6 +81,7 @@ def analyse(
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -87,7 +92,7 @@ def analyse(
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
     results, place = _results("analyse", place, overrides, confine, quiet)
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def simulate(
@@ -101,6 +106,7 @@ def simulate(
     cluster: ClusterAddress = None,
     worker_timeout: WorkerTimeout = None,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -114,7 +120,7 @@ def simulate(
     results, place = _results(
         "simulate", place, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
     )
-    keep(results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def _results(

@@ -13,6 +13,7 @@ from inputdesign_cli.cli.options import (
     DataFiles,
     DetrendWord,
     ExplorationOutput,
+    FigureFormat,
     Figures,
     Json,
     NoOutput,
@@ -47,6 +48,7 @@ def explore(
     overwrite: Overwrite = False,
     no_output: NoOutput = False,
     figures: Figures = True,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -66,7 +68,14 @@ def explore(
         model = None if validate is None else read_spec(validate, None, None, design=False)
         place = place.checked(model)
         found = tasks.explore(data, prepared, model=model)
-    keep(found.results, place, figures=figures, json_output=json_output, quiet=quiet)
+    keep(
+        found.results,
+        place,
+        figures=figures,
+        figure_format=figure_format,
+        json_output=json_output,
+        quiet=quiet,
+    )
     if not no_output and validate is None:
         from inputdesign_cli.report.render import report_text
         from inputdesign_cli.runs.record import PAGE

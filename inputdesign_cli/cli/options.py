@@ -164,3 +164,6 @@ Fast = Annotated[
 Figures = Annotated[
     bool, typer.Option("--figures/--no-figures", help="Draw the figures of the run, or leave them out.")
 ]
+FigureFormat = Annotated[
+    str, one_of(("png", "svg", "pdf"), "The format of the figures; svg and pdf can be scaled")
+]

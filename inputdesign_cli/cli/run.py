@@ -85,8 +85,16 @@ class Place:
         return text
 
 
-def keep(results: Results, place: Place, *, figures: bool, json_output: bool, quiet: bool) -> None:
-    """Write a run to its place, and print its result or its summary.
+def keep(
+    results: Results,
+    place: Place,
+    *,
+    figures: bool,
+    figure_format: str = "png",
+    json_output: bool,
+    quiet: bool,
+) -> None:
+    """Write a run to its place, with figures or without, and print its result or its summary.
 
     Raises:
         OutputError: as `write_run`, and `output-is-the-spec`.
@@ -95,7 +103,15 @@ def keep(results: Results, place: Place, *, figures: bool, json_output: bool, qu
         show(results, [], json_output=json_output, quiet=quiet)
         return
     results = replace(results, resolved_spec=place.spared(results.resolved_spec))
-    renew(results, place.directory, place.origin, figures=figures, json_output=json_output, quiet=quiet)
+    renew(
+        results,
+        place.directory,
+        place.origin,
+        figures=figures,
+        figure_format=figure_format,
+        json_output=json_output,
+        quiet=quiet,
+    )
 
 
 def renew(
@@ -104,6 +120,7 @@ def renew(
     origin: Origin | None = None,
     *,
     figures: bool,
+    figure_format: str = "png",
     json_output: bool,
     quiet: bool,
 ) -> None:
@@ -123,7 +140,7 @@ def renew(
         if figures:
             from inputdesign_cli.figures.plots import draw_all
 
-            drawings = draw_all(results)
+            drawings = draw_all(results, figure_format)
         replaced = has_other_values(directory, results.resolved_spec)
         files = write_run(results, directory, drawings, origin=origin)
     show(results, files, replaced=replaced, json_output=json_output, quiet=quiet)

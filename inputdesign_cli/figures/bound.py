@@ -2,55 +2,120 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.typing import LineStyleType
 
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, DOTTED, GREEN, GREY, ORANGE, log_axes, marked
+from inputdesign_cli.figures.style import (
+    BLACK,
+    BLUE,
+    DASHED,
+    DOTTED,
+    GREEN,
+    GREY,
+    ORANGE,
+    OTHERS,
+    log_axes,
+    marked,
+    plot_admitted,
+    positive,
+)
 from inputdesign_cli.runs.curves import BoundCurves, BoundPanel
 from inputdesign_cli.runs.results import Array
 
-_BELOW = 0.3  # of the smallest error, what is shown
+# Ratios beyond this many times the limit, or the design, run out of the linear panel.
+_HIGHEST = 4.0
 
 
 def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
-    """|G|, r_u, r_adm and white excitation's r_u over frequency, with the active frequencies marked."""
-    draw_panels(page, curves.panels, _plot, time_unit, magnitude="magnitude")
+    """r_u of design, record and white excitation against r_adm, and their ratios on a linear axis.
+
+    Where nothing is asked of the error, against |G|.
+    """
+    stated = [panel for panel in curves.panels if panel.r_adm is not None]
+    title = "Model error r_u against the admitted error r_adm" if stated else "Model error r_u beside |G|"
+    below = _plot_ratios if stated else None
+    draw_panels(page, curves.panels, _plot, time_unit, magnitude="error of G", title=title, below=below)
 
 
 def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
-    """The curves of one entry on `axes`; the handles of their legend."""
+    """The curves of one entry on `axes`, in the range of the errors; the handles of their legend."""
     w = curves.frequency
     log_axes(axes, "y")
     handles: list[Artist] = []
-    handles += axes.plot(w, _positive(curves.G_abs), color=BLACK, linewidth=1.2, label="|G|")
+    for error in _drawn(curves):
+        handles += error.plot(axes, w, positive(error.values), f"r_u, {error.name}")
     if curves.r_adm is not None:
-        r_adm = _positive(curves.r_adm)
-        handles += axes.plot(w, r_adm, color=ORANGE, linestyle=DASHED, label="r_adm")
-    handles += axes.plot(w, _positive(curves.r_u), color=BLUE, linewidth=2.0, label=f"r_u, {curves.label}")
-    if curves.r_u_record is not None:
-        record = _positive(curves.r_u_record)
-        handles += axes.plot(w, record, color=GREEN, linewidth=1.1, label="r_u, record")
-    if curves.r_u_white is not None:
-        white = _positive(curves.r_u_white)
-        handles += axes.plot(w, white, color=GREY, linestyle=DOTTED, label="r_u, white")
+        handles += plot_admitted(axes, w, curves.r_adm)
+    else:
+        handles += axes.plot(w, positive(curves.G_abs), color=BLACK, linewidth=1.2, label="|G|")
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
-        handles += marked(axes, curves.active, height, color=BLUE, label="active")
-    # A zero of G is no reason to show decades of nothing.
-    errors = [x for x in (curves.r_u, curves.r_adm, curves.r_u_record, curves.r_u_white) if x is not None]
-    least = min(float(np.min(x[x > 0.0], initial=np.inf)) for x in errors)
-    low, high = axes.get_ylim()
-    axes.set_ylim(max(low, _BELOW * least), high)
-    if curves.r_adm is not None:
-        low, high = axes.get_ylim()
-        axes.fill_between(w, _positive(curves.r_adm), high, color=ORANGE, alpha=0.07, linewidth=0)
-        axes.set_ylim(low, high)
+        handles += marked(axes, curves.active, height, color=BLUE, label=_limiting(curves.active))
     return handles
 
 
-def _positive(values: Array) -> Array:
-    """`values` with gaps where a logarithmic axis has no place for them (an r_adm below zero, say)."""
-    return np.where(values > 0, values, np.nan)
+def _limiting(active: Array) -> str:
+    return "limiting frequency" if active.size == 1 else "limiting frequencies"
+
+
+@dataclass(frozen=True)
+class _Error:
+    """One r_u (n,) or its ratio, and how it is drawn wherever it is."""
+
+    name: str
+    values: Array
+    color: str
+    width: float = 1.6
+    style: LineStyleType = "solid"
+
+    def plot(self, axes: Axes, w: Array, values: Array, label: str) -> list[Line2D]:
+        return axes.plot(w, values, color=self.color, linewidth=self.width, linestyle=self.style, label=label)
+
+
+def _drawn(curves: BoundPanel) -> list[_Error]:
+    """What r_u there is: the widest first, so that the others show on it."""
+    needed, equal = curves.white_labels
+    found = [_Error(curves.label, curves.r_u, BLUE, 2.4)]
+    if curves.r_u_record is not None:
+        found.append(_Error("record", curves.r_u_record, GREEN, 1.2, DASHED))
+    if curves.r_u_equal is not None:
+        found.append(_Error(equal, curves.r_u_equal, GREY, 1.4))
+    if curves.r_u_white is not None:
+        found.append(_Error(needed, curves.r_u_white, GREY, 1.6, DOTTED))
+    return found
+
+
+def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> list[Artist]:
+    """r_u / r_adm, with the largest in the legend: of one entry all curves, of several that of each."""
+    handles: list[Artist] = []
+    tops = [1.0]
+    for number, curves in enumerate(panels):
+        if curves.r_adm is None:
+            continue
+        drawn = _drawn(curves)
+        if len(panels) > 1:
+            at = "" if curves.entry is None else f"G{curves.entry[0] + 1}{curves.entry[1] + 1}"
+            drawn = [_Error(at, curves.r_u, OTHERS[number % len(OTHERS)])]
+        for place, error in enumerate(drawn):
+            ratio = error.values / positive(curves.r_adm)
+            top = float(np.nanmax(ratio, initial=0.0))
+            lines = error.plot(axes, curves.frequency, ratio, f"{error.name}: up to {top:.3g}")
+            # White excitation that meets the same reaches the same: no more than its name is to be said.
+            handles += lines if error.style != DOTTED or curves.r_u_equal is None else []
+            tops.append(top if not place else min(top, _HIGHEST * max(tops)))
+        if len(panels) == 1 and curves.active.size:
+            height = np.interp(curves.active, curves.frequency, curves.r_u / positive(curves.r_adm))
+            marked(axes, curves.active, height, color=BLUE, label="")
+    handles.append(axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit"))
+    axes.axhspan(1.0, 1.12 * max(tops) + 1.0, color=ORANGE, alpha=0.07, linewidth=0)
+    axes.set_ylim(0.0, 1.12 * max(tops))
+    axes.set_ylabel("r_u / r_adm")
+    return handles

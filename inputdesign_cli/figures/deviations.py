@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREEN, ORANGE, log_axes
+from inputdesign_cli.figures.style import BLACK, BLUE, GREEN, log_axes, plot_admitted
 from inputdesign_cli.runs.curves import DeviationCurves, DeviationPanel
 
 
@@ -21,8 +21,8 @@ def _plot(axes: Axes, panel: DeviationPanel) -> list[Artist]:
     log_axes(axes, "y")
     handles: list[Artist] = []
     handles += axes.plot(w, panel.G_abs, ".-", color=BLACK, linewidth=1.0, markersize=4, label="|G|")
-    handles += axes.plot(w, panel.r_adm, color=ORANGE, linestyle=DASHED, label="r_adm")
     handles += axes.plot(w, panel.deviation, "o", color=BLUE, markersize=5, label="standard deviation")
     if panel.found is not None:
         handles += axes.plot(w, panel.found, "x", color=GREEN, markersize=6, label=panel.label)
+    handles += plot_admitted(axes, w, panel.r_adm)
     return handles

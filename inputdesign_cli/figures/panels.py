@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import product
 from typing import Protocol, TypeVar
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import (
-    GREY,
-    frequency_axis,
-    legend_above,
-    legend_over_all,
-    log_axes,
-    lowered,
-)
+from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all, lowered
 from inputdesign_cli.runs.results import Array
+
+# How much higher a page is with a panel under one other, or under several.
+_TALL, _TALLER = 1.25, 1.4
 
 
 class Panel(Protocol):
@@ -48,8 +43,9 @@ def draw_panels(
     *,
     magnitude: str,
     title: str | None = None,
+    below: Callable[[Axes, Sequence[P]], list[Artist]] | None = None,
 ) -> None:
-    """Draw each panel with `plot`, which returns the handles of its legend.
+    """Draw each panel with `plot`, and all of them together with `below`; both return handles of legends.
 
     Args:
         page: the figure.
@@ -58,30 +54,38 @@ def draw_panels(
         time_unit: frequencies are labelled rad per this.
         magnitude: the label of the vertical axis where one panel stands alone.
         title: says what all panels are about.
+        below: draws one more panel under all others.
     """
-    if len(panels) == 1:
-        (panel,) = panels
-        axes = page.add_subplot()
-        handles = plot(axes, panel)
-        frequency_axis(axes, panel.frequency, time_unit)
-        axes.set_ylabel(magnitude)
-        if title or panel.names:
-            axes.set_title(title or panel.names, loc="right", color=GREY)
-        legend_above(axes, handles)
-        return
-    places = [panel.entry or (0, 0) for panel in panels]
+    single = len(panels) == 1
+    places = [(0, 0)] if single else [panel.entry or (0, 0) for panel in panels]
     rows, columns = (1 + max(place[side] for place in places) for side in (0, 1))
-    grid = page.subplots(rows, columns, sharex=True, squeeze=False)
-    longest: list[Artist] = []
+    heights = [3] * rows
+    if below is not None:
+        page.set_figheight((_TALL if single else _TALLER) * page.get_figheight())
+        heights.append(2)
+    cells = page.add_gridspec(len(heights), columns, height_ratios=heights)
+    drawn: list[tuple[Axes, list[Artist]]] = []
     for panel, (i, j) in zip(panels, places, strict=True):
-        axes = grid[i, j]
-        longest = max(longest, plot(axes, panel), key=len)
-        log_axes(axes, "x")
-        axes.set_xlim(float(panel.frequency.min()), float(panel.frequency.max()))
-        axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
-    for i, j in product(range(rows), range(columns)):
-        if (i, j) not in places:
-            grid[i, j].set_axis_off()
-    for axes in grid[-1]:
-        axes.set_xlabel(f"ω (rad/{time_unit})")
-    legend_over_all(page, longest, title)
+        axes = page.add_subplot(cells[i, j])
+        drawn.append((axes, plot(axes, panel)))
+        frequency_axis(axes, panel.frequency, time_unit)
+        if single:
+            axes.set_ylabel(magnitude)
+            axes.set_title(panel.names, loc="right", color=GREY)
+        else:
+            axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
+        if below is not None or any(row > i and column == j for row, column in places):
+            axes.tick_params(labelbottom=False)
+            axes.set_xlabel("")
+    if title and single:
+        page.suptitle(title, x=0.01, ha="left")
+    axes, handles = max(drawn, key=lambda one: len(one[1]))
+    if single:
+        legend_above(axes, handles)
+    else:
+        legend_over_all(page, handles, title)
+    if below is not None:
+        axes = page.add_subplot(cells[rows, :])
+        handles = below(axes, panels)
+        frequency_axis(axes, panels[0].frequency, time_unit)
+        legend_above(axes, handles)

@@ -15,10 +15,11 @@ from inputdesign_cli.figures.ellipses import draw_ellipses
 from inputdesign_cli.figures.exploration import draw_orders
 from inputdesign_cli.figures.fan import draw_fan
 from inputdesign_cli.figures.moments import draw_error, draw_moments
+from inputdesign_cli.figures.nyquist import draw_nyquist
 from inputdesign_cli.figures.response import draw_response
 from inputdesign_cli.figures.signal import draw_signal
 from inputdesign_cli.figures.spectrum import draw_directions, draw_optimality, draw_spectrum
-from inputdesign_cli.figures.style import FileType, painted, rendered
+from inputdesign_cli.figures.style import FILE_TYPES, FileType, painted, rendered
 from inputdesign_cli.figures.trials import draw_cloud, draw_error_bands, draw_loss
 from inputdesign_cli.runs import curves as of
 from inputdesign_cli.runs.curves import Curves
@@ -39,6 +40,7 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
     of.FitCurves: draw_fit,
     of.LossCurves: draw_loss,
     of.MomentsCurves: draw_moments,
+    of.NyquistCurves: draw_nyquist,
     of.OptimalityCurves: draw_optimality,
     of.OrderCurves: draw_orders,
     of.RatioCurves: draw_true_ratio,
@@ -50,9 +52,9 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
 }
 
 
-def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png") -> bytes:
-    """The figure of `curves` as a file; frequencies are labelled rad per `time_unit`."""
-    return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type)
+def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png", *, narrow: bool = False) -> bytes:
+    """The figure of `curves` as a file, see `rendered`; frequencies are labelled rad per `time_unit`."""
+    return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type, narrow=narrow)
 
 
 def figure(results: Results, name: str) -> Figure:
@@ -65,6 +67,9 @@ def figure(results: Results, name: str) -> Figure:
     return painted(lambda page: _DRAWN_BY[type(curves)](page, curves, results.time_unit))
 
 
-def draw_all(results: Results) -> dict[str, bytes]:
-    """The figures of a run by their file names: bound.png, spectrum.png, .."""
-    return {f"{stem}.png": draw(curves, results.time_unit) for stem, curves in results.curves.items()}
+def draw_all(results: Results, file_type: str = "png") -> dict[str, bytes]:
+    """The figures of a run by their file names: bound.png, spectrum.png, .., or in another format."""
+    kind = FILE_TYPES[file_type]
+    return {
+        f"{stem}.{kind}": draw(curves, results.time_unit, kind) for stem, curves in results.curves.items()
+    }

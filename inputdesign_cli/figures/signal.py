@@ -1,56 +1,95 @@
-"""signal.png: the record to be applied, and how its values are distributed."""
+"""signal.png: the record to be applied, how its values are distributed, and what it is to cause."""
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLUE, DASHED, GREY, ORANGE, lowered
-from inputdesign_cli.runs.curves import SignalCurves
+from inputdesign_cli.figures.style import BLUE, DASHED, GREEN, GREY, ORANGE, legend_over_all, lowered
+from inputdesign_cli.runs.curves import PredictedPanel, SignalCurves
 from inputdesign_cli.runs.results import Array
 
 SHOWN = 1000  # samples that a figure of this width can show one by one
-STEPS_TO = 300  # up to here the hold between samples is visible
-ROWS = 4  # channels that fit
+ROWS = 4  # channels that fit, of the record and of the outputs together
 MARGIN = 0.08  # above and below, of what is shown
+_HIGHER = 0.25  # of the page, for each row beyond the second
+_BAND = 2.0  # standard deviations
 
 
 def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
-    """Each channel against time, its first samples if the record is long, beside a histogram of all of it."""
-    channels = list(curves.channels.items())[:ROWS]
+    """Each channel against time, its first samples if the record is long, beside a histogram of all of it.
+
+    Below them the outputs that are to be expected, from rest, with two standard deviations of noise.
+    """
+    predicted = curves.predicted[: ROWS // 2]
+    channels = list(curves.channels.items())[: ROWS - len(predicted)]
+    rows = len(channels) + len(predicted)
+    page.set_figheight((1.0 + _HIGHER * max(rows - 2, 0)) * page.get_figheight())
     samples = curves.time.size
     shown = min(samples, SHOWN)
-    grid = page.subplots(len(channels), 2, sharey="row", squeeze=False, width_ratios=[5, 1])
-    for (name, values), (record, histogram) in zip(channels, grid, strict=True):
-        _draw_record(record, curves.time[:shown], values[:shown])
-        label, symbol = curves.labels.get(name, ""), f"{name[0]}{lowered(name[1:])}(t)"
-        nameless = not label or label.startswith("(")  # a unit alone
-        record.set_ylabel(f"{symbol} {label}".strip() if nameless else label)
+    time = curves.time[:shown]
+    grid = page.subplots(rows, 2, sharex="col", squeeze=False, width_ratios=[5, 1])
+    handles: dict[str, Artist] = {}
+    for (name, values), (record, histogram) in zip(channels, grid, strict=False):
+        style = "steps-post" if curves.held else "default"
+        (line,) = record.plot(time, values[:shown], color=BLUE, linewidth=0.9, drawstyle=style)
+        handles.setdefault("to be applied, held between samples" if curves.held else "to be applied", line)
+        _name(record, name, curves.labels.get(name, ""), "")
         _draw_histogram(histogram, values)
-        for bound in curves.limits.get(name, ()):
-            for axes in (record, histogram):
-                axes.axhline(bound, color=ORANGE, linewidth=1.0, linestyle=DASHED)
-        reached = [float(values.min()), float(values.max()), *curves.limits.get(name, ())]
-        low, high = min(reached), max(reached)
-        if high > low:
-            record.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
-    last, counts = grid[-1]
-    last.set_xlabel(f"time ({time_unit})")
-    counts.set_xlabel("share (%)")
-    for record, histogram in grid[:-1]:
+        limits = curves.limits.get(name, ())
+        for bound, axes in ((bound, axes) for bound in limits for axes in (record, histogram)):
+            handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
+        _frame(record, values, *limits)
+        histogram.set_ylim(record.get_ylim())
+    for panel, (below, beside) in zip(predicted, grid[len(channels) :], strict=True):
+        _draw_predicted(below, time, panel, handles)
+        beside.set_axis_off()
+    for record, _ in grid[:-1]:
         record.tick_params(labelbottom=False)
-        histogram.tick_params(labelbottom=False)
-    part = f"first {shown} of {samples} samples" if shown < samples else f"{samples} samples"
+    last, counts = grid[-1][0], grid[len(channels) - 1][1]
+    last.set_xlim(time[0], time[-1])
+    part = f"{samples} samples" if shown == samples else f"first {shown} of {samples} samples"
     if len(channels) < len(curves.channels):
         part += f", {len(channels)} of {len(curves.channels)} channels"
-    grid[0][0].set_title(part, loc="left", color=GREY)
+    last.set_xlabel(f"time ({time_unit}); {part}")
+    counts.tick_params(labelbottom=True)
+    grid[0][1].set_title("share (%)", loc="left")
+    for label, handle in handles.items():
+        handle.set_label(label)
+    legend_over_all(page, list(handles.values()))
 
 
-def _draw_record(axes: Axes, time: Array, values: Array) -> None:
-    steps = "steps-post" if values.size <= STEPS_TO else "default"
-    axes.plot(time, values, color=BLUE, linewidth=0.9, drawstyle=steps)
-    axes.set_xlim(time[0], time[-1])
+def _name(axes: Axes, name: str, label: str, what: str) -> None:
+    """The user's name and unit of a channel, or its symbol with the unit."""
+    symbol = f"{name[0]}{lowered(name[1:])}(t)"
+    nameless = not label or label.startswith("(")  # a unit alone
+    axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
+
+
+def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, handles: dict[str, Artist]) -> None:
+    y, noise = panel.values[: time.size], _BAND * panel.deviation[: time.size]
+    grows = bool(noise[0] < noise[-1])
+    band = axes.fill_between(time, y - noise, y + noise, color=GREY, alpha=0.3, linewidth=0)
+    since = " since the start" if grows else ""
+    handles.setdefault(f"± 2 standard deviations of noise{since}", band)
+    (line,) = axes.plot(time, y, color=GREEN, linewidth=1.0)
+    handles.setdefault("predicted output, from rest", line)
+    for bound in panel.limits or ():
+        handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
+    _name(axes, panel.name, panel.label, "")
+    _frame(axes, y - noise, y + noise, *(panel.limits or ()))
+
+
+def _frame(axes: Axes, *shown: Array | float) -> None:
+    """The limits of an axis about what is shown."""
+    reached = list(chain.from_iterable((np.min(part), np.max(part)) for part in shown))
+    low, high = float(min(reached)), float(max(reached))
+    if high > low:
+        axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
 
 
 def _draw_histogram(axes: Axes, values: Array) -> None:

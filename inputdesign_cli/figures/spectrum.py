@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -29,7 +31,7 @@ LOG_FROM = 100.0  # a density whose peak is further above the white level reads 
 DECADES = 5.0  # shown below the peak: the zeros of a spectrum would stretch the axis without end
 # Entries of a nearly singular spectrum lie on each other: the dashes let the lower ones show through.
 DASHES: tuple[LineStyleType, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
-MARGIN = 0.02  # beside the outermost lines, of the width between them
+NOTHING = 1e-9  # of the largest entry: below, and closer to another one, there is rounding only
 MOST = 6  # curves that stay apart in one panel
 FEW = 60  # lines that are drawn bold
 
@@ -94,9 +96,8 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     pairs = [(i, i) for i in range(r)] + [(i, j) for i in range(r) for j in range(i + 1, r)]
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     handles: list[Artist] = []
-    for number, (i, j) in enumerate(pairs[:MOST]):
-        label = f"|Φ{lowered(i + 1, j + 1)}|"
-        handles += _plot_power(above, w, entries[:, i, j], lines=curves.lines, number=number, label=label)
+    for number, (label, values) in enumerate(_told_apart(entries, pairs)[:MOST]):
+        handles += _plot_power(above, w, values, lines=curves.lines, number=number, label=label)
     if curves.record is not None:
         drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
         drawn[0].set_label("record, smoothed")
@@ -119,13 +120,25 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     _logarithmic(below, values)
     below.set_ylabel("eigenvalues")
     legend_above(below, handles)
-    if curves.logarithmic:
-        frequency_axis(below, w, time_unit)
-    else:
-        low, high = float(w.min()), float(w.max()) if w.max() > w.min() else float(w.min()) + 1.0
-        margin = MARGIN * (high - low) if curves.lines else 0.0
-        below.set_xlim(low - margin, high + margin)
-        below.set_xlabel(f"frequency ω (rad/{time_unit})")
+    frequency_axis(below, w, time_unit)
+    above.set_xscale(below.get_xscale())
+
+
+def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Array]]:
+    """The moduli (n,) of entries (n, r, r) by label: one for those that coincide, none for rounding."""
+    found: list[tuple[list[str], Array]] = []
+    peak = float(entries.max(initial=0.0))
+    for i, j in pairs:
+        values = entries[:, i, j]
+        if float(values.max(initial=0.0)) <= NOTHING * peak:
+            continue
+        name = f"|Φ{lowered(i + 1, j + 1)}|"
+        same = [names for names, other in found if np.abs(values - other).max() <= NOTHING * peak]
+        if same:
+            same[0].append(name)
+        else:
+            found.append(([name], values))
+    return [(" = ".join(names), values) for names, values in found]
 
 
 def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> None:
@@ -155,13 +168,19 @@ def draw_optimality(page: Figure, curves: OptimalityCurves, time_unit: str) -> N
     (ratio,) = axes.plot(
         curves.frequency, curves.ratio, color=BLUE, linewidth=2.0, label="worth of a unit of cost"
     )
-    handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="optimal: nowhere above one")]
+    handles = [ratio, axes.axhline(1.0, color=BLACK, linewidth=1.0, label="the most that is allowed")]
     if curves.support.size:
         height = np.interp(curves.support, curves.frequency, curves.ratio)
-        handles += marked(axes, curves.support, height, color=ORANGE, label="power of the optimum")
+        handles += marked(axes, curves.support, height, color=ORANGE, label="where the optimum has its power")
     axes.set_ylim(0.0, 1.08 * max(1.0, float(curves.ratio.max())))
     axes.set_ylabel("relative worth of excitation")
     frequency_axis(axes, curves.frequency, time_unit)
+    page.suptitle(
+        "A unit of cost buys nowhere more than where the optimum has its power:\n"
+        "no other spectrum can do better than the proved bound",
+        x=0.01,
+        ha="left",
+    )
     legend_above(axes, handles)
 
 

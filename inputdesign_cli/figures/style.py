@@ -9,20 +9,24 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter
+from matplotlib.markers import TICKDOWN, TICKLEFT
+from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter, NullLocator
 
 from inputdesign_cli.runs.results import Array
 
-FileType = Literal["png", "svg"]
+FileType = Literal["png", "svg", "pdf"]
+FILE_TYPES: dict[str, FileType] = {"png": "png", "svg": "svg", "pdf": "pdf"}
 
 SIZE = (7.0, 4.5)  # inches
-NARROW = (4.6, 3.4)
+NARROW = (5.0, 3.7)  # of a page, where text is to be as large on a phone
 DPI = 150
+TYPE_SIZE = 9.5  # points
 
 # Okabe and Ito's palette, which stays apart for colour-blind readers.
 BLACK = "#000000"
@@ -31,6 +35,10 @@ ORANGE = "#D55E00"
 GREEN = "#009E73"
 GREY = "#777777"
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what is admitted
+
+# Of a legend: letters that an inch holds, and what a handle takes beside its label.
+_LETTERS_PER_INCH, _BESIDE_LABEL = 12.0, 6
 
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
@@ -40,8 +48,13 @@ _RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "idesign",
-    "font.size": 10.0,
-    "axes.titlesize": 10.0,
+    # One size for all text: titles, ticks and legends alike.
+    "font.size": TYPE_SIZE,
+    "axes.titlesize": TYPE_SIZE,
+    "axes.labelsize": TYPE_SIZE,
+    "figure.titlesize": TYPE_SIZE,
+    "xtick.labelsize": TYPE_SIZE,
+    "ytick.labelsize": TYPE_SIZE,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -50,10 +63,14 @@ _RC: dict[Any, Any] = {
     "axes.axisbelow": True,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
-    "legend.fontsize": 9.0,
+    "legend.fontsize": TYPE_SIZE,
     # Names and units are the user's: no $ begins a formula, and ours are plain text too.
     "text.parse_math": False,
 }
+
+
+# Digits before a power of ten that are written where an axis shows less than a decade.
+_LABELLED = ("1", "3")
 
 
 def lowered(*indices: str | int) -> str:
@@ -68,27 +85,33 @@ class _LogTicks(LogFormatterSciNotation):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         formula = re.fullmatch(r"\$\\mathdefault\{(.*?)(?:\^\{(.*)\})?\}\$", super().__call__(x, pos))
-        if formula is None:
+        if formula is None or formula[1][:1] not in _LABELLED:
             return ""
         return formula[1].replace(r"\times", "×") + (formula[2] or "").translate(_RAISED)
 
 
-def rendered(paint: Callable[[Figure], object], file_type: FileType = "png") -> bytes:
-    """The file of a figure that `paint` draws on an empty page.
+def rendered(
+    paint: Callable[[Figure], object], file_type: FileType = "png", *, narrow: bool = False
+) -> bytes:
+    """The file of a figure that `paint` draws on an empty page, the same for the same figure.
 
-    A PNG of 7 by 4.5 inches, or a smaller SVG whose text stays readable on a phone.
+    A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves.
     """
-    narrow = file_type == "svg"
     buffer = io.BytesIO()
     with mpl.rc_context(_RC), warnings.catch_warnings():
         # A box stands for a letter of the user's that the font lacks; tables and pages have it.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        canvas = FigureCanvasAgg(painted(paint, NARROW if narrow else SIZE))
-        if narrow:
-            # Without a date and with ids that do not change, the same figure is the same file.
-            canvas.print_figure(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        page = painted(paint, NARROW if narrow else SIZE)
+        for axes in page.axes:
+            _strokes(axes)
+        if file_type == "png":
+            FigureCanvasAgg(page).print_png(buffer)
         else:
-            canvas.print_png(buffer)
+            # Without a date and with ids that do not change, the same figure is the same file.
+            nothing = {"Date": None} if file_type == "svg" else {"CreationDate": None, "Producer": None}
+            FigureCanvasAgg(page).print_figure(
+                buffer, format=file_type, metadata={**nothing, "Creator": None}
+            )
     return buffer.getvalue()
 
 
@@ -98,6 +121,29 @@ def painted(paint: Callable[[Figure], object], size: tuple[float, float] = SIZE)
         page = Figure(figsize=size, dpi=DPI, layout="constrained")
         paint(page)
     return page
+
+
+def _strokes(axes: Axes) -> None:
+    """Draw the minor ticks of logarithmic axes as one set of marks each, within the limits as they are.
+
+    A tick is an object with lines and a text of its own: all of them take half of the time of a figure.
+    """
+    for name, axis, limits, transform, marker in (
+        ("x", axes.xaxis, axes.get_xlim(), axes.get_xaxis_transform(), TICKDOWN),
+        ("y", axes.yaxis, axes.get_ylim(), axes.get_yaxis_transform(), TICKLEFT),
+    ):
+        if axis.get_scale() != "log":
+            continue
+        at = np.asarray(axis.get_minorticklocs(), dtype=float)
+        if any(axis.get_minor_formatter().format_ticks(at.tolist())):
+            continue  # within a decade they carry numbers
+        axis.set_minor_locator(NullLocator())
+        at = at[(at >= min(limits)) & (at <= max(limits))]
+        edge = np.zeros(at.size)
+        places = (at, edge) if name == "x" else (edge, at)
+        marks = Line2D(*places, linestyle="none", markersize=2.0, color=BLACK)
+        marks.set(marker=marker, transform=transform, clip_on=False, markeredgewidth=0.6, in_layout=False)
+        axes.add_artist(marks)
 
 
 def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
@@ -134,6 +180,26 @@ def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Li
     return [rings]
 
 
+def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> list[Artist]:
+    """What is admitted, drawn alike wherever it is: a dashed line, and beyond it a shade.
+
+    To be called last: the shade ends where the axis does.
+    """
+    admitted = positive(r_adm)
+    low, high = axes.get_ylim()
+    top = max(high, 1.15 * float(np.nanmax(admitted, initial=0.0)))
+    bottom = min(low, 0.87 * float(np.nanmin(admitted, initial=np.inf)))
+    axes.fill_between(w, admitted, top, color=ORANGE, alpha=0.07, linewidth=0)
+    drawn = axes.plot(w, admitted, color=ORANGE, linestyle=DASHED, label="r_adm, admitted")
+    axes.set_ylim(bottom, top)
+    return list(drawn)
+
+
+def positive(values: Array) -> Array:
+    """`values` with gaps where a logarithmic axis has no place for them (an r_adm below zero, say)."""
+    return np.where(values > 0, values, np.nan)
+
+
 def page_of_pairs(page: Figure, pairs: int, columns: int) -> list[Axes]:
     """Axes for so many pairs of parameters, row by row."""
     columns = min(columns, pairs)
@@ -146,22 +212,41 @@ def page_of_pairs(page: Figure, pairs: int, columns: int) -> list[Axes]:
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> None:
-    """A legend over the axes, where it cannot cover a curve."""
+    """A legend over the axes, where it cannot cover a curve, in as many columns as the page is wide."""
     page = axes.get_figure(root=True)
     assert page is not None
-    narrow = page.get_figwidth() < SIZE[0]
-    longest = max((len(str(handle.get_label())) for handle in handles), default=0)
+    labels = [str(handle.get_label()) for handle in handles]
     axes.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
-        ncols=max(1, min(3, 46 // (longest + 6))) if narrow else len(handles),
+        ncols=_columns(labels, page.get_figwidth()),
         borderaxespad=0.3,
-        handlelength=2.2,
-        columnspacing=1.4,
+        handlelength=2.0,
+        columnspacing=1.2,
     )
+
+
+def _columns(labels: Sequence[str], inches: float) -> int:
+    """The most columns of a legend, filled one after the other, that a page so wide has room for."""
+    room = inches * _LETTERS_PER_INCH
+    for columns in range(len(labels), 1, -1):
+        shared = np.array_split([len(label) for label in labels], columns)
+        widest = [int(max(lengths)) for lengths in shared]
+        if sum(widest) + _BESIDE_LABEL * len(widest) <= room:
+            return columns
+    return 1
 
 
 def legend_over_all(page: Figure, handles: Sequence[Artist], title: str | None = None) -> None:
     """One legend for all panels of a page, above them."""
-    page.legend(handles=handles, loc="outside upper left", ncols=len(handles), title=title, alignment="left")
+    labels = [str(handle.get_label()) for handle in handles]
+    page.legend(
+        handles=handles,
+        loc="outside upper left",
+        ncols=_columns(labels, page.get_figwidth()),
+        title=title,
+        alignment="left",
+        handlelength=2.0,
+        columnspacing=1.2,
+    )

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from inputdesign_cli.figures.style import ORANGE, log_axes
 from inputdesign_cli.runs.results import Array
@@ -17,6 +17,8 @@ from inputdesign_cli.runs.results import Array
 LOG_FROM = 10.0
 _LOG_KEYS_FROM = 100.0
 _DECADES_IN_FULL = 3.0
+# Ticks at points: so many at most, and so far apart, in shares of the axis.
+_MOST_TICKS, _ROOM = 12, 0.055
 _NAMES = {
     "experiment.samples": "number of samples N",
     "spectrum.order": "order of the FIR spectrum",
@@ -39,19 +41,37 @@ def curve(axes: Axes, x: Array, y: Array, **style: Any) -> list[Artist]:
 def mark_failures(axes: Axes, where: Array) -> None:
     """Crosses at the foot of the axes where a point has no result."""
     where = where[np.isfinite(where)]
+    if not where.size:  # the layout would make room for a line without points
+        return
     foot = np.full(where.size, 0.02)
     axes.plot(where, foot, "x", color=ORANGE, transform=axes.get_xaxis_transform(), clip_on=False)
 
 
 def scale_key(axes: Axes, key: str, x: Array) -> None:
-    """The scale and the name of the axis of a key: logarithmic for N and over decades."""
+    """The scale and the name of the axis of a key: logarithmic for N and over decades.
+
+    Up to a dozen points that stand apart have their ticks, and no others.
+    """
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     if low > 0 and (key == "experiment.samples" or high > _LOG_KEYS_FROM * low):
         log_axes(axes, "x")
         plain_numbers(axes.xaxis, high / low)
     elif np.all(x == np.round(x)):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    points = np.unique(x[np.isfinite(x)])
+    if _apart(points, logarithmic=axes.get_xscale() == "log"):
+        axes.xaxis.set_major_locator(FixedLocator(points.tolist()))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel(key_label(key))
+
+
+def _apart(points: Array, *, logarithmic: bool) -> bool:
+    """Whether there is room for a number at each of the points."""
+    if not 1 < points.size <= _MOST_TICKS:
+        return False
+    place = np.log(points) if logarithmic else points
+    return bool(np.diff(place).min() > _ROOM * np.ptp(place))
 
 
 def plain_numbers(axis: Axis, ratio: float) -> None:

@@ -14,6 +14,7 @@ from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from inputdesign_cli.figures.style import (
     BLACK,
@@ -21,7 +22,9 @@ from inputdesign_cli.figures.style import (
     DOTTED,
     GREY,
     PALETTE,
+    TYPE_SIZE,
     legend_above,
+    legend_over_all,
     log_axes,
     rendered,
 )
@@ -34,15 +37,15 @@ from inputdesign_cli.figures.sweep_axes import (
     scale_key,
 )
 from inputdesign_cli.figures.sweep_moments import draw_moments, moment_entries
-from inputdesign_cli.figures.sweep_table import SweepTable
+from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable
 from inputdesign_cli.runs.objectives import OBJECTIVES, objective
 from inputdesign_cli.runs.results import Array
 
-# What is drawn, if the results have it: the first of these.
-QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
 # What no design whatever does better.
 BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structure_bound": "any moments"}
 MOST_CURVES = len(PALETTE)
+MOST_KEYS = 3
+COLUMNS, ROW = 3, 0.6  # of small multiples: beside each other, and what a further row adds to the page
 MOST_LABELLED = 100  # cells of a map that carry their number
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
 
@@ -59,7 +62,8 @@ def draw_sweep(table: SweepTable, root: Path) -> list[Path]:
 def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]]]:
     """The figures that suit the sweep, each with what draws it: curves over a numeric key, a map over two.
 
-    Sweeps over three keys or more, or without two results, have none.
+    Of three keys the curves are small multiples, a panel for each value of the third. Sweeps over more, or
+    without two results, have none.
     """
     quantity = next((name for name in QUANTITIES if _usable(table.numbers(name))), None)
     if quantity is None:
@@ -68,11 +72,13 @@ def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]
     numeric = [key for key in axes if _usable(table.numbers(key))]
     zipped = bool(table.summary.get("zip"))
     found: list[tuple[str, Callable[[Figure], None]]] = []
-    if numeric and (zipped or len(axes) <= 2):
-        along = max(numeric, key=lambda key: len(set(table.columns[key])))
-        across = None if zipped else next((key for key in axes if key != along), None)
-        if across is None or len(set(table.columns[across])) <= MOST_CURVES:
-            found.append(("curves", partial(_draw_curves, table, quantity, along, across)))
+    if numeric and (zipped or len(axes) <= MOST_KEYS):
+        along, *others = sorted(axes, key=lambda key: (key not in numeric, -len(set(table.columns[key]))))
+        # The fewest values make the panels, the others the curves of each.
+        across, panels = (None, None) if zipped else (*others, None, None)[:2]
+        few = all(len(set(table.columns[key])) <= MOST_CURVES for key in (across, panels) if key)
+        if few:
+            found.append(("curves", partial(_draw_panels, table, quantity, along, across, panels)))
         if across is None and moment_entries(table):
             found.append(("moments", partial(draw_moments, table, along)))
     if not zipped and len(axes) == 2 and len(numeric) == 2:
@@ -89,50 +95,90 @@ def _label(table: SweepTable, quantity: str) -> str:
     return OBJECTIVES[table.kind].axis if named else quantity
 
 
-def _draw_curves(table: SweepTable, quantity: str, along: str, across: str | None, page: Figure) -> None:
-    """The quantity over one key, a curve for each value of the other, each with its bound; white if alone."""
+def _draw_panels(
+    table: SweepTable, quantity: str, along: str, across: str | None, panels: str | None, page: Figure
+) -> None:
+    """Curves over one key, a panel for each value of the third key, on common axes; the best point named."""
+    values = list(dict.fromkeys(table.columns[panels])) if panels else [""]
+    columns = min(len(values), COLUMNS)
+    rows = -(-len(values) // columns)
+    page.set_figheight((1.0 + ROW * (rows - 1)) * page.get_figheight())
+    grid = page.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    longest: list[Artist] = []
+    for value, axes in zip(values, grid.flat, strict=False):
+        member = np.array([not panels or text == value for text in table.columns[panels or along]])
+        handles = _draw_curves(axes, table, quantity, along, across, member)
+        longest = max(longest, handles, key=len)
+        if panels:
+            axes.set_title(f"{_short(panels)} = {value}", loc="left", color=GREY)
+            axes.label_outer()
+            # Under one panel alone there is no room for it.
+            axes.set_xlabel("")
+            axes.set_ylabel("")
+    for axes in grid.flat[len(values) :]:
+        axes.set_axis_off()
+    if panels:
+        page.supxlabel(key_label(along), fontsize=TYPE_SIZE)
+        page.supylabel(_label(table, quantity), fontsize=TYPE_SIZE)
+    named = table.best
+    title = f"best: {named[1]}" if named and named[0] == quantity else None
+    if panels or len(longest) > 4:
+        legend_over_all(page, longest, title)
+    else:
+        if title:
+            page.suptitle(title, x=0.01, ha="left")
+        legend_above(grid[0][0], longest)
+
+
+def _draw_curves(
+    axes: Axes, table: SweepTable, quantity: str, along: str, across: str | None, shown: NDArray[np.bool_]
+) -> list[Artist]:
+    """The quantity over one key, a curve for each value of the other, each with its bound; white if alone.
+
+    Of the points (n,) that are `shown`; what the scales depend on is asked of all.
+    """
     x, y = table.numbers(along), table.numbers(quantity)
     assert x is not None
     assert y is not None
     groups = list(dict.fromkeys(table.columns[across])) if across else [""]
     bound, whatever = _bound(table, quantity)
-    axes = page.add_subplot()
     handles: list[Artist] = []
-    shown = [y]
+    everything = [y] if bound is None else [y, bound]
     for group, colour in zip(groups, PALETTE, strict=False):
-        member = np.array([not across or text == group for text in table.columns[across or along]])
+        own = np.array([not across or text == group for text in table.columns[across or along]])
+        member = own & shown
         name = f"{_short(across)} = {group}" if across else "design"
         handles += curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
         if bound is not None:
             shade = colour if across else BLACK
             curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1)
-            shown.append(bound)
     if bound is not None:
-        side = "ceiling" if _maximised(table) else "floor"
+        side = "ceiling" if table.maximised else "floor"
         label = f"{side}: {whatever}"
         handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
     white = table.numbers(f"baseline.white.{objective(table.kind).white}")
     if quantity == "objective.value" and not across and white is not None:
         handles += curve(axes, x, white, color=GREY, linestyle=DOTTED, label="white excitation")
-        shown.append(white)
-    mark_failures(axes, x[~np.isfinite(y)])
-    values = np.concatenate([part[np.isfinite(part)] for part in shown])
+        everything.append(white)
+    mark_failures(axes, x[~np.isfinite(y) & shown])
+    _scale_values(axes, table, np.concatenate([part[np.isfinite(part)] for part in everything]))
+    scale_key(axes, along, x)
+    axes.set_ylabel(_label(table, quantity))
+    return handles
+
+
+def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
+    """The vertical axis: logarithmic over decades, from zero where that is near."""
     low, high = float(values.min()), float(values.max())
     if low > 0 and high > LOG_FROM * low and table.kind != "D":
         log_axes(axes, "y")
         plain_numbers(axes.yaxis, high / low)
-    elif _maximised(table):
+    elif table.maximised:
         # What counts are differences; but those of rounding are none.
         half = 0.55 * max(high - low, _FLAT * max(abs(low), abs(high)))
         axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
     elif low > 0:
         axes.set_ylim(bottom=0.0)
-    scale_key(axes, along, x)
-    axes.set_ylabel(_label(table, quantity))
-    if len(handles) > 4:
-        axes.legend(handles=handles, loc="best")
-    else:
-        legend_above(axes, handles)
 
 
 def _bound(table: SweepTable, quantity: str) -> tuple[Array | None, str]:
@@ -142,10 +188,6 @@ def _bound(table: SweepTable, quantity: str) -> tuple[Array | None, str]:
         if values is not None and np.isfinite(values).any():
             return values, whatever
     return None, ""
-
-
-def _maximised(table: SweepTable) -> bool:
-    return any(table.columns.get("objective.upper_bound", []))
 
 
 def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Figure) -> None:

@@ -13,7 +13,11 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Array, Json
+
+# What a sweep is about, if its results have it: the first of these.
+QUANTITIES = ("objective.value", "cost", "model_error.worst_ratio")
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,23 @@ class SweepTable:
         """The objective that all points have in common, or nothing."""
         kinds = {kind for kind in self.columns.get("objective.kind", []) if kind}
         return kinds.pop() if len(kinds) == 1 else ""
+
+    @property
+    def maximised(self) -> bool:
+        """Whether more of the objective is better, which then has bounds from above."""
+        return any(self.columns.get("objective.upper_bound", []))
+
+    @property
+    def best(self) -> tuple[str, str] | None:
+        """The quantity that the sweep is about and the point at which it is best; None without a result."""
+        for name in QUANTITIES:
+            values = self.numbers(name)
+            if values is None or not np.isfinite(values).any():
+                continue
+            most = name == "objective.value" and objective(self.kind).maximised
+            at = int(np.nanargmax(values) if most else np.nanargmin(values))
+            return name, ", ".join(f"{key} = {self.columns[key][at]}" for key in self.axes)
+        return None
 
     def numbers(self, name: str) -> Array | None:
         """A column as numbers (n,), NaN where it is empty; None if it is missing or holds text."""

@@ -16,7 +16,7 @@ from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import (
     BLACK,
     BLUE,
-    DASHED,
+    DOTTED,
     GREEN,
     GREY,
     ORANGE,
@@ -24,6 +24,8 @@ from inputdesign_cli.figures.style import (
     legend_over_all,
     log_axes,
     page_of_pairs,
+    plot_admitted,
+    positive,
 )
 from inputdesign_cli.runs.curves import CloudCurves, ErrorBandCurves, ErrorBandPanel, LossCurves
 
@@ -58,7 +60,14 @@ def draw_cloud(page: Figure, curves: CloudCurves, time_unit: str) -> None:
 def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> None:
     """The median and the central band of |G_hat - G_0| over frequency, with r_u and r_adm."""
     plot = partial(_bands, runs=curves.runs)
-    draw_panels(page, curves.panels, plot, time_unit, magnitude="|Ĝ − G₀|", title=curves.name)
+    draw_panels(
+        page,
+        curves.panels,
+        plot,
+        time_unit,
+        magnitude="|Ĝ − G₀|",
+        title=f"Errors of the models: {curves.name}",
+    )
 
 
 def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
@@ -74,10 +83,18 @@ def _bands(axes: Axes, curves: ErrorBandPanel, *, runs: int) -> list[Artist]:
     for level in levels[1:-1]:
         handles += axes.plot(w, curves.quantiles[level], color=BLUE, label=f"{100 * level:g} %")
     if curves.r_u is not None:
-        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DASHED, label="r_u, predicted")
+        handles += axes.plot(w, curves.r_u, color=BLACK, linestyle=DOTTED, label="r_u, predicted")
     if curves.r_adm is not None:
-        r_adm = np.where(curves.r_adm > 0, curves.r_adm, np.nan)
-        handles += axes.plot(w, r_adm, color=ORANGE, label="r_adm")
+        admitted = positive(curves.r_adm)
+        beyond = curves.quantiles[high] > admitted
+        if np.any(beyond):
+            label = f"where more than {100 * (1.0 - high):.2g} % of the runs leave r_adm"
+            handles.append(
+                axes.fill_between(
+                    w, admitted, curves.quantiles[high], where=beyond, color=ORANGE, linewidth=0, label=label
+                )
+            )
+        handles += plot_admitted(axes, w, curves.r_adm)
     return handles
 
 

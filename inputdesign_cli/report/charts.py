@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-
-import numpy as np
 
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.report.drawn import READERS, WITHOUT_LIMIT
 from inputdesign_cli.report.numbers import spoken
-from inputdesign_cli.runs.curves import (
-    BoundCurves,
-    BoundPanel,
-    Curves,
-    OptimalityCurves,
-    SignalCurves,
-    SpectrumCurves,
-)
-from inputdesign_cli.runs.results import Array, Result
+from inputdesign_cli.runs.results import Result
 from inputdesign_cli.runs.text_formats import read_csv
 
-# Curves, what they show in words, and a caption.
-Drawn = tuple[Curves, str, str]
-
+_PICTURES = {"png": "image/png", "svg": "image/svg+xml"}
 _CAPTIONS = {
-    "bound": "The error that the model may have (r_u) against the error that is admitted (r_adm).",
+    "bound": "Above: the error that the model may have (r_u) against the error that is admitted (r_adm). "
+    "Below: their ratio, which is to stay below one; white excitation that spends the same goes higher.",
     "deviations": "The standard deviation of the measured frequency response at every line, against what is "
     "admitted.",
     "fan": "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at "
@@ -37,7 +25,10 @@ _CAPTIONS = {
     "spectrum": "Where in frequency the excitation has its power, and white excitation for comparison.",
     "optimality": "The certificate of the bound over every spectrum: what a unit of cost buys at each "
     "frequency, relative to the best. It is nowhere above one, and one where power pays.",
-    "signal": "The signal to apply (signal.csv), and how its values are distributed.",
+    "signal": "The signal to apply (signal.csv), how its values are distributed, and the output that it is "
+    "to cause, with two standard deviations of noise.",
+    "nyquist": "The loop C G with the discs in which the data leave it, and the circle about -1 that it is "
+    "to keep off. The limiting frequencies are those at which a disc touches what is admitted.",
     "ellipses": "The confidence ellipses that the design buys, for pairs of parameters.",
     "directions": "The gains of the plant, and how the design shares its power among their directions.",
     "moments": "The second moments of the regressors.",
@@ -64,21 +55,20 @@ class Chart:
 
 
 def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) -> dict[str, Chart]:
-    """The charts of a run by file stem. What has no table we know of is taken from its PNG file."""
-    spectrum = partial(_spectrum, symbol="r" if closed_loop else "u")
-    makers: dict[str, Callable[[Mapping[str, Array], Result], Drawn | None]]
-    makers = {"bound": _bound, "spectrum": spectrum, "optimality": _optimality, "signal": _signal}
+    """The charts of a run by file stem. What has no table that we know of is taken from its file."""
+    names = (*READERS, "predicted_output")
+    tables = {name: read_csv(run / f"{name}.csv") for name in names if (run / f"{name}.csv").is_file()}
     charts = {}
-    for stem, make in makers.items():
-        path = run / f"{stem}.csv"
-        found = make(read_csv(path), result) if path.is_file() else None
+    for stem, read in READERS.items():
+        found = read(tables, result, closed_loop) if stem in tables else None
         if found is not None:
-            curves, alt, caption = found
-            charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg")), alt, caption)
+            curves, alt = found
+            caption = alt if alt == WITHOUT_LIMIT else _CAPTIONS[stem]
+            charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg", narrow=True)), alt, caption)
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
-        if kind == "png" and stem not in charts and (run / name).is_file():
-            charts[stem] = png_chart(run / name)
+        if kind in _PICTURES and stem not in charts and (run / name).is_file():
+            charts[stem] = file_chart(run / name)
     return charts
 
 
@@ -87,12 +77,12 @@ def svg_uri(content: bytes) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(content).decode()
 
 
-def png_chart(path: Path) -> Chart:
+def file_chart(path: Path) -> Chart:
     """A figure of the run as it is."""
     data = base64.b64encode(read_regular(path)).decode()
     name = path.stem.replace("_", " ")
     caption = _CAPTIONS.get(path.stem) or _caption_by_kind(path.stem) or f"The figure {name} of the run."
-    return Chart(f"data:image/png;base64,{data}", caption, caption)
+    return Chart(f"data:{_PICTURES[path.suffix[1:]]};base64,{data}", caption, caption)
 
 
 def _caption_by_kind(stem: str) -> str | None:
@@ -112,66 +102,3 @@ def _caption_by_kind(stem: str) -> str | None:
         "bound": "The error r_u that these data leave, against the admitted error r_adm.",
         "structures": "How well each structure that was tried simulates data that it has not seen.",
     }.get(stem.removeprefix("data_"))
-
-
-def _frequency(table: Mapping[str, Array]) -> Array:
-    return next(values for name, values in table.items() if name.startswith("frequency"))
-
-
-def _bound(table: Mapping[str, Array], result: Result) -> Drawn | None:
-    if not {"r_u", "G_abs"} <= set(table):
-        return None
-    w = _frequency(table)
-    error = result.get("model_error", {})
-    active = np.clip(np.array(error.get("active_frequencies", []), dtype=float), w[0], w[-1])
-    panel = BoundPanel(
-        w,
-        table["r_u"],
-        table["G_abs"],
-        table.get("r_adm"),
-        table.get("r_u_white"),
-        active,
-        table.get("r_u_record"),
-        # Beside a design the figure of the data is one of its own.
-        label="data" if "identification" in result and "objective" not in result else "design",
-    )
-    curves = BoundCurves((panel,))
-    if panel.r_adm is None:
-        alone = "The error r_u that the model may have, and the gain |G|, against frequency."
-        return curves, alone, alone
-    worst = f"; the largest ratio is {error['worst_ratio']:.6g}" if "worst_ratio" in error else ""
-    alt = f"Model error r_u and admissible error r_adm against frequency{worst}."
-    return curves, alt, _CAPTIONS["bound"]
-
-
-def _spectrum(table: Mapping[str, Array], result: Result, *, symbol: str) -> Drawn | None:
-    if "phi" not in table:
-        return None
-    w, phi = _frequency(table), table["phi"]
-    white = result.get("baseline", {}).get("white", {}).get("power", {}).get("excitation", [None])[0]
-    record = table["phi_record"][:, None] if "phi_record" in table else None
-    density = phi[:, None, None].astype(np.complex128)
-    curves = SpectrumCurves(w, density, white=white, symbol=symbol, record=record)
-    peak = w[int(np.argmax(phi))]
-    alt = f"Spectral density of the excitation against frequency, with its peak at {peak:.3g}."
-    return curves, alt, _CAPTIONS["spectrum"]
-
-
-def _optimality(table: Mapping[str, Array], result: Result) -> Drawn | None:
-    if "ratio" not in table:
-        return None
-    w, ratio = _frequency(table), table["ratio"]
-    curves = OptimalityCurves(w, ratio, np.zeros(0))
-    alt = f"Worth of a unit of cost against frequency; its maximum is {ratio.max():.4g}."
-    return curves, alt, _CAPTIONS["optimality"]
-
-
-def _signal(table: Mapping[str, Array], result: Result) -> Drawn | None:
-    names = list(table)
-    channels = {name: table[name] for name in names if not name.startswith("time")}
-    if len(channels) == len(names) or not channels:
-        return None
-    curves = SignalCurves(table[names[0]], channels)
-    listed = ", ".join(channels)
-    alt = f"The signal {listed} against time, and the distribution of its values."
-    return curves, alt, _CAPTIONS["signal"]

@@ -142,6 +142,19 @@ def campaign_facts(result: Result) -> Iterator[tuple[str, str]]:
         yield "next", f"apply {plan['samples']} samples of power {plan['power']:.4g} (signal.csv{of})"
 
 
+def simulation_answer(result: Result) -> Iterator[str]:
+    """What simulated experiments say of the design, in a sentence; nothing where they were not asked that."""
+    found = result.get("simulation", {})
+    entry = found.get("inputs", {}).get("design", {})
+    if "within_r_adm" not in entry:
+        return
+    low, high = (100 * limit for limit in entry["within_r_adm_limits"])
+    yield (
+        f"In {found['runs']} simulated experiments {100 * entry['within_r_adm']:.1f} % of the models stayed "
+        f"within r_adm at every frequency (95 % limits {low:.1f} to {high:.1f})."
+    )
+
+
 def simulation_table(result: Result) -> Rows | None:
     """One row for each input that was tried; None without a simulation."""
     inputs = result.get("simulation", {}).get("inputs", {})

@@ -35,6 +35,7 @@ class Question:
     asked: frozenset[str]  # the keys under `accuracy`
     family: str  # the type of the spectrum; empty for a given one
     seed: int  # of the signal
+    units: str  # of what the page shows
 
 
 def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Question:
@@ -68,6 +69,17 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
         asked=frozenset(name for name, value in spec.accuracy if value is not None),
         family=_family(spec),
         seed=spec.signal.seed or 0,
+        units=_units(spec),
+    )
+
+
+def _units(spec: Spec) -> str:
+    """In which units the numbers are."""
+    named = [f"{name} in {one.unit}" for name, one in (spec.channels or {}).items() if one.unit]
+    signals = ", ".join(named) or "signals in the units of the spec"
+    return (
+        f"{signals}; powers are mean squares, in the squares of these; time in {spec.time_unit}, frequencies "
+        f"in rad/{spec.time_unit}"
     )
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
@@ -14,6 +17,9 @@ from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.runs.record import RESULT, unreadable
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.version import __version__
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 # What a record leads to that somebody else wrote or changed: no schema says what each of its numbers must be.
 _BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
@@ -37,25 +43,38 @@ def report_text(directory: Path) -> str:
 def _filled(
     template: str, directory: Path, record: str, content_of: Callable[[Path, Trail], dict[str, Json]]
 ) -> str:
-    """A template with its content; whatever text comes from a spec or a result is escaped.
+    """The page about a directory.
 
-    The page carries the SHA-256 of the file `record`, which tells whether it is about what stands beside it.
+    It carries the SHA-256 of the file `record`, which tells whether it is about what stands beside it.
     """
+    trail = Trail()
+    try:
+        digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
+        # That of the record, not of the page: the same run gives the same page.
+        date = datetime.fromtimestamp((directory / record).stat().st_mtime).strftime("%Y-%m-%d %H:%M")
+        content = content_of(directory, trail)
+        source = directory.name or directory.resolve().name
+        return filled(
+            template, {"source": source, "record": record, "digest": digest, "date": date, **content}
+        )
+    except _BROKEN as error:
+        what = f'"{trail.last}" is' if trail.last else "its entries are"
+        raise unreadable(directory / record, f"{what} not what idesign writes") from error
+
+
+def filled(template: str, content: Mapping[str, Json]) -> str:
+    """A template with its content; whatever text comes from a spec or a result is escaped."""
+    return _templates().get_template(template).render(version=__version__, **content)
+
+
+@cache
+def _templates() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    environment = Environment(
+    return Environment(
         loader=PackageLoader("inputdesign_cli.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page, trail = environment.get_template(template), Trail()
-    try:
-        digest = hashlib.sha256(read_regular(directory / record)).hexdigest()
-        content = content_of(directory, trail)
-        source = directory.name or directory.resolve().name
-        return page.render(version=__version__, source=source, record=record, digest=digest, **content)
-    except _BROKEN as error:
-        what = f'"{trail.last}" is' if trail.last else "its entries are"
-        raise unreadable(directory / record, f"{what} not what idesign writes") from error

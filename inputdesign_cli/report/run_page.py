@@ -14,6 +14,7 @@ from inputdesign_cli.report.evidence import (
     estimate_facts,
     estimate_table,
     requirement_table,
+    simulation_answer,
     simulation_table,
 )
 from inputdesign_cli.report.facts import facts, proofs, white
@@ -29,6 +30,7 @@ from inputdesign_cli.runs.run_directory import read_run
 # Headings and the charts that belong under them; those of data and of simulated runs have their own.
 _SECTIONS = (
     ("Accuracy", ("bound", "deviations", "fan")),
+    ("The loop", ("nyquist",)),
     ("Spectrum", ("spectrum",)),
     ("Signal", ("signal",)),
     ("The certificate", ("optimality",)),
@@ -84,24 +86,43 @@ def run_page(run: Path, trail: Trail) -> dict[str, Json]:
     sections = [(heading, [n for n in names if n in charts]) for heading, names in _SECTIONS]
     sections.append(("Further figures", [name for name in charts if name not in placed]))
     proved = [f"{text[0].upper()}{text[1:]}." for text in proofs(result)]
+    shown = [(h, names) for h, names in sections if names or (h == "The certificate" and proved)]
+    estimated, simulated = estimate_table(result), simulation_table(result)
+    cited, assumed = citations(question, result), assumptions(question, result)
     status = str(result.get("assessment", {}).get("top_up_status") or result.get("status", ""))
     return {
         "title": question.title or run.resolve().name,
+        "contents": [
+            "The question",
+            "The answer",
+            *(["The data"] if estimated or data else []),
+            *(heading for heading, _ in shown),
+            *(["Simulation"] if simulated or runs else []),
+            *(["What was assumed"] if assumed else []),
+            "How to reproduce it",
+            *(["Methods"] if cited else []),
+            "All numbers",
+        ],
         "question": question.sentences,
-        "answer": estimate_answer(result) if "identification" in result else _answer(result),
+        "answer": " ".join(
+            [
+                estimate_answer(result) if "identification" in result else _answer(result),
+                *simulation_answer(result),
+            ]
+        ),
         "notes": result.get("notes", []),
-        "estimate": estimate_table(result),
+        "estimate": estimated,
         "estimate_facts": list(estimate_facts(result)),
         "verdicts": requirement_table(result, question.time_unit),
-        "data_charts": data,
-        "facts": [("status", status, ""), *facts(result, question.time_unit)],
+        "data_figures": data,
+        "facts": [("status", status, ""), *facts(result, question.time_unit), ("units", question.units, "")],
         "charts": charts,
-        "sections": [(h, names) for h, names in sections if names or (h == "The certificate" and proved)],
+        "sections": shown,
         "proofs": proved,
-        "simulation": simulation_table(result),
+        "simulation": simulated,
         "simulated_runs": result.get("simulation", {}).get("runs"),
         "run_charts": runs,
-        "assumptions": assumptions(question, result),
+        "assumptions": assumed,
         "command": _command(verb, result),
         "explored": "exploration" in result,
         "files": _data_files(result),
@@ -113,7 +134,7 @@ def run_page(run: Path, trail: Trail) -> dict[str, Json]:
                 ("seed of the signal", str(question.seed), ""),
             ],
         ),
-        "citations": citations(question, result),
+        "citations": cited,
         "numbers": flat({key: value for key, value in result.items() if key not in _NOT_NUMBERS}),
     }
 

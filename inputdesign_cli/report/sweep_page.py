@@ -9,7 +9,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.style import rendered
-from inputdesign_cli.figures.sweep_figures import QUANTITIES, sweep_figures
+from inputdesign_cli.figures.sweep_figures import sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, svg_uri
@@ -41,6 +41,14 @@ def sweep_page(root: Path, trail: Trail) -> dict[str, Json]:
     question, result = _first_run(table, root)
     return {
         "title": summary.get("title") or root.resolve().name,
+        "contents": [
+            "The question",
+            "The answer",
+            "The points",
+            *(["Points without a result"] if any(table.columns["code"]) else []),
+            "How to reproduce it",
+            *(["Methods"] if question and citations(question, result) else []),
+        ],
         "question": question.sentences if question else (),
         "zipped": summary.get("zip", False),
         "axes": [(axis["key"], _values(axis["values"]), "") for axis in summary["axes"]],
@@ -81,14 +89,13 @@ def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str
 def _answer(table: SweepTable) -> str:
     statuses = ", ".join(f"{n} {status}" for status, n in table.summary.get("statuses", {}).items())
     said = f"{table.rows} points: {statuses}."
-    quantity = next((name for name in QUANTITIES if table.numbers(name) is not None), None)
-    values = table.numbers(quantity) if quantity else None
-    if values is None or not np.isfinite(values).any():
+    found = table.best
+    if found is None:
         return said
-    known = OBJECTIVES.get(table.kind)
-    best = int(np.nanargmax(values) if known and known.maximised else np.nanargmin(values))
-    point = ", ".join(f"{key} = {table.columns[key][best]}" for key in table.axes)
-    what = known.name if known else quantity
+    quantity, point = found
+    values = table.numbers(quantity)
+    assert values is not None
+    what = OBJECTIVES[table.kind].name if table.kind in OBJECTIVES else quantity
     low, high = np.nanmin(values), np.nanmax(values)
     return f"{said} Over the sweep the {what} ranges from {low:.5g} to {high:.5g}; it is best at {point}."
 
@@ -100,7 +107,11 @@ def _charts(table: SweepTable) -> list[Chart]:
         "moments": "The second moments of the regressors over the key.",
     }
     return [
-        Chart(svg_uri(rendered(paint, "svg")), f"{captions[name]} Drawn from sweep.csv.", captions[name])
+        Chart(
+            svg_uri(rendered(paint, "svg", narrow=True)),
+            f"{captions[name]} Drawn from sweep.csv.",
+            captions[name],
+        )
         for name, paint in sweep_figures(table)
     ]
 

@@ -28,7 +28,6 @@ class SpectrumCurves(Curves):
     white: float | None = None  # the level of the white baseline; of one input's sinusoids its power
     lines: bool = False
     symbol: str = "u"  # which signal: "u" in open loop, "r" in closed loop
-    logarithmic: bool = False  # the axis of frequency; that of one input always is
     record: Array | None = None  # (n, r), smoothed periodograms of the record
     band: tuple[float, float] | None = None  # where the sinusoids might be
 
@@ -60,10 +59,12 @@ class BoundPanel:
     r_u: Array
     G_abs: Array
     r_adm: Array | None = None
-    r_u_white: Array | None = None  # of white excitation at the cost that it needs
+    r_u_white: Array | None = None  # of white excitation that meets the same, or exhausts the same limits
     active: Array = field(default_factory=lambda: np.zeros(0))  # frequencies where r_u touches r_adm
     r_u_record: Array | None = None  # of the samples of the record
     label: str = "design"  # what gave r_u
+    r_u_equal: Array | None = None  # of white excitation at the cost, or of the length, of the design
+    white_labels: tuple[str, str] = ("white", "white, same cost")  # what r_u_white and r_u_equal are called
     entry: tuple[int, int] | None = None  # of G: output and input from zero; None: the only one, or the norm
     names: str = ""  # of the input and the output, where the user gave them
 
@@ -73,6 +74,17 @@ class BoundCurves(Curves):
     """Model error against admissible error, entry by entry."""
 
     panels: tuple[BoundPanel, ...]
+
+
+@dataclass(frozen=True)
+class NyquistCurves(Curves):
+    """The loop C G of one channel over frequency, and how far r_u lets it stray; arrays (n,)."""
+
+    frequency: Array
+    loop: NDArray[np.complex128]
+    radius: Array  # |C| r_u
+    circle: float | None = None  # the distance from -1 that is to be kept, where it is one
+    limiting: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -267,13 +279,26 @@ class OrderCurves(Curves):
 
 
 @dataclass(frozen=True)
+class PredictedPanel:
+    """What the record causes at an output from rest, and the standard deviation of the noise; arrays (n,)."""
+
+    name: str  # "y1"
+    values: Array
+    deviation: Array
+    limits: tuple[float, float] | None = None
+    label: str = ""  # its name and unit, where there are any
+
+
+@dataclass(frozen=True)
 class SignalCurves(Curves):
-    """The record to be applied: `time` (n,), one array (n,) a channel."""
+    """The record to be applied: `time` (n,), one array (n,) a channel; below, what it is to cause."""
 
     time: Array
     channels: Mapping[str, Array]  # "u1" -> samples (closed loop: "r1")
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> least, largest value
     labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
+    predicted: tuple[PredictedPanel, ...] = ()
+    held: bool = True  # each value until the next
 
 
 @dataclass(frozen=True)

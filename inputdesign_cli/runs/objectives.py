@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+from inputdesign_cli.runs.results import Json
 
 
 @dataclass(frozen=True)
@@ -15,6 +18,7 @@ class Objective:
     label: str = ""  # of the value on an axis, if that is not the name
     maximised: bool = False  # its bounds are from above
     white: str = "value"  # the entry of `baseline.white` to compare with
+    spent: str = ""  # what white excitation that meets the same takes more of
 
     @property
     def axis(self) -> str:
@@ -31,12 +35,14 @@ OBJECTIVES = {
         "the cheapest experiment that meets the accuracy",
         "The cheapest experiment that meets the accuracy costs {}",
         white="cost",
+        spent="cost",
     ),
     "shortest_experiment": Objective(
         "samples",
         "the shortest experiment that meets the accuracy",
         "The shortest experiment that meets the accuracy has {} samples",
         white="samples",
+        spent="length",
     ),
     "accuracy_factor": Objective(
         "factor",
@@ -74,3 +80,19 @@ UNKNOWN = Objective("value", "", "The value is {}")
 def objective(kind: str | None) -> Objective:
     """The words for a kind; plain ones for a result without an objective."""
     return OBJECTIVES.get(kind or "", UNKNOWN)
+
+
+# Of white excitation that is not told to be anything else, and of that which spends what the design does.
+WHITE = ("white", "white, same cost")
+
+
+def white_labels(result: Mapping[str, Json]) -> tuple[str, str]:
+    """What curves of white excitation are called: that of the baseline, and that with equal means."""
+    found = result.get("objective", {})
+    spent, white = objective(found.get("kind")).spent, result.get("baseline", {}).get("white", {})
+    if not spent:
+        return ("white, same limits" if found else WHITE[1]), WHITE[1]
+    ratio = white.get("ratio", 1.0)
+    if spent == "length":
+        ratio = white.get("samples", 0) / max(result.get("samples", 1), 1)
+    return f"white, {ratio:.3g} × the {spent}", f"white, same {spent}"

@@ -22,7 +22,8 @@ from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
-from inputdesign_cli.runs.results import Json, Results, Table
+from inputdesign_cli.runs.objectives import white_labels
+from inputdesign_cli.runs.results import Json, Result, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit import audit
@@ -40,10 +41,11 @@ from inputdesign_cli.tasks.record import (
     shortfall,
 )
 from inputdesign_cli.tasks.record_search import fitting_record, samples_of_record
-from inputdesign_cli.tasks.result.bound import bound_curves
+from inputdesign_cli.tasks.result.bound import bound_curves, equal_white
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
+from inputdesign_cli.tasks.result.nyquist import nyquist_curves
 from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram
@@ -52,6 +54,7 @@ from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
 from inputdesign_cli.tasks.robust import Plants, without_dearest
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
+from inputdesign_cli.tasks.unknown_start import start_notes
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,7 @@ class ConvexTask:
                 None, self.record, done.design, notes=(no_record_in_time(self.record.settings.candidates),)
             )
         record = made.record
-        tables, curves = self._illustrations(done, record)
+        tables, curves = self._illustrations(done, record, result)
         if self.plants is not None:
             robust = robust_result(done, self.plants)
             result["robust"] = robust.entry
@@ -135,13 +138,16 @@ class ConvexTask:
         files: dict[str, bytes] = {}
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record)
-            tables["signal"], curves["signal"] = signal_curves(made.request, self.header.units, record)
+            drawn = signal_curves(made.request, self.header.units, done.experiment, record)
+            tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
             notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
             known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
+                asked, step = done.problem.requirements, self.record.step
+                notes += start_notes(done.experiment, record.samples, step, asked)
             if record is not None and self.foresight is not None:
                 foreseen = self.foresight.foreseen(record.samples, done.problem.requirements, result)
                 result |= {"foreseen": foreseen.entry} if foreseen.entry else {}
@@ -286,7 +292,7 @@ class ConvexTask:
         return entry | made.entry
 
     def _illustrations(
-        self, done: Designed, record: Record | None
+        self, done: Designed, record: Record | None, result: Result
     ) -> tuple[dict[str, Table], dict[str, Curves]]:
         """Tables and curves of the spectrum, of r_u and of the proof."""
         design, units = done.design, self.header.units
@@ -303,16 +309,21 @@ class ConvexTask:
         asked = (*problem.requirements, *problem.side)
         errors = model_errors(asked)
         unstated = [replace(error, experiment=done.experiment) for error in self.unstated]
+        active = [found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)]
         with suppress(np.linalg.LinAlgError):  # a parameter that a T-optimal design does not excite
             tables["bound"], curves["bound"] = bound_curves(
                 units,
                 errors or unstated,
                 done.information,
                 white=white,
+                equal=equal_white(design, done.experiment.samples, result["baseline"]["white"]["ratio"]),
+                white_labels=white_labels(result),
                 record=self._known(done, record),
                 stated=bool(errors),
-                active=[found.active_at(i) for i, r in enumerate(asked) if isinstance(r, OnModelError)],
+                active=active,
             )
+            loops = nyquist_curves(units, (errors or unstated)[:1], done.information, active)
+            tables, curves = tables | loops[0], curves | loops[1]
         optimality = optimality_curves(units, design)
         if optimality is not None:
             tables["optimality"], curves["optimality"] = optimality

@@ -19,6 +19,7 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, P
 from inputdesign_cli.monte_carlo.excitations import Excitation, InPhase, Redrawn, spectral_information
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.objectives import white_labels
 from inputdesign_cli.runs.results import Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in_phase_record
@@ -30,9 +31,11 @@ from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
+from inputdesign_cli.tasks.result.nyquist import nyquist_curves
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
+from inputdesign_cli.tasks.unknown_start import start_notes
 
 _TOO_FAINT = 1e-12
 _ROUNDING = 1e-9
@@ -147,8 +150,15 @@ class GivenTask:
         stated = model_errors(requirements)
         unstated = [replace(error, experiment=experiment) for error in self.unstated]
         tables["bound"], curves["bound"] = bound_curves(
-            units, stated or unstated, information, white=white, stated=bool(stated)
+            units,
+            stated or unstated,
+            information,
+            white=white,
+            white_labels=white_labels(result),
+            stated=bool(stated),
         )
+        loops = nyquist_curves(units, (stated or unstated)[:1], information)
+        tables, curves = tables | loops[0], curves | loops[1]
         if excitation.basis is not None and excitation.x is not None:
             tables["spectrum"], curves["spectrum"] = spectrum_curves(
                 units,
@@ -163,11 +173,14 @@ class GivenTask:
         record, files = self._record(experiment, worst_ratio(requirements)), {}
         if record is not None:
             result["signal"] = signal_entry(self.record, units, experiment, record, requirements)
-            tables["signal"], curves["signal"] = signal_curves(self.record, units, record)
+            drawn = signal_curves(self.record, units, experiment, record)
+            tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(self.record, units, record)
         signal = result.get("signal", {})
         notes = broken_limits(self.limits, experiment.samples, excitation.power, signal)
         notes += record_notes(self.record, experiment.samples, record) if record is None else []
+        if record is not None and np.isfinite(record.worst_ratio):
+            notes += start_notes(experiment, record.samples, self.record.step, requirements)
         if record is not None and self.foresight is not None:
             foreseen = self.foresight.foreseen(record.samples, requirements, result)
             result |= {"foreseen": foreseen.entry} if foreseen.entry else {}

@@ -3,34 +3,28 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.compute.executor import Executor
-from inputdesign_cli.design.convex.cost import Weight, weights_of
-from inputdesign_cli.design.convex.limits import PowerLimit
+from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.design.response import (
-    Goal,
     ResponseDesign,
-    ResponseLines,
     ResponseProblem,
     UnreachableError,
     cheapest,
     most_accurate,
 )
 from inputdesign_cli.errors import bad_spec
-from inputdesign_cli.identification.periodic_response import Periods, response_at
-from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.identification.periodic_response import response_at
+from inputdesign_cli.information import PowerKind
 from inputdesign_cli.monte_carlo.response import ResponseStudy, study_response
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal import Lines, Record, low_peak_phases, multisine_record, schroeder_phases
-from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.tasks.audit_response import audit_response
 from inputdesign_cli.tasks.record import RecordRequest
 from inputdesign_cli.tasks.result.response import (
@@ -49,29 +43,16 @@ _STREAM = 0x5EED
 
 
 @dataclass(frozen=True)
-class ResponseTask:
+class ResponseTask(ResponseTerms):
     """A design of lines, or the analysis of given ones, and its study.
 
     Attributes:
-        experiment: with the samples that count (one where the shortest is asked for).
         given: (L, r) powers that are not designed.
-        asked: samples that the spec gives the experiment.
         tabulated: whether the noise comes from a table, so that there is no model of it.
     """
 
-    header: Header
-    experiment: Experiment
-    grid: HarmonicGrid
-    lines: ResponseLines
-    periods: Periods
-    goal: Goal
     given: NDArray[np.float64] | None
-    cost: Mapping[PowerKind, Weight]
-    limits: tuple[PowerLimit, ...]
-    most_samples: int | None
-    tolerance: float
     tabulated: bool
-    asked: int
     record: RecordRequest
     simulation: Simulation
 
@@ -124,14 +105,7 @@ class ResponseTask:
             )
             for name, u in records.items()
         }
-        return study_results(self._terms, plan, results, studies, self.simulation, begun)
-
-    @property
-    def _terms(self) -> ResponseTerms:
-        return ResponseTerms(
-            self.header, self.experiment, self.grid, self.lines, self.periods, self.goal, self.cost,
-            self.limits, self.tolerance, self.asked, self.most_samples,
-        )  # fmt: skip
+        return study_results(self, plan, results, studies, self.simulation, begun)
 
     def _problem(self, samples: int) -> ResponseProblem:
         shape = self.lines.G.shape[0], self.experiment.inputs
@@ -202,7 +176,7 @@ class ResponseTask:
             not self.tabulated,
         )
         timing = {"design": solved - started, "signal": time.perf_counter() - solved}
-        terms = replace(self._terms, experiment=experiment)
+        terms = replace(self, experiment=experiment)
         result = {**design_result(terms, plan), "timing_s": timing}
         results = response_results(terms, plan, result, self.record)
         audit_response(terms, plan, results)

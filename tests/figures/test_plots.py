@@ -10,7 +10,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.figures.plots import draw, draw_all
 from inputdesign_cli.runs.curves import (
     BoundCurves,
     BoundPanel,
@@ -24,11 +24,14 @@ from inputdesign_cli.runs.curves import (
     FitPanel,
     LossCurves,
     MomentsCurves,
+    NyquistCurves,
     OptimalityCurves,
+    PredictedPanel,
     ResidualCurves,
     SignalCurves,
     SpectrumCurves,
 )
+from inputdesign_cli.runs.results import Results
 
 W = np.geomspace(1e-3, np.pi, 200)
 Z = np.exp(-1j * W)
@@ -64,6 +67,11 @@ BANDS = ErrorBandPanel(W, {0.05: 0.1 * G, 0.5: 0.2 * G, 0.95: 0.4 * G}, 0.5 * G,
 
 CURVES = {
     "bound": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi]))),
+    "bound beside white": bound(
+        BoundPanel(
+            W, 0.008 * G, G, 0.01 * G, 0.01 * G, r_u_equal=0.03 * G, white_labels=("white, 4 × the cost", "w")
+        )
+    ),
     "bound without a target": bound(BoundPanel(W, 0.008 * G, G)),
     "bound with a gap in r_adm": bound(BoundPanel(W, 0.008 * G, G, np.where(W < 1, 0.01 * G, -1.0))),
     "spectrum": one_input(DENSITY, 1.7),
@@ -73,6 +81,13 @@ CURVES = {
     ),
     "bound with its record": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_record=0.009 * G)),
     "limited signal": SignalCurves(np.arange(50.0), {"u1": 3 + np.sin(np.arange(50.0))}, {"u1": (1.5, 4.5)}),
+    "predicted signal": SignalCurves(
+        np.arange(50.0),
+        {"u1": 3 + np.sin(np.arange(50.0))},
+        {"u1": (1.5, 4.5)},
+        {"u1": "valve (%)"},
+        (PredictedPanel("y1", T[:50], np.sqrt(T[:50]), (-60.0, 60.0), "level (m)"),),
+    ),
     "lines": lines([0.1553], [0.1925], white=1.7, band=(1e-3, np.pi)),
     "lines in a loop": lines([0.02, 0.1], [0.1, 0.2], symbol="r"),
     "matrix": SpectrumCurves(W, PAIR, 1.7),
@@ -81,8 +96,10 @@ CURVES = {
     "directions": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([DENSITY, W], 1), 1.7),
     "directions of lines": DirectionCurves(W, np.stack([G, 0.01 * G], 1), np.stack([G, W], 1), lines=True),
     "loss": LossCurves({"design": W, "white": 2 * W}, {"design": 1.0}),
+    "nyquist": NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W, 0.5, W[150:151]),
+    "nyquist without a bound": NyquistCurves(W, 0.8 * Z**2 / (1 - Z), 0.1 + 0 * W),
     "optimality": OptimalityCurves(W, 1 / (1 + np.log(W / 0.1553) ** 2), np.array([0.1553])),
-    "matrix on a logarithmic axis": SpectrumCurves(W, PAIR, symbol="r", logarithmic=True),
+    "matrix of one direction": SpectrumCurves(W, PAIR * np.array([[1, 1e-14], [1e-14, 1]]), symbol="r"),
     "matrix with a peak": SpectrumCurves(W, PAIR / (1e-4 + (W - 1) ** 2)[:, None, None]),
     "one line of channels": SpectrumCurves(np.array([0.3]), PAIR[:1], lines=True),
     "bounds of entries": bound(
@@ -127,7 +144,9 @@ def lines_by_label(axes):
 def test_a_png_of_the_promised_size(name):
     data = draw(CURVES[name])
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    assert struct.unpack(">II", data[16:24]) == (1050, 675)
+    width, height = struct.unpack(">II", data[16:24])
+    assert width == 1050
+    assert 675 <= height <= 1050
 
 
 def test_no_global_state():
@@ -141,23 +160,57 @@ def test_no_global_state():
     assert state() == before
 
 
-def test_bound_shows_every_curve_and_marks_the_active_frequencies(page):
-    (axes,) = page(CURVES["bound"]).axes
-    lines = lines_by_label(axes)
-    np.testing.assert_array_equal(lines["|G|"].get_ydata(), G)
+def test_bound_shows_every_error_and_marks_the_limiting_frequencies(page):
+    above, below = page(CURVES["bound"]).axes
+    lines = lines_by_label(above)
     np.testing.assert_array_equal(lines["r_u, design"].get_ydata(), 0.008 * G)
     np.testing.assert_array_equal(lines["r_u, white"].get_ydata(), 0.01 * G)
-    np.testing.assert_array_equal(lines["r_adm"].get_ydata(), 0.01 * G)
+    np.testing.assert_array_equal(lines["r_adm, admitted"].get_ydata(), 0.01 * G)
     z = np.exp(-0.5j)
     expected = 0.008 * abs(3.6 * z / (1 - 0.7 * z))
-    assert lines["active"].get_xdata()[0] == 0.5
-    assert lines["active"].get_ydata()[0] == pytest.approx(expected, rel=1e-3)
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert lines["limiting frequencies"].get_xdata()[0] == 0.5
+    assert lines["limiting frequencies"].get_ydata()[0] == pytest.approx(expected, rel=1e-3)
+    assert (above.get_xscale(), above.get_yscale()) == ("log", "log")
+    ratios = lines_by_label(below)
+    np.testing.assert_allclose(ratios["design: up to 0.8"].get_ydata(), 0.8)
+    assert set(ratios["limit"].get_ydata()) == {1.0}
+    assert below.get_yscale() == "linear"
+
+
+def test_bound_shows_the_range_of_the_errors_not_that_of_the_gain(page):
+    above, _ = page(CURVES["bound beside white"]).axes
+    low, high = above.get_ylim()
+    assert low > 0.5 * (0.008 * G).min()
+    assert high < 2.0 * (0.03 * G).max()
+
+
+def test_bound_tells_how_far_white_excitation_of_the_same_cost_misses(page):
+    above, below = page(CURVES["bound beside white"]).axes
+    assert {"r_u, w", "r_u, white, 4 × the cost"} <= set(lines_by_label(above))
+    np.testing.assert_allclose(lines_by_label(below)["w: up to 3"].get_ydata(), 3.0)
+
+
+def test_a_ratio_far_beyond_the_limit_does_not_squeeze_the_others(page):
+    curves = bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, r_u_equal=3.0 * G))
+    _, below = page(curves).axes
+    assert below.get_ylim()[1] < 10.0
+
+
+def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
+    (axes,) = page(CURVES["nyquist"]).axes
+    (discs,) = axes.collections
+    near = Z[150]
+    centre = 0.8 * near**2 / (1 - near)
+    offsets = discs.get_offsets()
+    assert np.hypot(offsets[:, 0] - centre.real, offsets[:, 1] - centre.imag).min() < 1e-9
+    np.testing.assert_allclose(discs.get_widths(), 0.2)
+    assert [circle.get_radius() for circle in axes.patches] == [0.5, 0.5]
+    assert not page(CURVES["nyquist without a bound"]).axes[0].patches
 
 
 def test_only_what_is_there_is_in_the_legend(page):
     (axes,) = page(CURVES["bound without a target"]).axes
-    assert list(lines_by_label(axes)) == ["|G|", "r_u, design"]
+    assert list(lines_by_label(axes)) == ["r_u, design", "|G|"]
 
 
 def test_the_unit_of_time_is_on_the_axis(page):
@@ -174,10 +227,13 @@ def test_the_spectrum_beside_the_white_level(page):
 
 
 def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
-    panels = page(CURVES["bounds of entries"]).axes
-    assert [axes.get_title(loc="left") for axes in panels] == ["", "G₁₂", "G₂₁", ""]
-    np.testing.assert_array_equal(lines_by_label(panels[1])["r_adm"].get_ydata(), 0.01 * G)
-    assert "r_adm" not in lines_by_label(panels[2])
+    *panels, below = page(CURVES["bounds of entries"]).axes
+    titles = {axes.get_subplotspec().num1: axes.get_title(loc="left") for axes in panels}
+    assert titles == {1: "G₁₂", 2: "G₂₁"}
+    first, second = panels
+    np.testing.assert_array_equal(lines_by_label(first)["r_adm, admitted"].get_ydata(), 0.01 * G)
+    assert "r_adm, admitted" not in lines_by_label(second)
+    assert list(lines_by_label(below)) == ["G12: up to 0.8", "limit"]
 
 
 def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(page):
@@ -211,9 +267,25 @@ def test_lines_stand_as_stems_of_their_power(page):
 def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
     figure = page(CURVES["long signal"])
     record, histogram = figure.axes[:2]
-    assert "first 1000 of 3000 samples, 4 of 6 channels" in record.get_title(loc="left")
+    assert "first 1000 of 3000 samples, 4 of 6 channels" in figure.axes[6].get_xlabel()
     assert record.lines[0].get_xdata().size == 1000
     assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
+    figure = page(CURVES["predicted signal"])
+    record, _, below, _ = figure.axes
+    assert record.lines[0].get_drawstyle() == "steps-post"
+    assert (record.get_ylabel(), below.get_ylabel()) == ("valve (%)", "level (m)")
+    band = below.collections[0].get_paths()[0].vertices
+    np.testing.assert_allclose([band[:, 1].min(), band[:, 1].max()], [-1.0, 49.0 + 2.0 * 7.0], atol=1e-9)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == [
+        "to be applied, held between samples",
+        "limits",
+        "± 2 standard deviations of noise since the start",
+        "predicted output, from rest",
+    ]
 
 
 NAMES = [r"$\frac{1}{0", "$$", "$x$", r"\$", "_u", "100 %", "{}", "日本", "a_b^c", "&<b>", "{0}", "°C"]
@@ -251,3 +323,32 @@ def test_a_spectrum_of_no_lines_is_an_empty_page():
     """What a design is that needs no excitation."""
     nothing = SpectrumCurves(np.zeros(0), np.zeros((0, 1, 1)), lines=True, band=(0.0, 1.0))
     assert draw(nothing).startswith(b"\x89PNG")
+
+
+def test_entries_that_coincide_share_a_curve_and_rounding_has_none(page):
+    above, _ = page(CURVES["matrix of one direction"]).axes
+    assert list(lines_by_label(above)) == ["|Φ₁₁| = |Φ₂₂|"]
+    assert [axes.get_xscale() for axes in page(CURVES["matrix"]).axes] == ["log", "log"]
+
+
+def test_the_certificate_says_what_it_means(page):
+    figure = page(CURVES["optimality"])
+    assert "no other spectrum can do better" in figure.get_suptitle()
+
+
+def test_where_runs_leave_what_is_admitted_is_marked(page):
+    kept, missed = page(CURVES["error bands"]).axes[0], replace(BANDS, r_adm=np.where(W < 1, G, 0.3 * G))
+    assert not any("leave" in label for label in lines_by_label(kept))
+    (axes,) = page(ErrorBandCurves((missed,), "design", 100)).axes
+    (marked,) = [part for label, part in lines_by_label(axes).items() if "leave r_adm" in label]
+    assert marked.get_paths()[0].vertices[:, 0].min() >= 0.99
+    assert lines_by_label(axes)["r_adm, admitted"].get_linestyle() == "--"
+
+
+@pytest.mark.parametrize(("kind", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
+def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kind, begins):
+    results = Results({}, "", curves={"bound": CURVES["bound"]})
+    drawn = draw_all(results, kind)
+    assert list(drawn) == [f"bound.{kind}"]
+    assert drawn[f"bound.{kind}"].startswith(begins)
+    assert draw_all(results, kind) == drawn

@@ -31,7 +31,8 @@ M = "spectrum.order"
         (table({"spectrum": "aabb", M: "1212"}, [4, 3, 2, 1]), ["curves"]),
         (table({"spectrum": "ab"}, [4, 3]), []),
         (table({N: "12", M: "12"}, [4, 3], zipped=True), ["curves"]),
-        (table({N: "12", M: "12", "x": "12"}, [4, 3]), []),
+        (table({N: "1122", M: "1212", "x": "1122"}, [4, 3, 2, 1]), ["curves"]),
+        (table({N: "12", M: "12", "x": "12", "z": "12"}, [4, 3]), []),
         (table({N: "12"}, ["", ""]), []),
         (table({N: "12"}, [4, ""]), []),
         (table({N: "11", M: "12"}, [4, 3]), ["curves"]),
@@ -134,3 +135,32 @@ def test_of_large_moments_the_diagonal_is_drawn(pages, tmp_path):
     axes = pages(moments_table(["0", "1"], entries, [4.0, 8.0]), tmp_path)[-1].axes[0]
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["R₁₁", "R₂₂", "R₃₃", "R₄₄", "trace R"]
+
+
+def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_is_named(pages, tmp_path):
+    points = [(n, m, x) for n in ("10", "20", "40") for m in ("1", "2") for x in ("a", "b")]
+    values = [float(len(points) - i) for i in range(len(points))]
+    given = table(dict(zip((N, M, "x"), map(list, zip(*points, strict=True)), strict=True)), values)
+    (page,) = pages(given, tmp_path)
+    titles = [axes.get_title(loc="left") for axes in page.axes]
+    assert titles == ["x = a", "x = b"]
+    drawn = [line for line in page.axes[0].lines if len(line.get_xdata()) == 3]
+    assert [list(line.get_ydata()) for line in drawn] == [[12.0, 8.0, 4.0], [10.0, 6.0, 2.0]]
+    legend = page.legends[0]
+    assert legend.get_title().get_text() == f"best: {N} = 40, {M} = 2, x = b"
+
+
+def test_the_points_have_the_ticks(pages, tmp_path):
+    (page,) = pages(table({N: ["250", "500", "1000"]}, [3.0, 2.0, 1.0]), tmp_path)
+    assert list(page.axes[0].get_xticks()) == [250.0, 500.0, 1000.0]
+    assert page.get_suptitle() == f"best: {N} = 1000"
+
+
+def test_points_that_stand_too_close_have_common_ticks(pages, tmp_path):
+    (page,) = pages(table({M: ["1", "1.01", "40"]}, [3.0, 2.0, 1.0]), tmp_path)
+    assert 1.01 not in list(page.axes[0].get_xticks())
+
+
+def test_of_a_criterion_the_largest_is_the_best(pages, tmp_path):
+    given = table({M: ["0", "4", "8"]}, [3.0, 4.5, 4.0], kind="D")
+    assert given.best == ("objective.value", f"{M} = 4")

@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 from contextlib import suppress
+from datetime import datetime
 from functools import reduce
 from xml.etree import ElementTree
 
@@ -27,12 +28,17 @@ def test_the_page_of_a_run(runs, name):
     page = parse(report_text(runs / name))
     result = json.loads((runs / name / "result.json").read_text())
     headings = [element.text for element in page.iter(f"{XHTML}h2")]
+    loop = ["The loop"] if name == "closed" else []
     assert headings == [
-        "The question", "The answer", "Accuracy", "Spectrum", "Signal", "The certificate",
+        "The question", "The answer", "Accuracy", *loop, "Spectrum", "Signal", "The certificate",
         "What was assumed", "How to reproduce it", "Methods", "All numbers",
     ]  # fmt: skip
+    contents = ["".join(link.itertext()) for link in page.iter(f"{XHTML}a")]
+    assert contents == headings
     said = words(page)
     for part in (
+        f"computed {datetime.now():%Y-%m-%d}",
+        "powers are mean squares",
         "output-error system with one input and one output",
         "90 % confidence",
         "10 % of |G|",
@@ -128,7 +134,7 @@ def test_a_pipe_in_a_run_directory_is_not_waited_for(runs, tmp_path, name):
 def test_charts_are_pictures_with_words(runs):
     page = parse(report_text(runs / "closed"))
     images = list(page.iter(f"{XHTML}img"))
-    assert len(images) == 4
+    assert len(images) == 5
     for image in images:
         assert len(image.get("alt")) > 20
         kind, _, data = image.get("src").partition(";base64,")

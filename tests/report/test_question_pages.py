@@ -10,9 +10,10 @@ import scipy.signal
 
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.figures.plots import draw_all
-from inputdesign_cli.report.charts import _bound
+from inputdesign_cli.report.drawn import READERS, read_bound, read_optimality, read_signal
 from inputdesign_cli.report.render import report_text
 from inputdesign_cli.runs.run_directory import write_run
+from inputdesign_cli.runs.text_formats import read_csv
 from tests.support.pages import LOOP, SPEC, parse, rows, words
 
 SPECS = Path(__file__).parents[2] / "specs"
@@ -112,6 +113,8 @@ def test_the_page_of_a_study(tmp_path):
         assert row[2].startswith(f"{100 * entry['on_design_model']['within_r_adm']:.1f} %")
         assert row[4] == f"{entry['cost']:.5g}"
     assert "20 runs of each input" in words(page)
+    share = f"{100 * inputs['design']['within_r_adm']:.1f} %"
+    assert f"In 20 simulated experiments {share} of the models stayed within r_adm" in words(page)
     assert "What the excitation alone does to the loop: white." in words(page)
     assert "Further figures" not in words(page)
 
@@ -148,5 +151,26 @@ def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
 def test_the_chart_of_the_error_says_what_gave_it(result, label):
     """A top-up has a design of its own; what the data gave stands beside it."""
     table = {"frequency_rad_per_s": np.array([0.1, 1.0]), "r_u": np.ones(2), "G_abs": np.ones(2)}
-    curves, _, _ = _bound(table, result)
+    curves, _ = read_bound({"bound": table}, result, False)
     assert curves.panels[0].label == label
+
+
+def test_the_curves_of_the_page_are_those_of_the_run(tmp_path):
+    """Read back from the CSV files, with names, units, limits and what is to be expected."""
+    more = ["channels={u1: {name: valve, unit: '%'}, y1: {name: level, unit: m}}", "limits={amplitude: 50}"]
+    results = solve(parse_spec(SPEC % "", overrides=more))
+    write_run(results, tmp_path / "run")
+    tables = {stem: read_csv(tmp_path / "run" / f"{stem}.csv") for stem in results.tables}
+    for stem, read in READERS.items():
+        if stem not in tables:
+            continue
+        curves, _ = read(tables, results.result, False)
+        assert type(curves) is type(results.curves[stem])
+    shown, drawn = read_signal(tables, results.result, False)[0], results.curves["signal"]
+    assert (shown.limits, shown.labels) == (drawn.limits, drawn.labels)
+    assert [panel.label for panel in shown.predicted] == ["level (m)"]
+    np.testing.assert_array_equal(shown.predicted[0].values, drawn.predicted[0].values)
+    marks = read_optimality(tables, results.result, False)[0].support
+    nearest = np.abs(marks[:, None] - results.curves["optimality"].support).min(axis=1)
+    assert marks.size
+    assert np.all(nearest <= 0.01 * marks)

@@ -242,7 +242,7 @@ def test_limits_that_are_too_tight_say_what_would_do():
 def audited():
     task = build_task(spec())
     plan, results = task._solved()
-    return replace(task._terms, experiment=replace(task.experiment, samples=plan.counted)), plan, results
+    return replace(task, experiment=replace(task.experiment, samples=plan.counted)), plan, results
 
 
 def test_what_is_written_passes_the_audit():

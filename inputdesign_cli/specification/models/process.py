@@ -20,6 +20,7 @@ from inputdesign_cli.specification.models.named import (
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.units import FREQUENCY, TIME
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -36,16 +37,16 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     kind: ClassVar[Literal["process"]] = "process"
 
     gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = Field(
         default=None, description="Time constant, in time_unit, of a plant of first order."
     )
     damping: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
         default=None, description="Damping ratio of a plant of second order."
     )
-    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = Field(
         default=None, description="Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
         default=None, description="Dead time, in time_unit; 0 where there is none."
     )
 

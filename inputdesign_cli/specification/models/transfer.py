@@ -43,6 +43,7 @@ from inputdesign_cli.specification.models.shapes import (
     check_shapes,
     denominators_of,
 )
+from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.models.values import PolynomialList, PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -158,7 +159,7 @@ class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s
     denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
         default=None,
         description="Dead time in time_unit: a number, common to all entries, or rows of columns.",
         examples=[25],

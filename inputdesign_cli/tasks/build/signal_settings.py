@@ -9,7 +9,7 @@ from inputdesign_cli.runs.results import Table
 from inputdesign_cli.signal import Bounds, Quantiser, SignalSettings
 from inputdesign_cli.signal.settings import Method, Phases
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.columns import SECONDS
+from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.demand import check_record, longest_record
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_cost, excitation_band, record_step

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,11 @@ from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import most
-from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
+from inputdesign_cli.specification.models.uncertainty import SOURCES
 from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.build.demand import check_effects
 from inputdesign_cli.tasks.build.integrators import on_finite_information
-from inputdesign_cli.tasks.build.parameter_draws import Draw, drawing
+from inputdesign_cli.tasks.build.parameter_draws import Draw, Unsure, drawing
 from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked
 from inputdesign_cli.tasks.build.system import build_loop
@@ -142,17 +142,8 @@ class _NoPlantError(Exception):
         self.code, self.what = code, what
 
 
-@dataclass(frozen=True)
-class _Scenarios:
+class _Scenarios(Unsure):
     """What makes plants out of parameters."""
-
-    spec: Spec
-    stated: Uncertainty
-    experiment: Experiment
-
-    @property
-    def _nominal(self) -> Model:
-        return self.experiment.model
 
     @property
     def _radius(self) -> float:
@@ -173,7 +164,7 @@ class _Scenarios:
             experiment = replace(self.experiment, model=model, loop=loop)
             check_effects(self.spec, experiment)
             experiment = on_finite_information(self.spec, experiment)
-            return Alternative(experiment, *build_asked(self.spec, experiment, self._nominal))
+            return Alternative(experiment, *build_asked(self.spec, experiment, self.nominal))
         except SpecError as error:
             found = error.diagnostics[0]
             raise self.spec.complain(
@@ -184,11 +175,11 @@ class _Scenarios:
             ) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
-        model, controller = self._nominal.at(theta), self.spec.experiment.controller
+        model, controller = self.nominal.at(theta), self.spec.experiment.controller
         flaw = model.flaw
         if flaw is not None:
             raise _NoPlantError("not-a-plant", flaw)
-        lost = self._acting(self._nominal) & ~self._acting(model)
+        lost = self._acting(self.nominal) & ~self._acting(model)
         if np.any(lost):
             output, input = np.argwhere(lost)[0] + 1
             raise _NoPlantError("not-a-plant", f"output {output} does not depend on input {input}")
@@ -216,7 +207,7 @@ class _Scenarios:
         if "samples" not in spec.experiment.model_fields_set:
             return
         longest = spec.experiment.samples * (1.0 if spec.plant.sampled else spec.sample_time)
-        if longest <= model.memory > self._nominal.memory:
+        if longest <= model.memory > self.nominal.memory:
             raise spec.complain(
                 "delay-beyond-record",
                 f"at the scenario {self._named(theta)} a dead time outlasts the experiment",
@@ -225,16 +216,16 @@ class _Scenarios:
             )
 
     def _named(self, theta: Array) -> str:
-        return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self._nominal.names, theta, strict=True))
+        return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self.nominal.names, theta, strict=True))
 
     def listed(self, scenarios: Sequence[Mapping[str, float]]) -> Batch:
         """The plants that the spec states one by one."""
-        names, thetas, plants = list(self._nominal.names), [], []
+        names, thetas, plants = list(self.nominal.names), [], []
         # A known integrator is one at every plant.
-        farthest = max((self.experiment.loop or self._nominal).radius, 1.0 - _ON_CIRCLE)
+        farthest = max((self.experiment.loop or self.nominal).radius, 1.0 - _ON_CIRCLE)
         for number, values in enumerate(scenarios):
             key = f"{_KEY}.scenarios[{number}]"
-            theta = self._nominal.theta.copy()
+            theta = self.nominal.theta.copy()
             for name, value in values.items():
                 check_known(self.spec, names, name, key)
                 theta[names.index(name)] = value

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
+from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import BoundCurves, BoundPanel
+from inputdesign_cli.runs.objectives import WHITE
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.spectrum import axis, distinct
@@ -27,15 +29,18 @@ def bound_curves(
     stated: bool = True,
     active: Sequence[Array] = (),
     label: str = "design",
+    equal: Array | None = None,
+    white_labels: tuple[str, str] = WHITE,
 ) -> tuple[Table, BoundCurves]:
     """r_u, r_adm and |G| of every entry (or of the norm of G) over the band of the requirement.
 
     Args:
-        information: M (k, k) in the coordinates of the errors; `white` and `record`: that of the baseline
-            and of the record to be applied.
+        information: M (k, k) in the coordinates of the errors; `white`, `equal` and `record`: that of the
+            baseline, of white excitation with the means of the design, and of the record to be applied.
         stated: whether a requirement states r_adm; without, the errors' own r_adm mean nothing.
         active: for each error, the frequencies of the experiment at which it binds; empty for none.
         label: what gave r_u.
+        white_labels: what `white` and `equal` are called.
     """
     binding = active or [np.zeros(0)] * len(errors)
     peaks = _peaks(errors, information) if stated else np.zeros(0)
@@ -53,6 +58,8 @@ def bound_curves(
             active=distinct(np.maximum(binds, w[0]), w[-1]) / units.frequency,
             r_u_record=None if record is None else error.error_bound(record, w),
             label=label,
+            r_u_equal=None if equal is None else error.error_bound(equal, w),
+            white_labels=white_labels,
             entry=None if units.single else error.entry,
             names=units.passage(error.entry),
         )
@@ -63,6 +70,7 @@ def bound_curves(
             "G_abs": panel.G_abs,
             "r_u_white": panel.r_u_white,
             "r_u_record": panel.r_u_record,
+            "r_u_equal": panel.r_u_equal,
         }
         columns |= {f"{name}{suffix}": values for name, values in listed.items() if values is not None}
         panels.append(panel)
@@ -79,3 +87,20 @@ def _axis(errors: Sequence[OnModelError], extra: Array) -> Array:
     grid = np.unique(np.concatenate([error.grid for error in errors]))
     shape = grid[:: max(len(grid) // _GRID_POINTS, 1)]
     return axis(*errors[0].band, np.concatenate([extra, shape]))
+
+
+def equal_white(design: Design, samples: int, ratio: float) -> Array | None:
+    """(k, k): M of white excitation at the cost of the design, or of its length; None where limits bind both.
+
+    M less what is known without excitation is in proportion to the power and to the length.
+
+    Args:
+        samples: of the delivered experiment.
+        ratio: of the cost of white excitation that meets the requirements to that of the design.
+    """
+    problem, white = design.problem, design.white
+    if problem.goal == "factor" or ratio <= 0.0:
+        return None
+    share = samples / white.s if problem.goal == "samples" else 1.0 / ratio
+    known = problem.fixed_information[0]
+    return np.asarray(known + share * (white.informations[0] - known))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, Sensitivity, model_errors
+from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.design.convex.candidate import candidate_at
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.design.convex.designs import Design
@@ -152,8 +152,8 @@ def requirement_entry(units: Units, requirement: Requirement, information: Array
     elif requirement.of_the_norm:
         item["norm"] = "frobenius"
     for error in model_errors([requirement]):
-        kept = error.admissible
-        if isinstance(kept, Sensitivity) and kept.settings is not None:
+        kept = error.admissible.kept
+        if kept is not None and kept.settings is not None:
             item["loop"] = {**kept.settings, **kept.margins(error.grid)}
     return item
 

@@ -123,7 +123,7 @@ def spectrum_results(
     power = np.einsum("kai,kab,kbi->ki", np.conj(directions), drawn, directions).real
     frequency, lines = shown / units.frequency, design.of_lines
     return {"spectrum": table}, {
-        "spectrum": SpectrumCurves(frequency, drawn, white=white, lines=lines, logarithmic=True),
+        "spectrum": SpectrumCurves(frequency, drawn, white=white, lines=lines),
         "directions": DirectionCurves(frequency, gains, power, white=white, lines=lines),
     }
 

@@ -41,7 +41,13 @@ _CHANCE = 0.05
 
 @dataclass(frozen=True)
 class ResponseTerms:
-    """How the question was put, as far as its results repeat it; see `ResponseTask`."""
+    """How the question was put, as far as its results repeat it.
+
+    Attributes:
+        experiment: with the samples that count (one where the shortest is asked for).
+        asked: samples that the spec gives the experiment.
+        most_samples: of the longest record, where the spec limits it.
+    """
 
     header: Header
     experiment: Experiment
@@ -166,7 +172,7 @@ def response_results(
     notes = _notes(terms, plan, result)
     if notes:
         result["notes"] = notes
-    table, drawn = signal_curves(request, units, plan.record)
+    signals, drawn = signal_curves(request, units, terms.experiment, plan.record)
     matrices = _matrices(plan.powers)
     spectrum = {units.frequency_header: terms.frequency, **hermitian_columns(matrices, "power")}
     deviations, curves = _deviations(terms, plan)
@@ -176,7 +182,7 @@ def response_results(
         result,
         terms.header.resolved_spec,
         units.time_unit,
-        {"deviations": Table(deviations), "spectrum": Table(spectrum), "signal": table},
+        {"deviations": Table(deviations), "spectrum": Table(spectrum), **signals},
         {
             "deviations": curves,
             "spectrum": SpectrumCurves(terms.frequency, matrices.astype(complex), lines=True),

@@ -17,6 +17,7 @@ from inputdesign_cli.runs.signal_files import WRITERS
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.signal import DesignedSpectrum, Lines, Record
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
+from inputdesign_cli.tasks.result.predicted import predicted_output
 
 _LAGS = 50
 _LOST = 1e-6  # of the largest sample
@@ -59,6 +60,9 @@ def signal_entry(
         entry["extra_power"] = record.extra_power
     if spectrum is not None:
         entry["spectrum_error"] = _spectrum_error(spectrum.lines(len(samples)), samples)
+    limits = _limits(request, units, record)
+    if limits:
+        entry["limits"] = {name: list(pair) for name, pair in limits.items()}
     if record.factor_residual is not None:
         entry["spectral_factor_residual"] = record.factor_residual
     delivery = request.delivery
@@ -69,22 +73,43 @@ def signal_entry(
     return entry
 
 
-def signal_curves(request: RecordRequest, units: Units, record: Record) -> tuple[Table, SignalCurves]:
-    """signal.csv, with time stamps in the unit of the spec, and its plot with the limits on u.
+def signal_curves(
+    request: RecordRequest, units: Units, experiment: Experiment, record: Record
+) -> tuple[dict[str, Table], SignalCurves]:
+    """signal.csv and predicted_output.csv by file stem, with time stamps in the unit of the spec; their plot.
 
     Raises:
         SpecError: see `applied`.
     """
+    columns = applied_columns(request, units, record)
+    time, *signals = columns.values()
+    predicted, panels = predicted_output(units, experiment, record.samples, request.bounds.output)
+    curves = SignalCurves(
+        time,
+        dict(zip(units.excitations, signals, strict=True)),
+        _limits(request, units, record),
+        {name: units.label(name) for name in units.excitations},
+        panels,
+        held=units.sampled,
+    )
+    return {"signal": Table(columns), "predicted_output": predicted}, curves
+
+
+def applied_columns(request: RecordRequest, units: Units, record: Record) -> dict[str, Array]:
+    """The columns of signal.csv. Raises `SpecError` as `applied` does."""
     time = units.sample_time * np.arange(len(record.samples), dtype=np.float64)
-    channels = dict(zip(units.excitations, applied(request.delivery, record).T, strict=True))
-    most, limits = request.bounds.amplitude, {}
-    if most is not None and not units.closed_loop and record.method != "given":
-        around = request.delivery.operating_points
-        middle = np.zeros(most.size) if around is None else around
-        limits = dict(zip(units.excitations, zip(middle - most, middle + most, strict=True), strict=True))
-    columns = {units.header(name): values for name, values in channels.items()}
-    labels = {name: units.label(name) for name in channels}
-    return Table({units.time_header: time, **columns}), SignalCurves(time, channels, limits, labels)
+    values = applied(request.delivery, record).T
+    return {units.time_header: time, **dict(zip(map(units.header, units.excitations), values, strict=True))}
+
+
+def _limits(request: RecordRequest, units: Units, record: Record) -> dict[str, tuple[float, float]]:
+    """Between which values each channel of the record is to stay, where that signal is limited."""
+    most, around = request.bounds.amplitude, request.delivery.operating_points
+    if most is None or units.closed_loop or record.method == "given":
+        return {}
+    middle = np.zeros(most.size) if around is None else around
+    pairs = zip((middle - most).tolist(), (middle + most).tolist(), strict=True)
+    return dict(zip(units.excitations, pairs, strict=True))
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
@@ -111,8 +136,7 @@ def other_files(request: RecordRequest, units: Units, record: Record) -> dict[st
     delivery, files = request.delivery, {}
     for ending, made in WRITERS.items():
         if ending in delivery.also:
-            table, _ = signal_curves(request, units, record)
-            files[f"signal.{ending}"] = made(table.columns, units.sample_time)
+            files[f"signal.{ending}"] = made(applied_columns(request, units, record), units.sample_time)
     if "wav" in delivery.also:
         import scipy.io.wavfile
 

@@ -71,5 +71,7 @@ def disturbance(units: Units, loop: Loop, excitation: Array) -> tuple[Table, Sig
             shown[f"{letter}{'' if units.single else number}{cause}"] = samples
     first = "ruy" if units.single else "yur"
     return Table(columns), SignalCurves(
-        instants, {name: shown[name] for name in sorted(shown, key=lambda name: first.index(name[0]))}
+        instants,
+        {name: shown[name] for name in sorted(shown, key=lambda name: first.index(name[0]))},
+        held=False,
     )

@@ -1,0 +1,142 @@
+"""`idesign watch`: a local page that follows a spec, a run, a campaign or a sweep."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Overrides, Overwrite
+from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.errors import IdesignError
+
+if TYPE_CHECKING:
+    from inputdesign_cli.live.board import Board
+    from inputdesign_cli.live.changes import Stamp
+
+_LOOK = 0.1  # seconds between looks at the file while it is solved
+
+
+def watch(
+    spec: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SPEC|DIR", help="The experiment to design, a YAML file; or a run, campaign or sweep."
+        ),
+    ],
+    overrides: Overrides = None,
+    confine: Confine = None,
+    output: Output = None,
+    overwrite: Overwrite = False,
+    fast: Fast = False,
+    figures: Figures = True,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Of the page; 0 (default) takes a free one.")
+    ] = 0,
+) -> None:
+    """Serve a local page that solves a spec again whenever it is saved.
+
+    The page shows the answer, its pictures and the design before it; what is wrong stands at its line, beside
+    the last good design. The run directory is that of `solve`. Of a directory it shows the run, the campaign
+    or the sweep in it, and follows that. It is served to this machine only, until Ctrl-C.
+    """
+    from inputdesign_cli.live.board import Board
+    from inputdesign_cli.live.pages import message_page
+    from inputdesign_cli.live.server import serving
+
+    board = Board()
+    board.show(message_page(spec.name, "Computing .."))
+    with serving(board, port) as address:
+        typer.echo(address)
+        if spec.is_dir():
+            _follow_directory(spec, board)
+        told = [*(overrides or []), *(["solver.any_spectrum=false"] if fast else [])]
+        _follow_spec(spec, told, confine, Place(output, spec.stem, [spec], overwrite), board, figures)
+
+
+def _follow_spec(
+    spec: Path, overrides: list[str], confine: Path | None, place: Place, board: Board, figures: bool
+) -> None:
+    """Solve and show, again and again."""
+    from inputdesign_cli.cli.reading import read_spec
+    from inputdesign_cli.live.changes import stamp, wait_for_change
+    from inputdesign_cli.live.pages import Followed
+    from inputdesign_cli.sweep.verbs import run_verb
+
+    followed, files = Followed(spec.name), [spec]
+    while True:
+        before, started = stamp(files), time.monotonic()
+        lines = spec.read_text(encoding="utf-8", errors="replace").splitlines() if spec.is_file() else []
+        board.show(followed.computing().page)
+        try:
+            with _given_up_when_saved(files, before):
+                files = [spec, *_named_files(spec, overrides)]
+                before = stamp(files)
+                asked = read_spec(spec, overrides, confine)
+                place = place.checked(asked)
+                results = run_verb("solve", asked)
+            if stamp(files) == before:
+                keep(results, place, figures=figures, json_output=False, quiet=True)
+                clock, seconds = time.strftime("%H:%M:%S"), time.monotonic() - started
+                followed = followed.solved(place.directory, clock, seconds)
+        except IdesignError as error:
+            followed = followed.failed(error, lines, str(spec))
+        if stamp(files) == before:
+            board.show(followed.page)
+            wait_for_change(files, before)
+
+
+def _named_files(spec: Path, overrides: list[str]) -> list[Path]:
+    """The files that the spec includes or names, where it can be read."""
+    from inputdesign_cli.specification import read_template
+
+    try:
+        draft = read_template(spec, overrides)
+        return [draft.folder / name for name in (*draft.included, *draft.files(draft.data))]
+    except IdesignError:
+        return []
+
+
+@contextmanager
+def _given_up_when_saved(files: list[Path], before: Stamp) -> Iterator[None]:
+    """What is computed inside ends at the next round once a file is saved."""
+    from inputdesign_cli.compute.time_limit import stoppable
+    from inputdesign_cli.live.changes import stamp
+
+    done = Event()
+    with stoppable() as stop:
+
+        def look() -> None:
+            while not done.wait(_LOOK):
+                if stamp(files) != before:
+                    stop()
+                    return
+
+        Thread(target=look, daemon=True).start()
+        try:
+            yield
+        finally:
+            done.set()
+
+
+def _follow_directory(directory: Path, board: Board) -> None:
+    """Show the run, the campaign or the sweep in a directory, and how many points a sweep has so far."""
+    from inputdesign_cli.live.changes import stamp, wait_for_change
+    from inputdesign_cli.live.pages import followed_page, message_page
+    from inputdesign_cli.report.render import report_text
+
+    records = [directory / name for name in ("result.json", "sweep.csv", "sweep.json", "points", "failures")]
+    while True:
+        before = stamp(records)
+        try:
+            board.show(followed_page(report_text(directory)))
+        except IdesignError as error:
+            points = sum(1 for _ in (directory / "points").glob("*/result.json"))
+            told = f"{points} points have a result so far." if points else error.diagnostics[0].message
+            board.show(message_page(directory.name, told))
+        wait_for_change(records, before)

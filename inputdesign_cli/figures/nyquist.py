@@ -1,0 +1,77 @@
+"""nyquist.png: the loop with the discs in which the data leave it, and how near they come to -1."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch
+from numpy.typing import NDArray
+
+from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE, legend_over_all, marked
+from inputdesign_cli.runs.curves import NyquistCurves
+
+_DISCS = 36
+# Of the plane, what is shown: so far around -1 and 0 the loop decides on its margins.
+_LEFT, _RIGHT, _HALF = -2.2, 1.2, 1.35
+
+
+def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
+    """C G over frequency, discs of radius |C| r_u along it, -1, and the circle that it is to keep off."""
+    axes = page.add_subplot()
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(_LEFT, _RIGHT)
+    axes.set_ylim(-_HALF, _HALF)
+    L, radius = curves.loop, curves.radius
+    shown = (L.real > _LEFT) & (L.real < _RIGHT) & (np.abs(L.imag) < _HALF)
+    at = np.union1d(_along(np.where(shown, L, np.nan)), np.searchsorted(curves.frequency, curves.limiting))
+    at = at[at < L.size]
+    widths = 2.0 * radius[at]
+    discs = EllipseCollection(
+        widths,
+        widths,
+        np.zeros(at.size),
+        units="xy",
+        offsets=np.column_stack([L.real[at], L.imag[at]]),
+        offset_transform=axes.transData,
+        facecolor=BLUE,
+        edgecolor=BLUE,
+        alpha=0.14,
+        linewidth=0.5,
+    )
+    axes.add_collection(discs, autolim=False)
+    handles: list[Artist] = list(axes.plot(L.real, L.imag, color=BLUE, linewidth=1.6, label="C G, nominal"))
+    handles.append(Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)"))
+    if curves.circle is not None:
+        axes.add_patch(Circle((-1.0, 0.0), curves.circle, color=ORANGE, alpha=0.07, linewidth=0))
+        axes.add_patch(
+            Circle((-1.0, 0.0), curves.circle, fill=False, edgecolor=ORANGE, linestyle=DASHED, linewidth=1.6)
+        )
+        label = f"to be kept off: |S| up to {1.0 / curves.circle:.3g}"
+        handles.append(Patch(facecolor="#FDF1E9", edgecolor=ORANGE, linestyle=DASHED, label=label))
+    if curves.limiting.size:
+        places = (
+            np.interp(curves.limiting, curves.frequency, L.real),
+            np.interp(curves.limiting, curves.frequency, L.imag),
+        )
+        handles += marked(axes, *places, color=BLUE, label="limiting frequency")
+    axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)
+    axes.annotate("−1", (-1.0, 0.0), (4, 5), textcoords="offset points")
+    turn = np.linspace(0.0, 2.0 * np.pi, 200)
+    axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.6)
+    axes.set_xlabel("real part of C G")
+    axes.set_ylabel("imaginary part of C G")
+    legend_over_all(page, handles)
+
+
+def _along(L: NDArray[np.complex128]) -> NDArray[np.int_]:
+    """Indices (m,) of points of L (n,) evenly along the curve, where it is shown (NaN where not)."""
+    inside = np.flatnonzero(np.isfinite(L))
+    if inside.size <= _DISCS:
+        return inside
+    steps = np.abs(np.diff(L[inside], prepend=L[inside[0]]))
+    length = np.cumsum(np.minimum(steps, 0.2))
+    return inside[
+        np.unique(np.searchsorted(length, np.linspace(0.0, length[-1], _DISCS)).clip(0, inside.size - 1))
+    ]

@@ -1,0 +1,93 @@
+"""The pages that follow a spec: the new design beside the last good one, and what is wrong, at its line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from inputdesign_cli.errors import Diagnostic, IdesignError, Location
+from inputdesign_cli.report.followed import Trail
+from inputdesign_cli.report.render import filled
+from inputdesign_cli.report.run_page import run_page
+from inputdesign_cli.runs.results import Json
+
+_AROUND = 2  # lines shown before and after one that is wrong
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A spec as it is followed; `designs` are what pages say of the newest good design and the one before."""
+
+    name: str
+    state: str = "computing"  # computing, done, failed
+    told: str = ""
+    designs: tuple[dict[str, Json], ...] = ()
+    errors: tuple[dict[str, Json], ...] = field(default=())
+
+    def computing(self) -> Followed:
+        """The same while it is computed anew."""
+        return replace(self, state="computing", told="The file was saved: computing ..", errors=())
+
+    def solved(self, run: Path, clock: str, seconds: float) -> Followed:
+        """With the design that stands in `run` now."""
+        made = run_page(run, Trail()) | {"clock": clock}
+        told = f"Computed at {clock} in {seconds:.1f} s."
+        return replace(self, state="done", told=told, designs=(made, *self.designs[:1]))
+
+    def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:
+        """With what is wrong; `lines` are those of `file`, the spec as it was read."""
+        listed = tuple(_placed(diagnostic, lines, file) for diagnostic in error.diagnostics)
+        number = f"{len(listed)} errors" if len(listed) > 1 else "One error"
+        return replace(self, state="failed", told=f"{number}: the last good design stays.", errors=listed)
+
+    @property
+    def page(self) -> str:
+        """The page as it is now."""
+        return filled(
+            "watch.html",
+            {
+                "title": f"{self.name}: {self.state}",
+                "name": self.name,
+                "state": self.state,
+                "told": self.told,
+                "errors": self.errors,
+                "designs": self.designs,
+            },
+        )
+
+
+def followed_page(report: str) -> str:
+    """The page of a report, with what makes a browser follow it."""
+    told = '<p id="connection" class="bad" role="status"></p>'
+    return report.replace("</head>", '<script src="follow.js" defer></script>\n</head>', 1).replace(
+        "</body>", f"{told}\n</body>", 1
+    )
+
+
+def message_page(name: str, told: str) -> str:
+    """A page that only says something."""
+    return Followed(name, "waiting", told).page
+
+
+def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str, Json]:
+    """A diagnostic for the page, with the lines about its place."""
+    place = diagnostic.location
+    shown: list[tuple[str, str, bool]] = []
+    where = ""
+    if place is not None:
+        stands = place.file == file and 1 <= place.line <= len(lines)
+        where = f"{Path(place.file).name}, line {place.line}, column {place.column}"
+        shown = _about(place, lines) if stands else [(str(place.line), place.text.rstrip(), True)]
+    return {
+        "code": diagnostic.code,
+        "message": diagnostic.message,
+        "hint": diagnostic.hint,
+        "where": where or diagnostic.key,
+        "lines": shown,
+    }
+
+
+def _about(place: Location, lines: Sequence[str]) -> list[tuple[str, str, bool]]:
+    first, last = max(place.line - _AROUND, 1), min(place.line + _AROUND, len(lines))
+    return [(str(n), lines[n - 1].rstrip(), n == place.line) for n in range(first, last + 1)]

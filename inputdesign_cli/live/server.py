@@ -1,0 +1,146 @@
+"""The server of one page: loopback only, behind a path that nobody can guess, and no file at all.
+
+A page of another site cannot read it: the Host header must name the loopback interface (so that a name of
+that site which leads here is refused), and the path holds a secret. Other users of the machine do not know
+that path either.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+from urllib.parse import parse_qs, urlsplit
+
+from inputdesign_cli.errors import OutputError
+from inputdesign_cli.live.board import Board
+
+HOST = "127.0.0.1"
+# Seconds that a page waits for news before it asks again, and that a client may take for its request.
+_PATIENCE, _SLOWEST = 20.0, 30.0
+_POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+# Takes the new page as soon as there is one, and keeps what is folded out and where one has scrolled to.
+SCRIPT = """\
+"use strict";
+(async () => {
+  let version = document.documentElement.dataset.version;
+  const state = document.getElementById("connection");
+  for (;;) {
+    try {
+      const found = await (await fetch("news?version=" + version)).json();
+      state.textContent = "";
+      if (String(found.version) !== version) {
+        const text = await (await fetch("./")).text();
+        const page = new DOMParser().parseFromString(text, "text/html");
+        const open = [...document.querySelectorAll("details")].map((part) => part.open);
+        document.title = page.title;
+        document.querySelector("main").replaceWith(page.querySelector("main"));
+        document.querySelectorAll("details").forEach((part, i) => { part.open = open[i] || false; });
+        version = page.documentElement.dataset.version;
+      }
+    } catch (error) {
+      state.textContent = "idesign watch has ended: what stands here is not followed any more.";
+      await new Promise((done) => setTimeout(done, 1000));
+    }
+  }
+})();
+"""
+
+
+@contextmanager
+def serving(board: Board, port: int = 0) -> Iterator[str]:
+    """Serve the page of a board while the block runs; its address.
+
+    Args:
+        port: 0 takes a free one.
+
+    Raises:
+        OutputError: `port-taken`.
+    """
+    secret = secrets.token_urlsafe(16)
+
+    class Handler(_Handler):
+        shown, path_prefix = board, f"/{secret}/"
+        hosts = frozenset[str]()
+
+    try:
+        server = ThreadingHTTPServer((HOST, port), Handler)
+    except OSError as error:
+        message = f"nothing can be served at {HOST}:{port}: {error.strerror or error}"
+        raise OutputError.because(
+            "port-taken", message, "choose another --port, or 0 for a free one"
+        ) from error
+    taken = server.server_address[1]
+    Handler.hosts = frozenset({f"{HOST}:{taken}", f"localhost:{taken}"})
+    server.daemon_threads = True
+    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://{HOST}:{taken}/{secret}/"
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers GET and HEAD for the page, its script, and the number of the page that is newest."""
+
+    shown: Board
+    path_prefix: str
+    hosts: frozenset[str]
+    server_version, sys_version = "idesign", ""
+    timeout = _SLOWEST
+
+    def do_GET(self) -> None:
+        """One of three answers, or none."""
+        asked = urlsplit(self.path)
+        if not self._from_here():
+            self._answer("text/plain", "this page is for the machine that it runs on\n", HTTPStatus.FORBIDDEN)
+        elif asked.path == self.path_prefix:
+            page, version = self.shown.page
+            self._answer("text/html", page.replace("<html ", f'<html data-version="{version}" ', 1))
+        elif asked.path == f"{self.path_prefix}follow.js":
+            self._answer("text/javascript", SCRIPT)
+        elif asked.path == f"{self.path_prefix}news":
+            given = parse_qs(asked.query).get("version", ["0"])[0]
+            version = int(given) if given.isdecimal() and len(given) < 10 else 0
+            found = {"version": self.shown.newer_than(version, _PATIENCE)}
+            self._answer("application/json", json.dumps(found))
+        else:
+            self._answer("text/plain", "there is nothing here\n", HTTPStatus.NOT_FOUND)
+
+    do_HEAD = do_GET
+
+    def _from_here(self) -> bool:
+        """Whether the browser asked for this machine by its own name, and for no page of another site."""
+        named = self.headers.get_all("Host") or []
+        return (
+            len(named) == 1 and named[0] in self.hosts and self.headers.get("Sec-Fetch-Site") != "cross-site"
+        )
+
+    def _answer(self, kind: str, text: str, status: HTTPStatus = HTTPStatus.OK) -> None:
+        body = text.encode("utf-8", "backslashreplace")
+        self.send_response(status)
+        for name, value in (
+            ("Content-Type", f"{kind}; charset=utf-8"),
+            ("Content-Length", str(len(body))),
+            ("Cache-Control", "no-store"),
+            ("Content-Security-Policy", _POLICY),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("Referrer-Policy", "no-referrer"),
+            ("X-Content-Type-Options", "nosniff"),
+        ):
+            self.send_header(name, value)
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing is told of requests: the terminal is the user's."""

@@ -1,0 +1,126 @@
+"""The page is for this machine, behind a secret path, and no file is served."""
+
+import http.client
+import json
+import socket
+import threading
+import time
+from contextlib import closing
+from urllib.parse import urlsplit
+
+import pytest
+
+from inputdesign_cli.errors import OutputError
+from inputdesign_cli.live.board import Board
+from inputdesign_cli.live.server import serving
+
+PAGE = '<!DOCTYPE html>\n<html lang="en"><body><main>one</main></body></html>'
+
+
+@pytest.fixture
+def served():
+    board = Board()
+    board.show(PAGE)
+    with serving(board) as address:
+        yield board, urlsplit(address)
+
+
+def ask(address, path, method="GET", **headers):
+    with closing(http.client.HTTPConnection(address.hostname, address.port, timeout=10)) as connection:
+        connection.request(method, path, headers=headers)
+        answer = connection.getresponse()
+        return answer.status, answer.headers, answer.read().decode()
+
+
+def test_the_page_has_its_number_and_nothing_may_come_from_elsewhere(served):
+    _, address = served
+    status, headers, text = ask(address, address.path)
+    assert (status, headers["Cache-Control"]) == (200, "no-store")
+    assert '<html data-version="1" lang="en">' in text
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "'unsafe-inline'" not in policy.split("script-src")[1].split(";")[0]
+
+
+def test_the_server_listens_on_the_loopback_interface_only(served):
+    _, address = served
+    assert address.hostname == "127.0.0.1"
+    others = {found[4][0] for found in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    for other in others - {"127.0.0.1"}:
+        if not other.startswith("127."):
+            with (
+                pytest.raises(ConnectionRefusedError),
+                socket.create_connection((other, address.port), timeout=1),
+            ):
+                pass
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", ""])
+def test_another_name_of_the_machine_is_refused(served, host):
+    _, address = served
+    status, _, text = ask(address, address.path, Host=host.format(port=address.port))
+    assert status == 403
+    assert "one" not in text
+
+
+def test_a_page_of_another_site_is_refused(served):
+    _, address = served
+    assert ask(address, address.path, **{"Sec-Fetch-Site": "cross-site"})[0] == 403
+    assert ask(address, address.path, Host=f"localhost:{address.port}")[0] == 200
+
+
+NOWHERE = (
+    "/",
+    "/x/",
+    "{secret}x",
+    "{secret}../",
+    "{secret}../../../../etc/passwd",
+    "{secret}%2e%2e/etc/passwd",
+    "{secret}result.json",
+    "//etc/passwd",
+    "/etc/passwd",
+)
+
+
+@pytest.mark.parametrize("path", NOWHERE)
+def test_no_file_is_served(served, path):
+    _, address = served
+    status, _, text = ask(address, path.format(secret=address.path))
+    assert (status, text) == (404, "there is nothing here\n")
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS"])
+def test_nothing_can_be_sent(served, method):
+    _, address = served
+    assert ask(address, address.path, method)[0] == 501
+
+
+def test_head_has_no_body(served):
+    _, address = served
+    status, headers, text = ask(address, address.path, "HEAD")
+    assert (status, text) == (200, "")
+    assert int(headers["Content-Length"]) > 0
+
+
+def test_news_come_as_soon_as_there_are_any(served):
+    board, address = served
+    threading.Timer(0.3, board.show, [PAGE.replace("one", "two")]).start()
+    started = time.monotonic()
+    _, _, text = ask(address, f"{address.path}news?version=1")
+    assert json.loads(text) == {"version": 2}
+    assert 0.2 < time.monotonic() - started < 5.0
+    assert "two" in ask(address, address.path)[2]
+
+
+@pytest.mark.parametrize("version", ["", "0", "-3", "x", "9" * 50, "1&version=2"])
+def test_a_strange_number_is_answered_all_the_same(served, version):
+    board, address = served
+    threading.Timer(0.2, board.show, [PAGE.replace("one", "two")]).start()
+    assert json.loads(ask(address, f"{address.path}news?version={version}")[2])["version"] in (1, 2)
+
+
+def test_a_port_that_is_taken_is_told(served):
+    _, address = served
+    with pytest.raises(OutputError) as caught, serving(Board(), address.port):
+        pass
+    assert caught.value.diagnostics[0].code == "port-taken"
