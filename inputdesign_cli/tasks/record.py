@@ -151,7 +151,7 @@ def make_record(
     upper = tuple(
         (limit.kind, limit.channel, limit.bound)
         for limit in problem.limits
-        if limit.upper and limit.scenario == 0
+        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single ones are limited
     )
     bounds = replace(request.bounds, powers=upper)
     meets = problem.goal != "factor" and request.meets
