@@ -143,13 +143,13 @@ class Experiment(Coordinates):
 
     def cost_density(self, weights: Sequence[tuple[PowerKind, int | None, float]], w: ArrayLike) -> NDArray:
         """(n,) or (n, r, r): that of a weighted sum of powers, each of a kind and of a channel or all."""
-        t = None if self.loop is None else self.loop.responses(w)
+        caused = None if self.loop is None else self.loop.excited(w)
         total: NDArray | float = 0.0
         for kind, channel, weight in weights:
-            if t is None or not self.depends_on_plant(kind):
+            if caused is None or not self.depends_on_plant(kind):
                 total = total + weight * self.power_density(kind, w, channel)
                 continue
-            G = t.y_x if kind == "output" else t.u_x
+            G = caused[0 if kind == "output" else 1]
             rows = G if channel is None else G[:, channel : channel + 1]
             total = total + weight * self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         return np.asarray(total)
@@ -166,8 +166,8 @@ class Experiment(Coordinates):
             return np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
         if self.loop is None:
             return self.model.plant_at(w)
-        t = self.loop.responses(w)
-        return t.y_x if kind == "output" else t.u_x
+        y, u = self.loop.excited(w)
+        return y if kind == "output" else u
 
     def _moving(self, w: ArrayLike) -> ComplexArray:
         """(n,): 1 - q^-1, of samples that are held."""

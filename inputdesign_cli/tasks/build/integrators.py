@@ -47,7 +47,10 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
                 f"{known}; in q^-1 it may be free as a root of A, where the noise passes through it as well"
             )
             if any(spec.noise.drifts) and not all(spec.noise.drifts):
-                hint = "let the controller integrate where outputs drift, or let every output drift"
+                hint = (
+                    "the inputs wander with the drift that they counteract: let every output drift (noise: "
+                    "{drift: true})"
+                )
             raise spec.complain(
                 "infinite-information",
                 f"the noise alone, which is integrated and fed back, tells without end of {endless}",
