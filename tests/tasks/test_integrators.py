@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import SpecError
 
 INTEGRATOR = """
@@ -156,6 +156,40 @@ def test_power_at_the_pole_is_refused_in_open_loop(change):
     assert "of k" in found.message
 
 
+WEAK = """
+noise: {variance: 0.04}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.2, band: [0.01, 1]}}
+spectrum: {type: fir, order: 2}
+solver: {any_spectrum: false}
+signal: {samples: 100, seed: 1, candidates: 1}
+"""
+HIDDEN = [
+    "{parameters: {k: 0.1, a: 0.2}, sample: zoh, state_space: {A: [[-a, 0], [0, 0]], "
+    "B: [[k], [k*%s]], C: [[1, 1]]}}",
+    "{parameters: {k: 1, T: 5}, sample: zoh, continuous: {numerator: [k*(1 + %s*T), k*%s], "
+    "denominator: [[T, 1], [1, 0]]}}",
+    "{parameters: {k: 0.1, f: -0.8}, B: [0, k*(1 + %s), -k*(1 - f*%s)], F: [1, f - 1, -f]}",
+]
+
+
+@pytest.mark.parametrize("plant", HIDDEN, ids=["states", "in s", "in q^-1"])
+@pytest.mark.parametrize("share", ["1", "1e-3", "1e-5", "1e-8"])
+def test_an_integrator_however_weak_has_no_finite_information(plant, share):
+    """The derivative with respect to k has the residue k * share at frequency zero."""
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(f"plant: {plant.replace('%s', share)}{WEAK}"))
+    (found,) = caught.value.diagnostics
+    assert found.code == "infinite-information"
+    assert "end of k" in found.message
+
+
+def test_an_integrator_that_no_input_reaches_tells_nothing():
+    plain = "{parameters: {k: 0.1, a: 0.2}, sample: zoh, state_space: {A: [[-a]], B: [[k]], C: [[1]]}}"
+    costs = [solve(parse_spec(f"plant: {p}{WEAK}")).result["cost"] for p in (HIDDEN[0] % "0", plain)]
+    assert costs[0] == pytest.approx(costs[1], rel=1e-6)
+
+
 def test_a_band_without_the_pole_will_do():
     text = f"plant: {IN_WORDS[0]}{TANK}limits: {{band: [0.02, 1.5]}}\n"
     white = ["spectrum={type: white}", "solver.tolerance=1e-9"]  # one unknown is told to about 1e-10
@@ -189,18 +223,23 @@ signal: {type: multisine, samples: 600, seed: 1}
     assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
-def test_drift_that_one_output_has_and_no_controller_takes_away():
-    text = """
-plant: {B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1], [1, -0.8]]]}
-noise: {drift: [true, false], variance: 0.1}
-experiment: {samples: 300, controller: {numerator: [[[0.3], [0]], [[0], [0.2]]], denominator: [1]}}
-accuracy: {standard_deviation: {"b1[1,1]": 0.01}}
+@pytest.mark.parametrize("last", [0.0, -1.0], ids=["proportional", "integrates"])
+@pytest.mark.parametrize("drift", ["[true, false]", "[false, true]"])
+def test_drift_of_one_output_reaches_the_other_through_any_controller(drift, last):
+    text = f"""
+plant:
+  {{B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1, -0.2], [1, -0.8]]]}}
+noise: {{drift: {drift}, variance: 0.1}}
+experiment:
+  {{samples: 300, controller: {{numerator: [[[0.3], [0]], [[0], [0.2]]], denominator: [1, {last}]}}}}
+accuracy: {{standard_deviation: {{"b1[1,1]": 0.01}}}}
 """
     with pytest.raises(SpecError) as caught:
-        solve(parse_spec(text))
+        validate(parse_spec(text))
     (found,) = caught.value.diagnostics
     assert found.code == "infinite-information"
     assert "let every output drift" in found.hint
+    validate(parse_spec(text, overrides=["noise.drift=true"]))
 
 
 def test_a_criterion_of_the_loop_error_refuses_integrators():
