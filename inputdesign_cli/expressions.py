@@ -1,7 +1,7 @@
 """Expressions in named parameters, as `K*(1 - exp(-h/T))`: read by a list of what is allowed, never run.
 
-The text is parsed by Python's `ast` alone and walked by our own rules, with derivatives by forward
-differentiation through the tree: every step carries its value and its slope in all parameters.
+The text is parsed by Python's `ast` alone and becomes a list of steps by our own rules, with derivatives by
+forward differentiation: every step carries its value and its slope in all parameters.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LONGEST = 500
+_SHOWN = 60  # of what is made of expressions and longer
 CONSTANTS = {"pi": math.pi}
 
 # Value and derivative of the functions of one argument.
@@ -55,49 +56,74 @@ class _Dual(NamedTuple):
     slope: Array
 
 
+class Step(NamedTuple):
+    """One operation on the results of earlier steps: number, name, negative, a function, or + - * / **."""
+
+    operation: str
+    value: float | str = ""
+    operands: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True)
 class Expression:
-    """A text that has been checked, and what it is worth.
+    """A text that has been checked, or what is made of such, and what it is worth.
+
+    It is a list of steps, of which none is there twice: as long as what it is made of, however often that is
+    used, and worked through without recursion, however deep it is.
+
+    Attributes:
+        made: the steps of what is made of others; None of a text, which says them.
 
     Raises:
         ExpressionError: by `of`, for what is no expression.
     """
 
     text: str
+    made: tuple[Step, ...] | None = None
 
     @classmethod
     def of(cls, text: str) -> Expression:
         """The expression of a text; raises `ExpressionError` for anything that is not allowed."""
-        found = cls(text)
-        _check(found._tree)
-        return found
+        _check(_tree_of(text))
+        return cls(text)
 
     @cached_property
-    def _tree(self) -> ast.expr:
-        if len(self.text) > LONGEST:
-            raise ExpressionError(
-                f"has {len(self.text)} characters, and at most {LONGEST} are taken", "name a part of it"
-            )
-        try:
-            return ast.parse(self.text.strip(), mode="eval").body
-        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-            hint = "write * for a product, ** for a power, and close every bracket"
-            raise ExpressionError("is no expression", hint) from error
+    def steps(self) -> tuple[Step, ...]:
+        """Each after those that it works on; the last is the expression."""
+        return _read(_tree_of(self.text)) if self.made is None else self.made
 
     @cached_property
     def names(self) -> frozenset[str]:
         """The parameters that it names."""
-        functions = {node.func for node in ast.walk(self._tree) if isinstance(node, ast.Call)}
-        return frozenset(
-            node.id
-            for node in ast.walk(self._tree)
-            if isinstance(node, ast.Name) and node not in functions and node.id not in CONSTANTS
-        )
+        return frozenset(str(step.value) for step in self.steps if step.operation == "name")
 
     @cached_property
     def affine(self) -> bool:
         """Whether it is a sum of constants and of constant multiples of parameters, as it is written."""
-        return _degree(self._tree) <= 1
+        degrees: list[int] = []
+        for step in self.steps:
+            degrees.append(_degree(step.operation, [degrees[i] for i in step.operands]))
+        return degrees[-1] <= 1
+
+    @cached_property
+    def present(self) -> bool:
+        """Whether a coefficient exists that is written so: it names parameters, or is not zero.
+
+        What a plant consists of is read off its words: it does not change with the nominal parameters.
+        """
+        return bool(self.names) or self.at((), np.zeros(0))[0] != 0.0
+
+    def __mul__(self, other: Expression) -> Expression:
+        return self._with("*", other)
+
+    def __truediv__(self, other: Expression) -> Expression:
+        return self._with("/", other)
+
+    def _with(self, operation: str, other: Expression) -> Expression:
+        table = _Table()
+        operands = table.include(self), table.include(other)
+        last = table.add(Step(operation, operands=operands))
+        return table.expression(last, f"({self.text}){operation}({other.text})")
 
     def at(self, symbols: Sequence[str], values: Array) -> tuple[float, Array]:
         """Its value and its gradient (m,) where the `symbols` have these `values` (m,).
@@ -107,13 +133,72 @@ class Expression:
         Raises:
             KeyError: a name is not among the symbols.
         """
-        slopes = np.eye(len(symbols))
+        slopes, zero = np.eye(len(symbols)), np.zeros(len(symbols))
         known = {symbol: _Dual(float(values[i]), slopes[i]) for i, symbol in enumerate(symbols)}
+        found: list[_Dual] = []
         try:
-            found = _evaluated(self._tree, known, np.zeros(len(symbols)))
+            # What leaves the range of numbers is seen in the result.
+            with np.errstate(all="ignore"):
+                for step in self.steps:
+                    found.append(_evaluated(step, [found[i] for i in step.operands], known, zero))
         except (ArithmeticError, ValueError):
             return math.nan, np.full(len(symbols), np.nan)
-        return found.value, found.slope
+        return found[-1].value, found[-1].slope
+
+
+class _Table:
+    """Steps to which others are added unless they are there."""
+
+    def __init__(self) -> None:
+        self._places: dict[Step, int] = {}
+
+    def add(self, step: Step) -> int:
+        """The place of the step."""
+        return self._places.setdefault(step, len(self._places))
+
+    def include(self, expression: Expression) -> int:
+        """The place of an expression, all steps of which are added."""
+        places: list[int] = []
+        for step in expression.steps:
+            places.append(self.add(step._replace(operands=tuple(places[i] for i in step.operands))))
+        return places[-1]
+
+    def expression(self, place: int, text: str) -> Expression:
+        """That whose last step stands at the place, without steps that it does not need."""
+        steps, needed = list(self._places), {place}
+        for i in range(place, -1, -1):
+            if i in needed:
+                needed.update(steps[i].operands)
+        kept = {i: n for n, i in enumerate(sorted(needed))}
+        made = tuple(steps[i]._replace(operands=tuple(kept[o] for o in steps[i].operands)) for i in kept)
+        return Expression(text if len(text) <= LONGEST else f"{text[:_SHOWN]}..", made)
+
+
+def product_of(factors: Sequence[Sequence[Expression]]) -> tuple[Expression, ...]:
+    """The product of polynomials whose coefficients are expressions."""
+    table = _Table()
+    result = [table.add(Step("number", 1.0))]
+    for factor in factors:
+        own, sums = [table.include(one) for one in factor], [-1] * (len(result) + len(factor) - 1)
+        for i, a in enumerate(result):
+            for j, b in enumerate(own):
+                term = table.add(Step("*", operands=(a, b)))
+                sums[i + j] = term if sums[i + j] < 0 else table.add(Step("+", operands=(sums[i + j], term)))
+        result = sums
+    text = "*".join(f"[{', '.join(one.text for one in factor)}]" for factor in factors)
+    return tuple(table.expression(place, text) for place in result)
+
+
+def _tree_of(text: str) -> ast.expr:
+    if len(text) > LONGEST:
+        raise ExpressionError(
+            f"has {len(text)} characters, and at most {LONGEST} are taken", "name a part of it"
+        )
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        hint = "write * for a product, ** for a power, and close every bracket"
+        raise ExpressionError("is no expression", hint) from error
 
 
 def is_name(text: str) -> bool:
@@ -160,62 +245,78 @@ def _number(value: float) -> float:
         return math.inf
 
 
-def _evaluated(node: ast.AST, known: Mapping[str, _Dual], zero: Array) -> _Dual:
-    match node:
-        case ast.Constant(value=int() | float() as number):
-            return _Dual(float(number), zero)
-        case ast.Name(id=name):
-            return known[name] if name in known or name not in CONSTANTS else _Dual(CONSTANTS[name], zero)
-        case ast.UnaryOp(op=op, operand=operand):
-            a = _evaluated(operand, known, zero)
-            return _Dual(-a.value, -a.slope) if isinstance(op, ast.USub) else a
-        case ast.Call(func=ast.Name(id=name), args=[argument]):
-            a, (value, slope) = _evaluated(argument, known, zero), FUNCTIONS[name]
+def _read(tree: ast.expr) -> tuple[Step, ...]:
+    """The steps of a tree that has been checked; it is walked from its leaves."""
+    table = _Table()
+    places: dict[ast.AST, int] = {}
+    for node in reversed(list(ast.walk(tree))):
+        match node:
+            case ast.Constant(value=int() | float() as number):
+                step = Step("number", _number(number))
+            case ast.Name(id=name):
+                step = Step("number", CONSTANTS[name]) if name in CONSTANTS else Step("name", name)
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                places[node] = places[operand]
+                continue
+            case ast.UnaryOp(operand=operand):
+                step = Step("negative", operands=(places[operand],))
+            case ast.Call(func=ast.Name(id=name), args=[argument]):
+                step = Step(name, operands=(places[argument],))
+            case ast.BinOp(left=left, op=op, right=right):
+                step = Step(_SIGNS[type(op)], operands=(places[left], places[right]))
+            case _:
+                continue
+        places[node] = table.add(step)
+    return table.expression(places[tree], "").steps
+
+
+_SIGNS: dict[type[ast.AST], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+
+
+def _evaluated(step: Step, operands: Sequence[_Dual], known: Mapping[str, _Dual], zero: Array) -> _Dual:
+    match step.operation, operands:
+        case "number", _:
+            return _Dual(float(step.value), zero)
+        case "name", _:
+            return known[str(step.value)]
+        case "negative", [a]:
+            return _Dual(-a.value, -a.slope)
+        case name, [a]:
+            value, slope = FUNCTIONS[name]
             # A constant has no slope, also where the function has none: sqrt(0).
             return _Dual(value(a.value), slope(a.value) * a.slope if np.any(a.slope) else zero)
-        case ast.BinOp(left=left, op=op, right=right):
-            return _combined(op, _evaluated(left, known, zero), _evaluated(right, known, zero))
-    raise ValueError("the expression has been checked")
+    return _combined(step.operation, *operands)
 
 
-def _combined(op: ast.operator, a: _Dual, b: _Dual) -> _Dual:
-    match op:
-        case ast.Add():
+def _combined(sign: str, a: _Dual, b: _Dual) -> _Dual:
+    match sign:
+        case "+":
             return _Dual(a.value + b.value, a.slope + b.slope)
-        case ast.Sub():
+        case "-":
             return _Dual(a.value - b.value, a.slope - b.slope)
-        case ast.Mult():
+        case "*":
             return _Dual(a.value * b.value, b.value * a.slope + a.value * b.slope)
-        case ast.Div():
+        case "/":
             ratio = a.value / b.value
             return _Dual(ratio, (a.slope - ratio * b.slope) / b.value)
-        case _:
-            power = math.pow(a.value, b.value)
-            slope = np.zeros_like(a.slope)
-            if np.any(a.slope) and b.value:
-                slope = slope + b.value * math.pow(a.value, b.value - 1.0) * a.slope
-            if np.any(b.slope):
-                slope = slope + power * math.log(a.value) * b.slope
-            return _Dual(power, slope)
+    power = math.pow(a.value, b.value)
+    slope = np.zeros_like(a.slope)
+    if np.any(a.slope) and b.value:
+        slope = slope + b.value * math.pow(a.value, b.value - 1.0) * a.slope
+    if np.any(b.slope):
+        slope = slope + power * math.log(a.value) * b.slope
+    return _Dual(power, slope)
 
 
-def _degree(node: ast.AST) -> int:
+def _degree(operation: str, degrees: Sequence[int]) -> int:
     """0 of a constant, 1 of what is affine in the parameters as it is written, 2 of anything else."""
-    match node:
-        case ast.Name(id=name):
-            return int(name not in CONSTANTS)
-        case ast.UnaryOp(operand=operand):
-            return _degree(operand)
-        case ast.Call(args=[argument]):
-            return 2 * min(_degree(argument), 1)
-        case ast.BinOp(left=left, op=op, right=right):
-            a, b = _degree(left), _degree(right)
-            match op:
-                case ast.Add() | ast.Sub():
-                    return max(a, b)
-                case ast.Mult():
-                    return min(a + b, 2)
-                case ast.Div() if b == 0:
-                    return a
-            return 2 * min(a + b, 1)
-    return 0
+    match operation, degrees:
+        case (("number" | "name"), _):
+            return int(operation == "name")
+        case (("negative" | "+" | "-"), _):
+            return max(degrees)
+        case "*", [a, b]:
+            return min(a + b, 2)
+        case "/", [a, 0]:
+            return a
+    return 2 * min(sum(degrees), 1)

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from inputdesign_cli.expressions import Expression, ExpressionError, is_name
+from inputdesign_cli.expressions import Expression, ExpressionError, is_name, product_of
 
 NAMES = ("K", "T", "zeta")
 VALUES = np.array([2.1, 0.7, 0.3])
@@ -101,3 +101,48 @@ def test_names_are_told_and_travel():
     assert found.names == {"K", "T"}
     assert is_name("K_1")
     assert not any(map(is_name, ("exp", "pi", "1K", "K[1]", "", "lambda", "None", "if")))
+
+
+DEEP = ["-" * 400 + "K", "K" + "*1" * 240, "K" + "+T" * 240, "1*(" * 80 + "K" + ")" * 80, "K # gain", " K\t"]
+
+
+@pytest.mark.parametrize("text", [*TEXTS, *DEEP, "K" + " " * 499])
+def test_what_is_made_of_expressions_is_worth_what_they_are(text):
+    """However long and deep the texts are: by the rules of products and quotients."""
+    a, b = Expression.of(text), Expression.of("T*exp(zeta)")
+    (x, dx), (y, dy) = (one.at(NAMES, VALUES) for one in (a, b))
+    for made, value, slope in (
+        (a * b, x * y, y * dx + x * dy),
+        (a / b, x / y, (dx * y - x * dy) / y**2),
+        (a / b * b, x, dx),
+    ):
+        found = made.at(NAMES, VALUES)
+        assert found[0] == pytest.approx(value, rel=1e-13)
+        np.testing.assert_allclose(found[1], slope, rtol=1e-12, atol=1e-13)
+        assert made.names == a.names | b.names
+        assert pickle.loads(pickle.dumps(made)).at(NAMES, VALUES)[0] == found[0]
+
+
+@pytest.mark.parametrize("count", [0, 1, 6, 60])
+def test_products_of_many_factors_are_those_of_numpy(count):
+    """And their slopes those of complex steps; each factor is worked through once."""
+    factors = [[Expression.of(f"T/{k}"), Expression.of("1 + K/T")] for k in range(1, count + 1)]
+    found = [one.at(NAMES, VALUES) for one in product_of(factors)]
+    step = 1e-20
+
+    def product(K, T):
+        rows = [np.array([T / k, 1 + K / T]) for k in range(1, count + 1)]
+        full = np.ones(1, dtype=complex)
+        for row in rows:
+            full = np.convolve(full, row)
+        return full
+
+    np.testing.assert_allclose([value for value, _ in found], product(2.1, 0.7).real, rtol=1e-11)
+    for k, moved in enumerate((product(2.1 + 1j * step, 0.7), product(2.1, 0.7 + 1j * step))):
+        np.testing.assert_allclose([slope[k] for _, slope in found], moved.imag / step, rtol=1e-9)
+
+
+@pytest.mark.parametrize("text", ["K*1e200*1e200", "K + 1e308*1e308*0", "K*1e308*1e-308 + 0*(1e308*1e308)"])
+def test_what_leaves_the_range_of_numbers_is_not_finite_and_quiet(text):
+    with np.errstate(all="raise"):
+        assert not math.isfinite(Expression.of(text).at(NAMES, VALUES)[0])

@@ -22,3 +22,6 @@ from inputdesign_cli.identification.residual_tests import (
     whiteness as whiteness,
 )
 from inputdesign_cli.identification.rivals import Rival as Rival
+from inputdesign_cli.identification.unknown_start import (
+    information_begun_anywhere as information_begun_anywhere,
+)

@@ -13,7 +13,7 @@ from html import escape
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.runs.curves import Curves, SpectrumCurves
 
@@ -67,21 +67,23 @@ class Results:
         """The columns of bound.csv: frequency_rad_per_s, r_u, r_adm, .."""
         return self.tables["bound"].columns
 
-    def spectrum(self, w: Array) -> NDArray[np.complex128]:
-        """(n, r, r): the spectrum at frequencies `w` (n,), in rad per time unit.
+    def spectrum(self, w: ArrayLike) -> NDArray[np.complex128]:
+        """(.., r, r): the spectrum at frequencies `w`, a number or an array (..), in rad per time unit.
 
         A density is interpolated between the frequencies of spectrum.csv; of sinusoids it is their power,
-        and zero between them.
+        and zero between them. A frequency within a thousandth of a line, and of its distance to the next one,
+        is that of the line.
         """
-        found = cast(SpectrumCurves, self.curves["spectrum"])
-        at = np.asarray(w, dtype=float)
+        found, stated = cast(SpectrumCurves, self.curves["spectrum"]), np.asarray(w, dtype=float)
+        at, shape = stated.ravel(), (*stated.shape, *found.spectrum.shape[1:])
         if found.lines:
             nearest = np.abs(found.frequency - at[:, None]).argmin(axis=1)
-            on = np.isclose(found.frequency[nearest], at, rtol=1e-9, atol=0.0)
-            return np.where(on[:, None, None], found.spectrum[nearest], 0.0).astype(complex)
+            on = np.abs(found.frequency[nearest] - at) <= _SAME_LINE * _room(found.frequency)[nearest]
+            powers = np.where(on[:, None, None], found.spectrum[nearest], 0.0)
+            return powers.reshape(shape).astype(complex)
         flat = found.spectrum.reshape(len(found.frequency), -1)
         columns = [np.interp(at, found.frequency, column, left=0.0, right=0.0) for column in flat.T]
-        return np.stack(columns, axis=1).reshape(at.size, *found.spectrum.shape[1:]).astype(complex)
+        return np.stack(columns, axis=1).reshape(shape).astype(complex)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the head of the result."""
@@ -98,6 +100,15 @@ class Results:
 
 
 _BOUNDS = ("lower_bound", "upper_bound")
+# Frequencies are written with three digits, say: so much of what lies around a line is the line.
+_SAME_LINE = 1e-3
+
+
+def _room(frequency: Array) -> Array:
+    """(n,): the frequency of each line, or its distance to the next one where that is less."""
+    apart = np.abs(frequency[:, None] - frequency)
+    np.fill_diagonal(apart, np.inf)
+    return np.minimum(frequency, apart.min(axis=1))
 
 
 def _digits(value: Json) -> str:

@@ -14,13 +14,35 @@ _SYNONYMS = {
     "numerator": ("num",),
     "denominator": ("den",),
     "variance": ("lambda", "sigma2"),
-    "s": ("sec", "second", "seconds"),
-    "min": ("minute", "minutes"),
-    "h": ("hour", "hours"),
+    "s": ("sec", "secs", "second", "seconds"),
+    "ms": ("msec", "milliseconds"),
+    "us": ("\u00b5s", "usec", "microseconds"),
+    "min": ("mins", "minute", "minutes"),
+    "h": ("hr", "hrs", "hour", "hours"),
     "d": ("day", "days"),
     "optimised": ("optimized",),
     "filtered_noise": ("gaussian",),
 }
+
+# Ways of sampling that other programs have.
+_OTHER_SAMPLING = {
+    *(
+        "foh",
+        "first_order_hold",
+        "linear",
+        "tustin",
+        "bilinear",
+        "trapezoidal",
+        "prewarp",
+        "matched",
+        "impulse",
+    ),
+    *("euler", "forward", "backward", "backward_diff"),
+}
+_IN_SAMPLES = (
+    " (an input that is held between samples, as converters do), or write what is sampled otherwise as "
+    "polynomials in q^-1"
+)
 
 
 def describe(value: object) -> str:
@@ -55,11 +77,16 @@ def choices(known: Sequence[str]) -> str:
     return known[0] if len(known) == 1 else ", ".join(known[:-1]) + " or " + known[-1]
 
 
+def synonym(word: str, known: Iterable[str]) -> str | None:
+    """The known word of which this one is another name."""
+    return next((ours for ours in known if word in _SYNONYMS.get(ours, ())), None)
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word that was probably meant, if there is one."""
     known = list(known)
-    if synonym := next((ours for ours in known if word in _SYNONYMS.get(ours, ())), None):
-        return synonym
+    if ours := synonym(word, known):
+        return ours
     lower = {k.lower(): k for k in known}
     flat = word[:80].lower().replace("-", "_").replace(" ", "_")
     near = difflib.get_close_matches(flat, lower, n=1, cutoff=0.6)
@@ -69,5 +96,11 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 def unknown_word(value: object, known: Sequence[str]) -> tuple[str, str]:
     """Message and hint for a value that is none of the known words."""
     message = f"{{key}} must be {choices(known)}, not {describe(value)}"
-    near = nearest(value, known) if isinstance(value, str) else None
+    word = value if isinstance(value, str) else ""
+    if "zoh" in known and word.lower() in _OTHER_SAMPLING:
+        supported = choices([f"sample: {method}" for method in known])
+        return message, f"{word} is not supported: write {supported}{_IN_SAMPLES if len(known) == 1 else ''}"
+    near = nearest(word, known)
+    if near is None and len(known) == 1:
+        return message, f"write {known[0]}"
     return message, f'did you mean "{near}"?' if near else ""

@@ -12,6 +12,7 @@ import inputdesign_cli
 from inputdesign_cli import tasks
 from inputdesign_cli.cli import app
 from inputdesign_cli.cli.init import KINDS
+from inputdesign_cli.error_codes import explanation, explanations
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from tests.support.command_line import RESULT, diagnostic
 
@@ -184,10 +185,11 @@ def test_an_unknown_word_is_refused_in_plain_words(run, arguments, nearest):
 def test_explain(run):
     code, out, _ = run("explain")
     assert code == 0
-    for name in (line.split()[0] for line in out.splitlines()):
-        ended, text, _ = run("explain", name)
-        assert ended == 0
-        assert len(text) > 40
+    names = [line.split()[0] for line in out.splitlines() if not line.startswith(" ")]
+    assert set(names) == set(explanations())
+    assert all(len(explanation(name)) > 40 for name in names)
+    for name in (names[0], "yaml-syntax"):
+        assert run("explain", name) == (0, explanation(name) + "\n", "")
     code, _, err = run("explain", "no-such-code")
     assert code == 2
     assert "no-such-code" in err

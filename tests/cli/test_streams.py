@@ -29,16 +29,21 @@ def shell(command, folder, **environment):
     return ended.returncode, ended.stderr
 
 
-@pytest.mark.parametrize("command", ["--help", f"validate --json {SPEC}"])
+FAILS = [
+    (">&-", 2, "error: standard output cannot be written"),
+    (">/dev/full", 2, "error: standard output cannot be written"),
+    ("| head -c 0", 141, ""),
+    ("2>&-", 0, ""),
+    ("2>/dev/full", 0, ""),
+    ("<&-", 0, ""),
+]
+
+
 @pytest.mark.parametrize(
-    ("stream", "code", "said"),
+    ("command", "stream", "code", "said"),
     [
-        (">&-", 2, "error: standard output cannot be written"),
-        (">/dev/full", 2, "error: standard output cannot be written"),
-        ("| head -c 0", 141, ""),
-        ("2>&-", 0, ""),
-        ("2>/dev/full", 0, ""),
-        ("<&-", 0, ""),
+        *((command, *fails) for command in ("--help", "explain yaml-syntax") for fails in FAILS),
+        *((f"validate --json {SPEC}", *fails) for fails in FAILS[1:3]),
     ],
 )
 def test_streams_that_fail(tmp_path, command, stream, code, said):

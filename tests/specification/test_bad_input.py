@@ -40,7 +40,7 @@ ROWS: list[Row] = [
     ("not-a-number", "sample_time", "1:30", {"sample_time": "§1:30"}),
     ("not-a-number", "sample_time", "2001-01-01", {"sample_time": "§2001-01-01"}),
     ("not-a-number", "sample_time", "decimal point: 0.5", {"sample_time": "§0,5"}),
-    ("not-a-number", "sample_time", "without a unit: 5", {"sample_time": "§5 ms"}),
+    ("not-a-number", "sample_time", "write 0.005", {"sample_time": "§5 ms"}),
     ("not-a-number", "sample_time", "remove the quotes", {"sample_time": "§'1e-3'"}),
     ("not-a-number", "sample_time", "3.14159", {"sample_time": "§pi"}),
     ("not-a-number", "accuracy.model_error.relative", "fraction: 0.01", {

@@ -23,7 +23,7 @@ GRID = np.linspace(0.0, np.pi, 801)
 
 
 def designed(text, *overrides):
-    spec = parse_spec(text, overrides=list(overrides))
+    spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
     return build_convex(spec).designed()[0].design
 
 

@@ -16,6 +16,8 @@ plant: {continuous: {gain: 2.1, time_constant: 180, dead_time: 25}, sample: zoh}
 noise: {variance: 0.04}
 accuracy: {standard_deviation: {gain: 0.05}}
 spectrum: {type: multisine, lines: 60}
+signal: {candidates: 1}
+solver: {any_spectrum: false}
 """
 CHANNELS = 'channels: {u1: {name: heating, unit: "%"}, y1: {unit: degC}}\n'
 
@@ -82,7 +84,7 @@ def test_what_would_be_long_enough_is_told_as_lengths_are_stated(lengths):
     text = (
         "sample_time: 0.5\nplant: {B: [0, 3.6], F: [1, -0.7]}\nnoise: {variance: 1}\n"
         f"experiment: {{{word}: {{}}}}\naccuracy: {{model_error: {{relative: 0.05}}}}\n"
-        "limits: {amplitude: 0.25}\nspectrum: {type: fir, order: 8}\n"
+        "limits: {amplitude: 0.25}\nspectrum: {type: fir, order: 8}\nsolver: {any_spectrum: false}\n"
     ).replace("{}", "%s")
     with pytest.raises(InfeasibleError) as caught:
         solve(parse_spec(text % (400 * unit)))
@@ -95,7 +97,7 @@ def test_entries_are_titled_by_the_names_of_their_channels():
     text = names + (
         "plant: {B: [[[0, 1], [0, 0.5]]], F: [[[1, -0.5], [1, -0.7]]]}\nnoise: {variance: 0.1}\n"
         "experiment: {samples: 200}\naccuracy: {criterion: D}\nlimits: {input_power: 1}\n"
-        "spectrum: {type: fir, order: 3}\n"
+        "spectrum: {type: fir, order: 3}\nsignal: {candidates: 1}\nsolver: {any_spectrum: false}\n"
     )
     panels = solve(parse_spec(text)).curves["bound"].panels
     assert [(panel.entry, panel.names) for panel in panels] == [

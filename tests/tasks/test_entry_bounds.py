@@ -22,7 +22,13 @@ spectrum: {type: polynomial, order: 6, band: [0, 2.0]}
 def arx(error, *overrides):
     spec = load_spec(
         SPECS / "two_by_two_arx.yaml",
-        ["spectrum.order=3", f"accuracy.model_error={{{error}}}", "signal.candidates=1", *overrides],
+        [
+            "spectrum.order=3",
+            f"accuracy.model_error={{{error}}}",
+            "signal.candidates=1",
+            "solver.any_spectrum=false",
+            *overrides,
+        ],
     )
     return solve(spec)
 

@@ -121,3 +121,28 @@ def test_results_are_arrays():
     power = lines.spectrum(np.array([0.2, 0.3, 0.5]))[:, 0, 0].real
     assert power[1] == 0.0
     assert power.sum() == pytest.approx(lines.result["cost"], rel=1e-6)
+
+
+def test_the_power_of_a_line_is_found_by_the_digits_that_people_write():
+    """Lines at multiples of pi/(60 sample_time), as numbers and as arrays of any shape."""
+    heater = {"continuous": {"gain": 2.1, "time_constant": 180, "dead_time": 25}, "sample": "zoh"}
+    spec = {
+        "sample_time": 4.76,
+        "plant": heater,
+        "noise": {"variance": 0.04},
+        "experiment": {"samples": 720},
+        "accuracy": {"standard_deviation": {"gain": 0.05, "dead_time": 2}},
+        "spectrum": {"type": "multisine", "lines": 60},
+    }
+    outcome = solve(Spec.from_dict(spec))
+    columns = outcome.tables["spectrum"].columns
+    frequency, power = columns["frequency_rad_per_s"], columns["power"]
+    written = np.array([float(f"{w:.4g}") for w in frequency])
+    np.testing.assert_array_equal(outcome.spectrum(written)[:, 0, 0].real, power)
+    between = 0.5 * (frequency[1:] + frequency[:-1])
+    assert not np.any(outcome.spectrum(between))
+    assert outcome.spectrum(written[0]).shape == (1, 1)
+    assert outcome.spectrum(written[0])[0, 0] == power[0]
+    assert outcome.spectrum(written[:4].reshape(2, 2)).shape == (2, 2, 1, 1)
+    density = solve(Spec.from_dict({**DATA, "experiment": {"samples": 100}}))
+    assert density.spectrum(0.3).shape == (1, 1)

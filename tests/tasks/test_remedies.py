@@ -7,7 +7,8 @@ import pytest
 from inputdesign_cli import parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.identification import build_identification
-from inputdesign_cli.tasks.result.remedies import remedies_of
+from inputdesign_cli.tasks.result.refutations import FOUND
+from inputdesign_cli.tasks.result.remedies import remedies_of, vague_notes
 
 SPEC = """
 sample_time: 5
@@ -27,7 +28,7 @@ PLANTS = {"short": SHORT, "s": IN_S, "named": NAMED, "states": STATES, "q": IN_Q
 WORDS = {
     "short": "numerator: [K]",
     "s": "raise the orders of numerator and denominator",
-    "named": "denominator: [[T1, 1], [T2, 1]]",
+    "named": "[T2, 1] as another factor of the denominator",
     "states": "one more state",
     "q": "raise the orders of B and F",
     "named q": "by a name in parameters",
@@ -44,10 +45,35 @@ def test_remedies_are_in_the_words_of_the_plant(kind):
     spec, found = remedies(PLANTS[kind])
     assert WORDS[kind] in found["plant"]
     for other, words in WORDS.items():
-        assert other == kind or words not in found["plant"] or other in ("short", "named")
+        assert other == kind or words not in found["plant"]
     for fault in ("noise", "drift"):
         (block,) = re.findall(r"noise: (\{.*\})\)", found[fault])
         build_convex(parse_spec(spec.to_yaml(), overrides=[f"noise={{variance: 0.04, {block[1:]}"]))
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_remedies_fit_into_the_sentences_that_hold_them(kind):
+    _, found = remedies(PLANTS[kind])
+    for fault, remedy in found.items():
+        note = FOUND[fault].format(p="0.1", lag=3, where="", remedy=remedy)
+        assert not re.search(r"[,;:.]\s*[,;.]|\s[,;.](?!\.)|  ", note.replace(", ..]", "]")), note
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_only_coefficients_have_orders(kind):
+    """A gain or a lag that may be zero is not an order; c1 is, beside parameters of any name."""
+    spec = parse_spec(f"plant: {PLANTS[kind]}\n{SPEC}", overrides=["noise={C: [1, -0.2], variance: 0.04}"])
+    model = build_identification(spec).nominal
+    orders = {"s": ("b0", "a0", "c1"), "q": ("b1", "f1", "c1")}.get(kind, ("c1",))
+    told = {
+        tuple(sorted(names.split(", "))): "order" in advice
+        for names, advice in (
+            re.fullmatch(r"zero lies within a standard deviation of (.*?): (.*)", note).groups()
+            for note in vague_notes(model, model.names)
+        )
+    }
+    physical = tuple(sorted(set(model.names) - set(orders)))
+    assert told == {**({physical: False} if physical else {}), tuple(sorted(orders)): True}
 
 
 def test_a_lag_more_is_written_as_it_is_said():

@@ -199,7 +199,7 @@ def test_lines_that_tell_nonlinearity_stay_silent():
         ({"experiment.controller": {"numerator": [0.1], "denominator": [1]}}, "not-supported", "controller"),
         ({"noise.drift": True}, "not-supported", "drift"),
         ({"spectrum": {"type": "fir"}}, "not-supported", "spectrum"),
-        ({"limits.amplitude": 1.0}, "not-supported", "amplitude"),
+        ({"limits.energy": 1.0}, "not-supported", "energy"),
         ({"signal.hold": 2}, "not-supported", "hold"),
         ({"accuracy.model_error": {"relative": 0.1}}, "not-supported", "model_error"),
         ({"accuracy.frequency_response.lines": 500}, "too-few-lines", "lines"),
@@ -242,7 +242,7 @@ def test_limits_that_are_too_tight_say_what_would_do():
 def audited():
     task = build_task(spec())
     plan, results = task._solved()
-    return replace(task._terms, experiment=replace(task.experiment, samples=plan.counted)), plan, results
+    return replace(task, experiment=replace(task.experiment, samples=plan.counted)), plan, results
 
 
 def test_what_is_written_passes_the_audit():

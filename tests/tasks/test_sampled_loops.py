@@ -53,7 +53,7 @@ plant:
 
 
 def designed(text, *overrides):
-    spec = parse_spec(text, overrides=list(overrides))
+    spec = parse_spec(text, overrides=[*overrides, "solver.any_spectrum=false"])
     return build_convex(spec).designed()[0].design.result
 
 

@@ -23,6 +23,7 @@ accuracy: {model_error: {relative: 0.05}}
 spectrum: {type: fir, order: 4}
 limits: {amplitude: 1}
 signal: {candidates: 2}
+solver: {any_spectrum: false}
 """
 MOVES = """
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -31,6 +32,7 @@ accuracy: {model_error: {relative: 0.05, alpha: 2.45}}
 spectrum: {type: fir, order: 8}
 limits: {amplitude: 0.7, rate: 0.9}
 signal: {candidates: 2}
+solver: {any_spectrum: false}
 """
 TWO = """
 plant:
@@ -41,6 +43,7 @@ accuracy: {model_error: {relative: 0.4}}
 spectrum: {type: fir, order: 3}
 limits: {amplitude: [1.0, 0.6]}
 signal: {candidates: 1}
+solver: {any_spectrum: false}
 """
 SHORTEST = "objective: shortest_experiment\n"
 

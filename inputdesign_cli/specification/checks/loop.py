@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from inputdesign_cli.specification.checks.plant import SAMPLED
 from inputdesign_cli.specification.models.controller import Controller
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.plant import Plant
@@ -49,7 +50,7 @@ def sensitivity_has_loop(spec: Spec) -> Iterator[PathDiagnostic]:
 def _controller(plant: Plant, controller: Controller, *path: str) -> Iterator[PathDiagnostic]:
     if not plant.sampled:
         message = "{key} works in discrete time, but the plant is not sampled"
-        yield PathDiagnostic("unsuitable-key", message, "add sample: zoh to the plant", path)
+        yield PathDiagnostic("unsuitable-key", message, SAMPLED, path)
     channels = (plant.inputs, plant.outputs)
     has = f"but the plant has {count(plant.inputs, 'input')} and {count(plant.outputs, 'output')}"
     if controller.kind == "loops":

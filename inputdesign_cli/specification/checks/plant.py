@@ -29,6 +29,10 @@ def check_stable(spec: Spec, plant: Plant, *path: str) -> Iterator[PathDiagnosti
         yield replace(found, hint=needs + found.hint)
 
 
+SAMPLED = "add sample: zoh to the plant"
+"""What mends most that a plant in s cannot have without."""
+
+
 def noise_fits(spec: Spec) -> Iterator[PathDiagnostic]:
     """The noise has as many channels as the plant has outputs."""
     yield from check_noise(spec, spec.noise, "noise")
@@ -43,7 +47,8 @@ def check_noise(spec: Spec, noise: NoiseShape, *path: str) -> Iterator[PathDiagn
     for key, value in (("C", noise.C), ("D", noise.D), ("drift", ())):
         if kind and key in noise.model_fields_set:
             message = f"{{key}} is {'a polynomial' if value else 'a root'} in q^-1, but {kind}"
-            yield PathDiagnostic("unsuitable-key", message, f"remove {key}", (*path, key))
+            hint = f"remove {key}" if white else f"{SAMPLED}, or remove {key}"
+            yield PathDiagnostic("unsuitable-key", message, hint, (*path, key))
         elif value:
             yield from check_per_output(value, outputs, *path, key)
     if len(noise.drifts) not in (1, outputs):
@@ -81,7 +86,7 @@ def spectrum_fits(spec: Spec) -> Iterator[PathDiagnostic]:
         yield PathDiagnostic("regression-mismatch", "moments are for a regression", hint, path)
     elif spectrum.type == "fir" and not spec.plant.sampled:
         message = "a fir spectrum is in discrete time, but the plant is not sampled"
-        hint = "add sample: zoh to the plant, or choose type: polynomial"
+        hint = f"{SAMPLED}, or choose type: polynomial"
         yield PathDiagnostic("unsuitable-key", message, hint, path)
 
 
@@ -93,7 +98,7 @@ def weights_fit(spec: Spec) -> Iterator[PathDiagnostic]:
         path = ("accuracy", name, "weight")
         if spec.at(*path, "kind") == "discrete":
             message = "{key} is in q^-1, but the plant is not sampled"
-            hint = "write {continuous: {numerator: [..], denominator: [..]}} in s"
+            hint = f"{SAMPLED}, or write {{continuous: {{numerator: [..], denominator: [..]}}}} in s"
             yield PathDiagnostic("unsuitable-key", message, hint, path)
 
 
@@ -127,7 +132,8 @@ def true_system_fits(spec: Spec) -> Iterator[PathDiagnostic]:
         return
     if true.sampled and not plant.sampled:
         message = "{key} is in discrete time, but the plant is not sampled"
-        yield PathDiagnostic("wrong-shape", message, "describe the true system in s as well", path)
+        hint = f"{SAMPLED} as well, or describe the true system in s without it"
+        yield PathDiagnostic("wrong-shape", message, hint, path)
     if plant.sampled and not true.sampled:
         message = "{key} is not sampled, but the plant is in discrete time"
         yield PathDiagnostic("wrong-shape", message, "add sample: zoh to it", path)

@@ -34,6 +34,7 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import DiscreteTransfer, Transfer
+from inputdesign_cli.specification.models.units import FRACTION
 
 DEFAULT_CONFIDENCE = 0.95
 # Draws that lie on the rarer side.
@@ -104,7 +105,9 @@ class Confidence(Section):
 class ModelError(Section):
     """r_u(w) <= r_adm(w) at every frequency of the band."""
 
-    relative: Positive | None = Field(default=None, description="r_adm = this fraction of |G|.")
+    relative: Annotated[Positive, FRACTION] | None = Field(
+        default=None, description="r_adm = this fraction of |G|."
+    )
     absolute: Positive | None = Field(default=None, description="r_adm = this value at every frequency.")
     table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
     sensitivity: Sensitivity | None = Field(default=None, description="r_adm from a bound on a sensitivity.")
@@ -208,7 +211,9 @@ class MeanSquaredError(Section):
 class FrequencyResponse(Section):
     """The standard deviation of a nonparametric frequency response, line by line, for periodic excitation."""
 
-    relative: Positive | None = Field(default=None, description="r_adm = this fraction of |G|.")
+    relative: Annotated[Positive, FRACTION] | None = Field(
+        default=None, description="r_adm = this fraction of |G|."
+    )
     absolute: Positive | None = Field(default=None, description="r_adm = this value at every line.")
     table: FileName | None = Field(default=None, description="CSV file with columns frequency and r_adm.")
     frequencies: Annotated[Frequencies, SIZES["accuracy.frequency_response.lines"]] | None = Field(

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Union
 from pydantic import Tag
 
 from inputdesign_cli.specification.models.section import TAG, Section
+from inputdesign_cli.specification.models.units import Measure
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,16 @@ def declared_at(root: type[Section], location: Sequence[str | int]) -> Declared:
     for step in location:
         found = found.at(step)
     return found
+
+
+def measure_at(root: type[Section], location: Sequence[str | int]) -> Measure | None:
+    """What a number at the location counts in: what is said nearest to it, within its section."""
+    found, latest = Declared(root), None
+    for step in location:
+        found = found.at(step)
+        own = next((m for m in reversed(found.metadata) if isinstance(m, Measure)), None)
+        latest = own or (None if found.section else latest)
+    return latest
 
 
 def sections_in(annotation: Any) -> set[type[Section]]:

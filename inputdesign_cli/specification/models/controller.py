@@ -8,11 +8,12 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
-from inputdesign_cli.specification.models.fields import Count, Index, NonNegative, Number, Positive, Several
+from inputdesign_cli.specification.models.fields import Count, Index, NonNegative, Number, Several, Time
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.transfer import ContinuousRatio, DiscreteMatrix, DiscreteTransfer
+from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.models.values import depth
 
 Rule = Literal["tustin", "backward", "zoh"]
@@ -26,9 +27,9 @@ class Pid(Section):
     """Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)), times in time_unit."""
 
     Kp: Number = Field(description="Gain; negative where more input means less output.", examples=[2.0])
-    Ti: Positive | None = Field(default=None, description="Integral time; absent: no integral action.")
-    Td: NonNegative = Field(default=0.0, description="Derivative time (default 0).")
-    Tf: NonNegative | None = Field(
+    Ti: Time | None = Field(default=None, description="Integral time; absent: no integral action.")
+    Td: Annotated[NonNegative, TIME] = Field(default=0.0, description="Derivative time (default 0).")
+    Tf: Annotated[NonNegative, TIME] | None = Field(
         default=None, description="Time constant of the filter of the derivative (default Td / 10)."
     )
     sample: Rule = Field(default="tustin", description=_RULE)

@@ -24,12 +24,14 @@ from inputdesign_cli.specification.models.fields import (
     Positive,
     SemidefiniteMatrix,
     StablePerOutput,
+    Time,
     Variance,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.specification.models.section import TAG, Section, tag
 from inputdesign_cli.specification.models.shapes import with_paths
+from inputdesign_cli.specification.models.units import FRACTION
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import count
 
@@ -119,7 +121,7 @@ class Noise(NoiseShape):
 class SimulationNoise(NoiseShape):
     """The noise of a simulation: its variance, or its size relative to the outputs."""
 
-    relative_std: Positive | None = Field(
+    relative_std: Annotated[Positive, FRACTION] | None = Field(
         default=None, description="Standard deviation as a fraction of the smallest output rms."
     )
 
@@ -178,7 +180,7 @@ class Experiment(Section):
     """How the data will be collected."""
 
     samples: Count = Field(default=1, description="Number of samples (default 1: criteria are per sample).")
-    duration: Positive | None = Field(
+    duration: Time | None = Field(
         default=None, description="In place of samples: how long it lasts, in time_unit.", examples=[3600]
     )
     controller: Controller | None = Field(

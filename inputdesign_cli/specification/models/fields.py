@@ -30,6 +30,7 @@ from inputdesign_cli.specification.models.polynomials import (
 )
 from inputdesign_cli.specification.models.section import TAG, tag
 from inputdesign_cli.specification.models.sizes import COEFFICIENT, QUANTITY, SIZES
+from inputdesign_cli.specification.models.units import FRACTION, FREQUENCY, SIGNAL, TIME
 from inputdesign_cli.specification.models.values import (
     as_text,
     as_whole,
@@ -78,8 +79,11 @@ Number = Annotated[float, Strict(), AllowInfNan(False), COEFFICIENT]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0), QUANTITY]
 NonNegative = Annotated[float, Strict(), AllowInfNan(False), Field(ge=0), QUANTITY]
 Cap = Annotated[Positive, Wording("a number", "to have no limit, remove the key")]
-Fraction = Annotated[Number, Field(ge=1e-9, lt=1)]  # a smaller probability is no requirement
-Tolerance = Annotated[Number, Field(gt=0, lt=1e-2)]
+Time = Annotated[Positive, TIME]
+Level = Annotated[Cap, SIGNAL]
+"""A bound on samples of a signal, in its unit."""
+Fraction = Annotated[Number, Field(ge=1e-9, lt=1), FRACTION]  # a smaller probability is no requirement
+Tolerance = Annotated[Number, Field(gt=0, lt=1e-2), FRACTION]
 Count = Annotated[int, Strict(), Field(ge=1, le=2**53), _WHOLE]
 Index = Annotated[int, Strict(), Field(ge=0, le=2**53), _WHOLE]
 RegisterLength = Annotated[int, Strict(), Field(ge=2, le=32), _WHOLE]
@@ -103,8 +107,12 @@ Numbers = Annotated[Several[Number], Wording("a list of numbers")]
 Names = Annotated[Several[Name], Wording("a list of parameter names")]
 PerChannel = Annotated[Annotated[T, tag("one")] | Annotated[Several[T], tag("list")], _LIST_OR_NOT]
 """One value, or a list with one per channel."""
-Band = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(two_frequencies), AfterValidator(ascending)]
-Frequencies = Annotated[Several[NonNegative], AfterValidator(rising), Wording("a list of frequencies")]
+Band = Annotated[
+    tuple[NonNegative, NonNegative], BeforeValidator(two_frequencies), AfterValidator(ascending), FREQUENCY
+]
+Frequencies = Annotated[
+    Several[NonNegative], AfterValidator(rising), Wording("a list of frequencies"), FREQUENCY
+]
 Harmonics = Annotated[
     Annotated[Count, tag("count")]
     | Annotated[Literal["odd"], Wording("odd", "write odd, a number of harmonics, or a list"), tag("word")]

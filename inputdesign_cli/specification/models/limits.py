@@ -13,9 +13,10 @@ from inputdesign_cli.specification.models.fields import (
     Cap,
     Count,
     FileName,
+    Level,
     NonNegative,
     PerChannel,
-    Positive,
+    Time,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
@@ -85,8 +86,10 @@ Power = Annotated[PowerLimit, Shorthand("max", *_NUMBERS)]
 class AmplitudeLimit(Section):
     """Bounds on single samples of what the excitation causes, noise and operating point not counted."""
 
-    input: PerChannel[Cap] | None = Field(default=None, description="Largest |u|; a number or one per input.")
-    output: PerChannel[Cap] | None = Field(
+    input: PerChannel[Level] | None = Field(
+        default=None, description="Largest |u|; a number or one per input."
+    )
+    output: PerChannel[Level] | None = Field(
         default=None, description="Largest |y| of the simulated output; a number or one per output."
     )
 
@@ -106,13 +109,13 @@ class Limits(Section):
     )
     excitation_power: Power | None = Field(default=None, description="Power of r: number, list, {min, max}.")
     samples: Count | None = Field(default=None, description="Largest number of samples.")
-    duration: Positive | None = Field(
+    duration: Time | None = Field(
         default=None, description="In place of samples: the longest experiment, in time_unit."
     )
     amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = Field(
         default=None, description="Largest |u|: a number or one per input; or {input, output}."
     )
-    rate: PerChannel[Cap] | None = Field(
+    rate: PerChannel[Level] | None = Field(
         default=None,
         description="Largest change of u from one sample to the next; a number or one per input.",
     )
@@ -126,8 +129,11 @@ class Limits(Section):
     def bounds_power(self) -> bool:
         """Whether some limit bounds the power of the excitation, so that the best experiment exists."""
         powers = (self.input_power, self.output_power, self.excitation_power, self.spectrum)
-        sampled = self.amplitude is not None and self.amplitude.input is not None
-        return sampled or self.energy is not None or any(p is not None and p.max is not None for p in powers)
+        return (
+            self.amplitude is not None
+            or self.energy is not None
+            or any(p is not None and p.max is not None for p in powers)
+        )
 
 
 def _some(limit: Section, first: str, second: str, example: str) -> Iterator[PathDiagnostic]:

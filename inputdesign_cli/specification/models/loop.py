@@ -10,7 +10,7 @@ from pydantic import Field
 
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.controller import Controller, Rule
-from inputdesign_cli.specification.models.fields import Band, Fraction, Positive
+from inputdesign_cli.specification.models.fields import Band, Fraction, Positive, Time
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section
 
@@ -21,7 +21,7 @@ _MOST_DEGREES = 60.0
 class Simc(Section):
     """PI settings by the rules of Skogestad."""
 
-    tau_c: Positive | None = Field(
+    tau_c: Time | None = Field(
         default=None, description="Time constant of the closed loop, in time_unit (default: the dead time)."
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,17 +43,17 @@ EXPRESSIONS = TakesExpressions()
 # Keys whose texts are words.
 _WORDS = ("time",)
 
-Texts = tuple[str, ...]
-TextMatrix = tuple[tuple[Texts, ...], ...]
+Terms = tuple[Expression, ...]
+TermMatrix = tuple[tuple[Terms, ...], ...]
 
 
 @dataclass(frozen=True)
-class CoefficientTexts:
+class CoefficientTerms:
     """The coefficients of a plant in s, descending, and its dead times, as expressions entry by entry."""
 
-    numerator: TextMatrix
-    denominator: TextMatrix
-    delay: tuple[Texts, ...]
+    numerator: TermMatrix
+    denominator: TermMatrix
+    delay: tuple[Terms, ...]
 
 
 @dataclass(frozen=True)
@@ -159,41 +159,18 @@ def texts_in(value: Plain) -> list[str]:
     return [found for part in parts for found in texts_in(part)]
 
 
-def present(written: Plain) -> bool:
-    """Whether a coefficient exists: an expression in parameters, whatever its value, or what is not zero.
-
-    What a plant consists of is read off its words, so that it does not change with the nominal parameters.
-    """
-    if not isinstance(written, str):
-        return bool(written)
-    expression = Expression(written)
-    return bool(expression.names) or expression.at((), np.zeros(0))[0] != 0.0
-
-
-def leading(written: Sequence[Plain]) -> int:
+def leading(terms: Terms) -> int:
     """The place of the first coefficient that exists; the length where none does."""
-    return next((i for i, one in enumerate(written) if present(one)), len(written))
+    return next((i for i, one in enumerate(terms) if one.present), len(terms))
 
 
-def text(value: Plain) -> Plain:
-    """A nested value of numbers and expressions with every number as a text."""
+def expressed(value: Plain) -> Plain:
+    """A nested value of numbers and texts with an expression in place of each."""
     if isinstance(value, list | tuple):
-        return tuple(text(part) for part in value)
-    return value if isinstance(value, str) else repr(float(value))
+        return tuple(expressed(part) for part in value)
+    return Expression(value if isinstance(value, str) else repr(float(value)))
 
 
-def product_of(factors: Iterable[Texts]) -> Texts:
-    """The product of polynomials whose coefficients are expressions."""
-    result: Texts = ("1.0",)
-    for factor in factors:
-        sums: list[list[str]] = [[] for _ in range(len(result) + len(factor) - 1)]
-        for i, a in enumerate(result):
-            for j, b in enumerate(factor):
-                sums[i + j].append(f"({a})*({b})")
-        result = tuple(" + ".join(terms) for terms in sums)
-    return result
-
-
-def matrix(value: Plain) -> TextMatrix:
+def matrix(value: Plain) -> TermMatrix:
     """One polynomial as a 1 x 1 matrix; a matrix as it is."""
     return value if depth(value) == 3 else ((value,),)

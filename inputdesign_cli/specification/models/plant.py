@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
+from inputdesign_cli.expressions import Expression
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     Count,
@@ -21,14 +22,14 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
-    CoefficientTexts,
+    CoefficientTerms,
     NamedParameter,
-    Texts,
+    Terms,
     check_names,
     check_used,
+    expressed,
     leading,
     matrix,
-    text,
     texts_in,
     values_of,
     worth,
@@ -116,9 +117,7 @@ class NamedPlant(Section):
     def named_parameters(self) -> tuple[NamedParameter, ...]:
         """Parameters with names of their own; none where the coefficients are the parameters."""
         stated = self.parameters or {}
-        return tuple(
-            NamedParameter(name, name, value, ("parameters", name)) for name, value in stated.items()
-        )
+        return tuple(NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
 
 
 class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials A, B, F"):
@@ -152,13 +151,13 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
 
     def check_written(self) -> Iterator[PathDiagnostic]:
         """Some coefficient of B exists."""
-        yield from check_gain(as_matrix(self.written["B"]), "B")
+        yield from check_gain(matrix(expressed(self.written["B"])), "B")
 
     @property
     def delays(self) -> tuple[tuple[int, ...], ...]:
         """Entry by entry the power of the first coefficient of B that exists; its length where none does."""
         return tuple(
-            tuple(leading(entry) for entry in row) for row in as_matrix(self.written.get("B", self.B))
+            tuple(leading(entry) for entry in row) for row in matrix(expressed(self.written.get("B", self.B)))
         )
 
     @property
@@ -171,9 +170,9 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
         """The number of inputs."""
         return len(self.B_matrix[0])
 
-    def coefficients(self, letter: str, output: int, input: int) -> Texts:
+    def coefficients(self, letter: str, output: int, input: int) -> Terms:
         """A, B or F of an entry as expressions in the named parameters."""
-        written = text(self.written[letter.upper()])
+        written = expressed(self.written[letter.upper()])
         if letter == "a":
             return written[output] if depth(written) == 2 else written
         return matrix(written)[output][input]
@@ -194,7 +193,6 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
     """A continuous-time transfer matrix; without `sample` the design stays in continuous time."""
 
     kind: ClassVar[Literal["continuous"]] = "continuous"
-
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("continuous",)
 
     continuous: Continuous = Field(
@@ -229,19 +227,19 @@ class ContinuousPlant(NamedPlant, family="plant", phrase="a continuous-time plan
 
     def check_written(self) -> Iterator[PathDiagnostic]:
         """Some coefficient of a numerator exists, and none that does makes an entry improper."""
-        yield from self.continuous.check_present(self.stated_texts)
-
-    @property
-    def texts(self) -> CoefficientTexts:
-        """The coefficients as expressions in the named parameters."""
-        if self.parameters is None and self.continuous.kind == "process":
-            return self.continuous.texts()
-        return self.stated_texts
+        yield from self.continuous.check_present(self.stated_terms)
 
     @cached_property
-    def stated_texts(self) -> CoefficientTexts:
+    def terms(self) -> CoefficientTerms:
+        """The coefficients as expressions in the named parameters."""
+        if self.parameters is None and self.continuous.kind == "process":
+            return self.continuous.terms()
+        return self.stated_terms
+
+    @cached_property
+    def stated_terms(self) -> CoefficientTerms:
         """The coefficients as they are written."""
-        return self.continuous.texts(self.written["continuous"])
+        return self.continuous.terms(self.written["continuous"])
 
 
 class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
@@ -285,11 +283,11 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
         """The letters of those that are written."""
         return self.state_space.stated("A", "B", "C", "D", "K")
 
-    def term(self, letter: str, row: int, column: int) -> str:
+    def term(self, letter: str, row: int, column: int) -> Expression:
         """An entry of a matrix, or the dead time, as an expression in the named parameters."""
         written = self.written["state_space"]
         value = written.get("delay", 0.0) if letter == "delay" else written[letter][row][column]
-        return str(text(value))
+        return expressed(value)
 
 
 class RegressionSize(Section):

@@ -12,14 +12,14 @@ from inputdesign_cli.expressions import Expression
 from inputdesign_cli.specification.models.fields import NonNegativeGrid, NumberGrid, PositiveGrid
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
-    CoefficientTexts,
+    CoefficientTerms,
     NamedParameter,
-    Texts,
-    present,
-    text,
+    Terms,
+    expressed,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section
+from inputdesign_cli.specification.models.units import FREQUENCY, TIME
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -36,16 +36,16 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
     kind: ClassVar[Literal["process"]] = "process"
 
     gain: Annotated[NumberGrid, EXPRESSIONS] = Field(description="Static gain.", examples=[2.1])
-    time_constant: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+    time_constant: Annotated[PositiveGrid, EXPRESSIONS, TIME] | None = Field(
         default=None, description="Time constant, in time_unit, of a plant of first order."
     )
     damping: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
         default=None, description="Damping ratio of a plant of second order."
     )
-    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS] | None = Field(
+    natural_frequency: Annotated[PositiveGrid, EXPRESSIONS, FREQUENCY] | None = Field(
         default=None, description="Undamped natural frequency of a plant of second order, rad per time_unit."
     )
-    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+    dead_time: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
         default=None, description="Dead time, in time_unit; 0 where there is none."
     )
 
@@ -65,9 +65,9 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                 hint = "write one number, or rows (outputs) of columns (inputs), for all of them alike"
                 yield PathDiagnostic("wrong-shape", "{key} must have the shape of the gain", hint, (name,))
 
-    def check_present(self, texts: CoefficientTexts) -> Iterator[PathDiagnostic]:
+    def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
         """Some gain exists."""
-        if not any(present(one) for row in texts.numerator for entry in row for one in entry):
+        if not any(one.present for row in terms.numerator for entry in row for one in entry):
             message = "{key} is zero: the input has no effect"
             yield PathDiagnostic("zero-polynomial", message, "", ("continuous", "gain"))
 
@@ -117,52 +117,50 @@ class ProcessModel(Section, family="continuous", phrase="a process model"):
                     found.append(NamedParameter(label, self._symbol(name, i, j), value, place))
         return tuple(found)
 
-    def texts(self, written: Mapping[str, Plain] | None = None) -> CoefficientTexts:
+    def terms(self, written: Mapping[str, Plain] | None = None) -> CoefficientTerms:
         """Its coefficients as expressions in its own parameters.
 
         Args:
             written: the section, where its values are expressions in other parameters.
         """
 
-        def of(name: str, i: int, j: int) -> str:
+        def of(name: str, i: int, j: int) -> Expression:
             if written is None:
-                return self._symbol(name, i, j)
+                return Expression(self._symbol(name, i, j))
             value = written[name]
-            return f"({text(value[i][j] if isinstance(value, list | tuple) else value)})"
+            return expressed(value[i][j] if isinstance(value, list | tuple) else value)
 
         def there(name: str, i: int, j: int) -> bool:
             if not self.stated(name):
                 return False
-            return self.grid(name)[i][j] != 0.0 if written is None else present(of(name, i, j))
+            return self.grid(name)[i][j] != 0.0 if written is None else of(name, i, j).present
 
-        above, below, delays = [], [], []
+        none, above, below, delays = Expression("0.0"), [], [], []
         for i, row in enumerate(self.grid("gain")):
-            entries = [self._entry(of, i, j) for j in range(len(row))]
-            above.append(
-                tuple(top if there("gain", i, j) else ("0.0",) for j, (top, _) in enumerate(entries))
-            )
+            columns = range(len(row))
+            entries = [self._entry(of, i, j) for j in columns]
+            above.append(tuple(entries[j][0] if there("gain", i, j) else (none,) for j in columns))
             below.append(tuple(bottom for _, bottom in entries))
-            delays.append(
-                tuple(of("dead_time", i, j) if there("dead_time", i, j) else "0.0" for j in range(len(row)))
-            )
-        return CoefficientTexts(tuple(above), tuple(below), tuple(delays))
+            delays.append(tuple(of("dead_time", i, j) if there("dead_time", i, j) else none for j in columns))
+        return CoefficientTerms(tuple(above), tuple(below), tuple(delays))
 
-    def _entry(self, of: Callable[[str, int, int], str], i: int, j: int) -> tuple[Texts, Texts]:
+    def _entry(self, of: Callable[[str, int, int], Expression], i: int, j: int) -> tuple[Terms, Terms]:
         """Numerator and denominator of an entry, descending in s."""
+        one, two = Expression("1.0"), Expression("2.0")
         if self.time_constant is not None:
-            return (of("gain", i, j),), (of("time_constant", i, j), "1.0")
+            return (of("gain", i, j),), (of("time_constant", i, j), one)
         gain, damping, w = (of(name, i, j) for name in ("gain", "damping", "natural_frequency"))
-        return (f"{gain}*{w}**2",), ("1.0", f"2*{damping}*{w}", f"{w}**2")
+        return (gain * (w * w),), (one, two * damping * w, w * w)
 
     def _numbers(self, part: int) -> PolynomialMatrix:
         """The numerators (0) or the denominators (1) at the values of the quantities."""
 
-        def of(name: str, i: int, j: int) -> str:
-            return f"({self.grid(name)[i][j]!r})"
+        def of(name: str, i: int, j: int) -> Expression:
+            return Expression(repr(self.grid(name)[i][j]))
 
         return tuple(
             tuple(
-                tuple(Expression(term).at((), np.zeros(0))[0] for term in self._entry(of, i, j)[part])
+                tuple(term.at((), np.zeros(0))[0] for term in self._entry(of, i, j)[part])
                 for j in range(len(row))
             )
             for i, row in enumerate(self.grid("gain"))

@@ -11,9 +11,10 @@ import yaml
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from inputdesign_cli.specification.models.annotations import Declared, declared_at, sections_in
+from inputdesign_cli.specification.models.annotations import Declared, declared_at, measure_at, sections_in
 from inputdesign_cli.specification.models.path_diagnostic import CARRIER, PathDiagnostic
 from inputdesign_cli.specification.models.section import FAMILIES, TAG, Section
+from inputdesign_cli.specification.models.units import without_unit
 from inputdesign_cli.specification.wording import choices, describe, nearest, show, unknown_word
 from inputdesign_cli.specification.yaml.places import Path, format_key
 from inputdesign_cli.specification.yaml.plain import Plain
@@ -47,7 +48,8 @@ def translate(error: ValidationError, data: Plain, root: type[Section]) -> list[
         Diagnostics with absolute paths, which exist in `data` up to their last step.
     """
     details = error.errors(include_url=False)
-    return [shorten(found, data) for detail in details for found in _translate(detail, root)]
+    unit = data.get("time_unit", "s") if isinstance(data, dict) and "time_unit" in root.model_fields else None
+    return [shorten(found, data) for detail in details for found in _translate(detail, root, unit)]
 
 
 def shorten(diagnostic: PathDiagnostic, data: Plain) -> PathDiagnostic:
@@ -67,7 +69,7 @@ def shorten(diagnostic: PathDiagnostic, data: Plain) -> PathDiagnostic:
     return replace(diagnostic, path=tuple(kept))
 
 
-def _translate(error: ErrorDetails, root: type[Section]) -> list[PathDiagnostic]:
+def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> list[PathDiagnostic]:
     location, kind, context = error["loc"], error["type"], error.get("ctx", {})
     path = tuple(step for step in location if not (isinstance(step, str) and step.startswith(TAG)))
     if kind == CARRIER:
@@ -82,7 +84,11 @@ def _translate(error: ErrorDetails, root: type[Section]) -> list[PathDiagnostic]
     types = [tag.removeprefix(_TYPE) for tag in declared.alternatives if tag.startswith(_TYPE)]
     if types and isinstance(error["input"], dict):
         return [_unknown_type(path, types, error["input"])]
-    return [PathDiagnostic(*_wrong_value(kind, error["input"], context, declared), path)]
+    code, message, hint = _wrong_value(kind, error["input"], context, declared)
+    if kind in ("float_type", "int_type") and isinstance(error["input"], str):
+        known = time_unit if isinstance(time_unit, str) else None
+        hint = without_unit(error["input"], measure_at(root, location), known) or hint
+    return [PathDiagnostic(code, message, hint, path)]
 
 
 def _wrong_value(

@@ -26,6 +26,7 @@ from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic,
 from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
 
 Samples = Annotated[Count, SIZES["signal.samples"]]
 SignalType = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
@@ -44,7 +45,7 @@ class Quantisation(Section):
     """The digital-to-analogue converter that applies the signal."""
 
     bits: RegisterLength = Field(description="The converter has 2^bits values.", examples=[12])
-    range: PerChannel[Positive] = Field(
+    range: PerChannel[Annotated[Positive, SIGNAL]] = Field(
         description="They span [-range, range), in the unit of u, the offset included; a number or one per "
         "input.",
         examples=[10.0],
@@ -67,11 +68,11 @@ class Signal(Section):
     lines: Annotated[Harmonics, SIZES["signal.lines"]] | None = Field(
         default=None, description="Harmonics of a period that are used: their number, odd, or a list."
     )
-    amplitudes: PerChannel[Positive] | None = Field(
+    amplitudes: PerChannel[Annotated[Positive, SIGNAL]] | None = Field(
         default=None,
         description="Amplitude (level) to scale to, whatever it buys; a number or one per input.",
     )
-    offset: PerChannel[Number] | None = Field(
+    offset: PerChannel[Annotated[Number, SIGNAL]] | None = Field(
         default=None, description="Operating point added; a number or one per input."
     )
     ramp: Annotated[Index, SIZES["signal.samples"]] | None = Field(
@@ -132,7 +133,9 @@ class Solver(Section):
         default=1e-4,
         description="Relative gap of the bound over every spectrum (default 1e-4; no less than tolerance).",
     )
-    time_limit: Positive = Field(default=600.0, description="Seconds that a design may take (default 600).")
+    time_limit: Annotated[Positive, SECONDS_ONLY] = Field(
+        default=600.0, description="Seconds that a design may take (default 600)."
+    )
     grid: Annotated[Count, SIZES["solver.grid"]] = Field(
         default=1000, description="Number of frequencies of the lmi method (default 1000)."
     )

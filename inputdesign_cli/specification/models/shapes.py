@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from inputdesign_cli.specification.models.named import TextMatrix, Texts, leading, present
+from inputdesign_cli.specification.models.named import TermMatrix, Terms, leading
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import Polynomial, product
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
@@ -60,9 +60,9 @@ def check_per_output(value: tuple, outputs: int, *path: str) -> Iterator[PathDia
         yield PathDiagnostic("wrong-shape", message, hint, path)
 
 
-def check_gain(entries: TextMatrix | PolynomialMatrix, name: str) -> Iterator[PathDiagnostic]:
+def check_gain(entries: TermMatrix, name: str) -> Iterator[PathDiagnostic]:
     """Some coefficient exists."""
-    if not any(present(one) for row in entries for p in row for one in p):
+    if not any(one.present for row in entries for p in row for one in p):
         message = "all coefficients of {key} are zero: the input has no effect"
         yield PathDiagnostic("zero-polynomial", message, path=(name,))
 
@@ -81,15 +81,14 @@ def shape_words(value: tuple) -> str:
     return f"{rows} x {columns} lists of coefficients"
 
 
-def check_proper(
-    numerator: Texts | Polynomial, denominator: Texts | Polynomial, *path: str | int
-) -> Iterator[PathDiagnostic]:
-    """In s, descending: the degree of the numerator is at most that of the denominator."""
-    above, below = len(numerator) - leading(numerator) - 1, len(denominator) - 1
-    if above > below:
+def check_proper(numerator: Terms, degree: int, *path: str | int) -> Iterator[PathDiagnostic]:
+    """In s, descending: the degree of the numerator is at most that of the denominator, `degree`."""
+    above = len(numerator) - leading(numerator) - 1
+    if above > degree:
         yield PathDiagnostic(
             "improper-transfer",
-            f"{{key}} has degree {above} in s, more than its denominator ({below}): the system is not proper",
+            f"{{key}} has degree {above} in s, more than its denominator ({degree}): the system is "
+            "not proper",
             "powers of s descend: [2, 1] is 2 s + 1; lower this degree or raise the other",
             path,
         )

@@ -13,6 +13,7 @@ from inputdesign_cli.specification.models.named import EXPRESSIONS
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section
 from inputdesign_cli.specification.models.sizes import SIZES
+from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.models.values import Matrix, same_columns
 
 _Row = Annotated[Several[Number], SIZES["states"]]
@@ -42,7 +43,7 @@ class StateSpace(Section):
         description="Gain of the one-step predictor, states by outputs, of the sampled model (default 0: the "
         "noise is added to the outputs).",
     )
-    delay: Annotated[NonNegative, EXPRESSIONS] = Field(
+    delay: Annotated[NonNegative, EXPRESSIONS, TIME] = Field(
         default=0.0, description="Dead time of the inputs, in time_unit; in continuous time."
     )
     time: Literal["continuous", "discrete"] = Field(

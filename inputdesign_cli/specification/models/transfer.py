@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
 
+from inputdesign_cli.expressions import product_of
 from inputdesign_cli.specification.models.annotations import Wording
 from inputdesign_cli.specification.models.fields import (
     ContinuousDenominator,
@@ -19,12 +20,10 @@ from inputdesign_cli.specification.models.fields import (
 )
 from inputdesign_cli.specification.models.named import (
     EXPRESSIONS,
-    CoefficientTexts,
-    TextMatrix,
-    Texts,
+    CoefficientTerms,
+    TermMatrix,
+    expressed,
     matrix,
-    product_of,
-    text,
 )
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.polynomials import (
@@ -43,6 +42,7 @@ from inputdesign_cli.specification.models.shapes import (
     check_shapes,
     denominators_of,
 )
+from inputdesign_cli.specification.models.units import TIME
 from inputdesign_cli.specification.models.values import PolynomialList, PolynomialMatrix, depth
 from inputdesign_cli.specification.yaml.plain import Plain
 
@@ -77,7 +77,7 @@ class ContinuousRatio(Ratio):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """It is proper."""
-        yield from check_proper(self.numerator, self.denominator_polynomial, "numerator")
+        yield from check_proper(expressed(self.numerator), len(self.denominator_polynomial) - 1, "numerator")
 
 
 class ContinuousTransfer(Section, family="transfer", phrase="a continuous-time transfer function"):
@@ -101,7 +101,7 @@ class _Matrix(Section):
 
     def check(self) -> Iterator[PathDiagnostic]:
         """Some coefficient is not zero, and numerator and denominator have one shape."""
-        yield from check_gain(as_matrix(self.numerator), "numerator")
+        yield from check_gain(expressed(self.numerator_matrix), "numerator")
         yield from check_shapes(self.numerator, self.denominator)
 
     @property
@@ -126,13 +126,12 @@ class DiscreteMatrix(_Matrix, family="transfer", phrase="a transfer matrix in q^
     )
 
 
-def check_each_proper(
-    above: Sequence[Sequence[Texts | Polynomial]], below: Sequence[Sequence[Texts | Polynomial]], levels: int
-) -> Iterator[PathDiagnostic]:
+def check_each_proper(above: TermMatrix, below: PolynomialMatrix, levels: int) -> Iterator[PathDiagnostic]:
     """Every entry of a matrix in s is proper, whose numerator is written with so many levels of lists."""
     for i, row in enumerate(above):
         for j, entry in enumerate(row):
-            yield from check_proper(entry, below[i][j], "numerator", *((i, j) if levels == 3 else ()))
+            where = (i, j) if levels == 3 else ()
+            yield from check_proper(entry, len(below[i][j]) - 1, "numerator", *where)
 
 
 class ContinuousMatrix(_Matrix):
@@ -144,7 +143,9 @@ class ContinuousMatrix(_Matrix):
             yield from shapes
             return
         yield from check_each(self.denominator, check_left_half_plane, "denominator")
-        yield from check_each_proper(self.numerator_matrix, self.denominator_matrix, depth(self.numerator))
+        yield from check_each_proper(
+            expressed(self.numerator_matrix), self.denominator_matrix, depth(self.numerator)
+        )
 
 
 class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s"):
@@ -158,7 +159,7 @@ class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s
     denominator: Annotated[ContinuousDenominator, EXPRESSIONS] = Field(
         description="One polynomial for all entries, a list of its factors, or one polynomial per entry."
     )
-    delay: Annotated[NonNegativeGrid, EXPRESSIONS] | None = Field(
+    delay: Annotated[NonNegativeGrid, EXPRESSIONS, TIME] | None = Field(
         default=None,
         description="Dead time in time_unit: a number, common to all entries, or rows of columns.",
         examples=[25],
@@ -173,11 +174,11 @@ class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s
             message = "{key} must have a dead time for each entry: rows (outputs) of columns (inputs)"
             yield PathDiagnostic("wrong-shape", message, "write 0 where there is none", ("delay",))
 
-    def check_present(self, texts: CoefficientTexts) -> Iterator[PathDiagnostic]:
+    def check_present(self, terms: CoefficientTerms) -> Iterator[PathDiagnostic]:
         """Some coefficient of the numerators exists, and every entry is proper."""
         for found in (
-            *check_gain(texts.numerator, "numerator"),
-            *check_each_proper(texts.numerator, texts.denominator, depth(self.numerator)),
+            *check_gain(terms.numerator, "numerator"),
+            *check_each_proper(terms.numerator, self.denominator_matrix, depth(self.numerator)),
         ):
             yield replace(found, path=("continuous", *found.path))
 
@@ -198,18 +199,20 @@ class DelayedMatrix(_Matrix, family="continuous", phrase="a transfer matrix in s
             return self.delay
         return tuple(tuple(self.delay or 0.0 for _ in row) for row in self.numerator_matrix)
 
-    def texts(self, written: Mapping[str, Plain]) -> CoefficientTexts:
+    def terms(self, written: Mapping[str, Plain]) -> CoefficientTerms:
         """Its coefficients as expressions, from the section as it was written."""
-        above, below, delay = (text(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay"))
+        above, below, delay = (
+            expressed(written.get(key, 0.0)) for key in ("numerator", "denominator", "delay")
+        )
         rows = matrix(above)
-        denominators: TextMatrix
+        denominators: TermMatrix
         if depth(below) == 3:
             denominators = matrix(below)
         else:
             common = product_of(below if depth(below) == 2 else [below])
             denominators = tuple(tuple(common for _ in row) for row in rows)
         delays = delay if isinstance(delay, tuple) else tuple(tuple(delay for _ in row) for row in rows)
-        return CoefficientTexts(rows, denominators, delays)
+        return CoefficientTerms(rows, denominators, delays)
 
 
 class ContinuousTarget(ContinuousMatrix):

@@ -83,14 +83,10 @@ def _number_hint(text: str) -> str:
         return f"write it in decimal: {int(text, 16)}"
     if re.fullmatch(r"[-+]?0o[0-7]+", text):
         return f"write it in decimal: {int(text, 8)}"
-    if text.endswith("%") and NUMBER.fullmatch(text[:-1].strip()):
-        return f"write it as a fraction: {float(text[:-1]) / 100:g}"
     if text.lower() == "pi":
         return "write 3.141592653589793"
     if re.fullmatch(r"[-+]?[0-9.]+ */ *[0-9.]+", text):
         return "fractions are not computed; write the decimal number"
-    if match := re.match(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*[A-Za-z/]+$", text):
-        return f"write the number without a unit: {match.group(1)}"
     return ""
 
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import is_time, named_columns
 
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0}
 TIME_UNITS = tuple(SECONDS)
 _UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
     unit: unit for unit in TIME_UNITS

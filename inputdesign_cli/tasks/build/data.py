@@ -12,8 +12,8 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.columns import (
-    SECONDS,
     other_units,
     reference_columns,
     time_unit_of,

@@ -12,6 +12,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
+from inputdesign_cli.tasks.build.model_error import confidence_factor
 from inputdesign_cli.tasks.build.parameters import check_known, embedded
 from inputdesign_cli.tasks.build.prior import inverse
 from inputdesign_cli.tasks.build.system import read_excitation_record, record_step
@@ -33,17 +34,33 @@ def drawing(spec: Spec, stated: Uncertainty, experiment: Experiment) -> Draw:
     return _Source(spec, stated, experiment).drawing()
 
 
+def reach(
+    spec: Spec, stated: Uncertainty, experiment: Experiment, confidence: float
+) -> tuple[str, Array, Array, bool]:
+    """What the draws are from, up to a confidence: in words, centre (k,), columns (k, m), whether a box.
+
+    Raises:
+        SpecError, DataError: see `drawing`.
+    """
+    return _Source(spec, stated, experiment).reach(confidence)
+
+
 @dataclass(frozen=True)
-class _Source:
-    """What is known of the parameters."""
+class Unsure:
+    """A spec, what it says of how little is known of its plant, and the experiment at the nominal one."""
 
     spec: Spec
     stated: Uncertainty
     experiment: Experiment
 
     @property
-    def _nominal(self) -> Model:
+    def nominal(self) -> Model:
+        """The plant that the spec states."""
         return self.experiment.model
+
+
+class _Source(Unsure):
+    """What is known of the parameters."""
 
     def drawing(self) -> Draw:
         """How parameters (k,) are drawn."""
@@ -52,7 +69,7 @@ class _Source:
         covariance = self._covariance()
         varied = np.diag(covariance) > 0.0
         root = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
-        nominal = self._nominal.theta
+        nominal = self.nominal.theta
 
         def draw(rng: np.random.Generator) -> Array:
             theta = nominal.copy()
@@ -61,8 +78,25 @@ class _Source:
 
         return draw
 
+    def reach(self, confidence: float) -> tuple[str, Array, Array, bool]:
+        """The intervals, or the ellipsoid of a confidence."""
+        names, nominal = list(self.nominal.names), self.nominal.theta
+        if self.stated.intervals is not None:
+            index = [names.index(name) for name in self.stated.intervals]
+            low, high = np.array(list(self.stated.intervals.values())).T
+            centre, columns = nominal.copy(), np.zeros((nominal.size, len(index)))
+            centre[index] = 0.5 * (low + high)
+            columns[index, np.arange(len(index))] = 0.5 * (high - low)
+            return "the intervals", centre, columns[:, low < high], True
+        covariance = self._covariance()
+        varied = np.diag(covariance) > 0.0
+        root = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
+        columns = np.zeros((nominal.size, len(root)))
+        columns[varied] = confidence_factor(confidence, len(root)) * root
+        return f"the ellipsoid of confidence {confidence:g}", nominal, columns, False
+
     def _even(self, intervals: Mapping[str, tuple[float, float]]) -> Draw:
-        names, nominal = list(self._nominal.names), self._nominal.theta
+        names, nominal = list(self.nominal.names), self.nominal.theta
         for name, (low, high) in intervals.items():
             key = f"{_KEY}.intervals.{name}"
             check_known(self.spec, names, name, key)
@@ -86,7 +120,7 @@ class _Source:
 
     def _covariance(self) -> Array:
         """(k, k), zero for parameters that are known."""
-        stated, names = self.stated, self._nominal.names
+        stated, names = self.stated, self.nominal.names
         key = f"{_KEY}.{stated.stated(*SOURCES)[0]}"
         source = stated.covariance if stated.covariance is not None else stated.information
         if isinstance(source, str):
@@ -122,8 +156,8 @@ class _Source:
 
     def _check_same_plant(self, name: str, values: Mapping[str, float], covariance: Array, key: str) -> None:
         """Raise `SpecError` (`wrong-estimate`) where the file is about another plant than the spec."""
-        nominal = dict(zip(self._nominal.names, self._nominal.theta.tolist(), strict=True))
-        deviation = dict(zip(self._nominal.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+        nominal = dict(zip(self.nominal.names, self.nominal.theta.tolist(), strict=True))
+        deviation = dict(zip(self.nominal.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         far = [p for p, x in values.items() if abs(x - nominal[p]) > _AWAY * deviation[p]]
         if far:
             told = ", ".join(f"{p} is {values[p]:.4g} there and {nominal[p]:.4g} here" for p in far)

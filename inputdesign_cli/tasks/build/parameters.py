@@ -13,26 +13,26 @@ from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.plant.polynomial_model import Rows
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.specification.models.named import leading, present
+from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant
 
 
 def delays_of(plant: ContinuousPlant) -> Rows:
     """A list of one dead time for each entry that has one, empty lists for the others; empty if none has.
 
-    See `present`.
+    See `Expression.present`.
     """
-    texts = plant.stated_texts.delay
+    terms = plant.stated_terms.delay
     rows = tuple(
-        tuple(np.array([value] if present(texts[i][j]) else []) for j, value in enumerate(row))
+        tuple(np.array([value] if terms[i][j].present else []) for j, value in enumerate(row))
         for i, row in enumerate(plant.continuous.delays)
     )
     return rows if any(entry.size for row in rows for entry in row) else ()
 
 
 def degrees_of(plant: ContinuousPlant) -> list[list[int]]:
-    """Of each numerator, -1 where the entry is absent; see `present`."""
-    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_texts.numerator]
+    """Of each numerator, -1 where the entry is absent; see `Expression.present`."""
+    return [[len(entry) - leading(entry) - 1 for entry in row] for row in plant.stated_terms.numerator]
 
 
 def reparametrised(
@@ -76,7 +76,7 @@ def _of_named(
     noise = [p for p in parameters if p.letter in "cd"]
     # No name of a parameter of the plant: those are in ASCII.
     symbols = {p.name: f"\N{GREEK SMALL LETTER EPSILON}{i}" for i, p in enumerate(noise)}
-    terms = [symbols[p.name] if p.letter in "cd" else _term(plant, p) for p in parameters]
+    terms = [Expression(symbols[p.name]) if p.letter in "cd" else _term(plant, p) for p in parameters]
     labels = (*(one.label for one in named), *symbols)
     fixed = [one.label in (plant.known or ()) for one in named]
     fixed += [name in (spec.noise.known or ()) for name in symbols]
@@ -85,7 +85,7 @@ def _of_named(
         (*(one.symbol for one in named), *symbols.values()),
         np.array([*(one.value for one in named), *(p.value for p in noise)]),
         np.ones(len(labels), dtype=bool),
-        tuple(Expression(term) for term in terms),
+        tuple(terms),
     )
     for label, moves in zip(labels, np.any(made.jacobian != 0.0, axis=0), strict=True):
         if not moves:
@@ -98,19 +98,19 @@ def _of_named(
     return replace(made, free=~np.array(fixed))
 
 
-def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> str:
+def _term(plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, parameter: Parameter) -> Expression:
     """A coefficient of the model as an expression in the named parameters of the plant."""
     i, j = parameter.places[0]
     if plant.kind == "state_space":
         return plant.term(parameter.letter, i, j)
     if plant.kind == "polynomial":
         return plant.coefficients(parameter.letter, i, j)[parameter.power]
-    texts = plant.texts
+    terms = plant.terms
     if parameter.letter == DELAY:
-        return texts.delay[i][j]
-    below = texts.denominator[i][j]
-    entry = texts.numerator[i][j] if parameter.letter == "b" else below
-    return f"({entry[-1 - parameter.power]})/({below[0]})"
+        return terms.delay[i][j]
+    below = terms.denominator[i][j]
+    entry = terms.numerator[i][j] if parameter.letter == "b" else below
+    return entry[-1 - parameter.power] / below[0]
 
 
 def check_known(spec: Spec, known: Sequence[str], name: str, key: str) -> None:

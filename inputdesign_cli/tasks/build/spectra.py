@@ -46,7 +46,8 @@ def build_basis(spec: Spec, inputs: int, band: tuple[float, float]) -> Basis:
             raise spec.complain(
                 "missing-key",
                 "a design in continuous time needs a family of spectra",
-                hint="add spectrum: {type: polynomial, order: 10, band: [0, 2]}",
+                hint="add sample: zoh to the plant, or spectrum: {type: polynomial, order: 10, band: "
+                f"[0, {0.5 * np.pi / spec.sample_time:.3g}]}}",
                 key="spectrum",
             )
         case None:

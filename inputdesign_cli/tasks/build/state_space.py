@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.expressions import Expression
 from inputdesign_cli.plant import Matrices, StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
 from inputdesign_cli.plant.polynomial import Array
@@ -33,7 +32,7 @@ def state_space_model(spec: Spec, plant: StateSpacePlant, covariance: Array) -> 
     }
     written = [(letter, M.shape) for letter, M in given.items() if letter in plant.stated_matrices]
     places = [(letter, i, j) for letter, shape in written for i, j in np.ndindex(shape)]
-    free = [place for place in (*places, (DELAY, 0, 0)) if Expression(plant.term(*place)).names]
+    free = [place for place in (*places, (DELAY, 0, 0)) if plant.term(*place).names]
     model = StateSpaceModel(
         Matrices(**given, delay=stated.delay),
         tuple(free),

@@ -42,6 +42,9 @@ from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.state_space import state_space_model
 from inputdesign_cli.tasks.build.tables import read_columns
 
+# Of pi/sample_time, where a band is proposed.
+_WITHIN = 0.95
+
 
 def build_model(spec: Spec) -> Model:
     """The model of `plant` and `noise`.
@@ -163,7 +166,9 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
         raise spec.complain(
             "needs-band",
             "in continuous time frequencies have no end: the band of the excitation is missing",
-            hint="add limits: {band: [0, 2]}, or a polynomial spectrum with its band",
+            hint="add sample: zoh to the plant, whose input is then held for each sample_time; or, to stay "
+            f"in continuous time, limits: {{band: [0, {0.5 * np.pi / spec.sample_time:.3g}]}}, or a "
+            "polynomial spectrum with its band",
             key="spectrum" if spec.spectrum is not None else "limits",
         )
     return band
@@ -240,7 +245,9 @@ def record_step(spec: Spec) -> float:
             "beyond-nyquist",
             f"samples {spec.sample_time:g} {spec.time_unit} apart cannot carry the band up to {hi:g} "
             f"rad/{spec.time_unit}",
-            hint=f"set sample_time to {0.5 * np.pi / hi:.3g} or less (at most {np.pi / hi:.3g})",
+            hint="if the input is held between samples, add sample: zoh to the plant and end the band at "
+            f"{_WITHIN * np.pi / spec.sample_time:.3g}; otherwise set sample_time to {0.5 * np.pi / hi:.3g} "
+            f"or less (at most {np.pi / hi:.3g})",
             key="sample_time",
         )
     return spec.sample_time

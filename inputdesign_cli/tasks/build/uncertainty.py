@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.design.convex.cost import Paid
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
@@ -16,14 +17,15 @@ from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.sizes import most
-from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
+from inputdesign_cli.specification.models.uncertainty import SOURCES
 from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.build.demand import check_effects
 from inputdesign_cli.tasks.build.integrators import on_finite_information
-from inputdesign_cli.tasks.build.parameter_draws import Draw, drawing
+from inputdesign_cli.tasks.build.parameter_draws import Draw, Unsure, drawing, reach
 from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked
 from inputdesign_cli.tasks.build.system import build_loop
+from inputdesign_cli.tasks.region import Region
 from inputdesign_cli.tasks.robust import CONFIDENCE, Batch, Plants
 
 _KEY = "uncertainty"
@@ -52,10 +54,10 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
     if stated is None:
         return None
     scenario = _Scenarios(spec, stated, experiment)
-    mean_cost = spec.closed_loop if stated.cost is None else stated.cost == "mean"
+    paid: Paid = stated.cost or ("mean" if spec.closed_loop else "nominal")
     names = experiment.model.names
     if isinstance(stated.scenarios, tuple):
-        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, mean_cost)
+        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
     number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
     draw = drawing(spec, stated, experiment)
     batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
@@ -68,10 +70,11 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         stated.stated(*SOURCES)[0],
         names,
         stated.r_adm,
-        mean_cost,
+        paid,
         discard=int(stated.discard * number),
         afresh=afresh if stated.fresh else None,
         unknowns=None if basis.free else _unknowns(spec, basis),
+        region=None if stated.worst_case is None else scenario.region(stated.worst_case),
     )
 
 
@@ -100,8 +103,9 @@ def _needed(spec: Spec, basis: Basis) -> int | None:
 
 
 def _unknowns(spec: Spec, basis: Basis) -> int:
-    """Of the program: those of the spectrum, and the factor or the length where that is sought."""
-    return basis.size + int(spec.goal != "least_cost")
+    """Of the program: those of the spectrum, and the factor, length or largest cost that is sought."""
+    stated = spec.uncertainty
+    return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
 
 
 def farthest_radius(spec: Spec, experiment: Experiment) -> float:
@@ -142,17 +146,8 @@ class _NoPlantError(Exception):
         self.code, self.what = code, what
 
 
-@dataclass(frozen=True)
-class _Scenarios:
+class _Scenarios(Unsure):
     """What makes plants out of parameters."""
-
-    spec: Spec
-    stated: Uncertainty
-    experiment: Experiment
-
-    @property
-    def _nominal(self) -> Model:
-        return self.experiment.model
 
     @property
     def _radius(self) -> float:
@@ -173,7 +168,7 @@ class _Scenarios:
             experiment = replace(self.experiment, model=model, loop=loop)
             check_effects(self.spec, experiment)
             experiment = on_finite_information(self.spec, experiment)
-            return Alternative(experiment, *build_asked(self.spec, experiment, self._nominal))
+            return Alternative(experiment, *build_asked(self.spec, experiment, self.nominal))
         except SpecError as error:
             found = error.diagnostics[0]
             raise self.spec.complain(
@@ -184,11 +179,11 @@ class _Scenarios:
             ) from error
 
     def _sound(self, theta: Array, radius: float) -> tuple[Model, Loop | None]:
-        model, controller = self._nominal.at(theta), self.spec.experiment.controller
+        model, controller = self.nominal.at(theta), self.spec.experiment.controller
         flaw = model.flaw
         if flaw is not None:
             raise _NoPlantError("not-a-plant", flaw)
-        lost = self._acting(self._nominal) & ~self._acting(model)
+        lost = self._acting(self.nominal) & ~self._acting(model)
         if np.any(lost):
             output, input = np.argwhere(lost)[0] + 1
             raise _NoPlantError("not-a-plant", f"output {output} does not depend on input {input}")
@@ -216,7 +211,7 @@ class _Scenarios:
         if "samples" not in spec.experiment.model_fields_set:
             return
         longest = spec.experiment.samples * (1.0 if spec.plant.sampled else spec.sample_time)
-        if longest <= model.memory > self._nominal.memory:
+        if longest <= model.memory > self.nominal.memory:
             raise spec.complain(
                 "delay-beyond-record",
                 f"at the scenario {self._named(theta)} a dead time outlasts the experiment",
@@ -225,16 +220,16 @@ class _Scenarios:
             )
 
     def _named(self, theta: Array) -> str:
-        return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self._nominal.names, theta, strict=True))
+        return ", ".join(f"{name} = {x:.4g}" for name, x in zip(self.nominal.names, theta, strict=True))
 
     def listed(self, scenarios: Sequence[Mapping[str, float]]) -> Batch:
         """The plants that the spec states one by one."""
-        names, thetas, plants = list(self._nominal.names), [], []
+        names, thetas, plants = list(self.nominal.names), [], []
         # A known integrator is one at every plant.
-        farthest = max((self.experiment.loop or self._nominal).radius, 1.0 - _ON_CIRCLE)
+        farthest = max((self.experiment.loop or self.nominal).radius, 1.0 - _ON_CIRCLE)
         for number, values in enumerate(scenarios):
             key = f"{_KEY}.scenarios[{number}]"
-            theta = self._nominal.theta.copy()
+            theta = self.nominal.theta.copy()
             for name, value in values.items():
                 check_known(self.spec, names, name, key)
                 theta[names.index(name)] = value
@@ -249,6 +244,18 @@ class _Scenarios:
                 ) from error
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
+
+    def region(self, confidence: float) -> Region:
+        """All plants that the draws are from, up to this confidence."""
+        name, centre, columns, box = reach(self.spec, self.stated, self.experiment, confidence)
+
+        def at(theta: Array) -> Alternative | None:
+            try:
+                return self.at(theta, self._radius)
+            except _NoPlantError:
+                return None
+
+        return Region(name, centre, columns, box, at)
 
     def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
         """So many plants, drawn again where they are unstable, or no plants.

@@ -14,6 +14,7 @@ from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
+from inputdesign_cli.tasks.result.remedies import vague_notes
 from inputdesign_cli.tasks.result.rivals import rival_entries
 
 # A first residual beyond so many standard deviations is named.
@@ -128,8 +129,7 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
         )
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
-    if vague:
-        notes.append(f"zero lies within a standard deviation of {', '.join(vague)}: an order may be too high")
+    notes += vague_notes(model, vague)
     if model.continuous and estimate.failed:
         notes.append(
             "the input was taken for the band-limited interpolation of its samples; where it is held "

@@ -10,7 +10,7 @@ from inputdesign_cli.identification import Estimate, Extension, ScoreTest
 from inputdesign_cli.plant import Model
 from inputdesign_cli.tasks.result.remedies import remedies_of
 
-_FOUND = {
+FOUND = {
     "plant": "past inputs explain residuals{where} (probability {p}), most at lag {lag}: the plant has "
     "more structure than the model; {remedy}, or compare with an FIR model (B: [0, 1, 1, ..]) that is long "
     "enough",
@@ -101,7 +101,7 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
             strongest[test.fault] = test
     remedies = remedies_of(model)
     of_many = [
-        _FOUND[fault].format(
+        FOUND[fault].format(
             p=chance(strongest[fault].probability),
             lag=strongest[fault].lag,
             remedy=remedies[fault],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json
@@ -19,6 +19,23 @@ def remedies_of(model: Model) -> dict[str, str]:
         plant = f"see whether what is known is right (plant.known: {', '.join(known)}; without it, it is "
         plant += f"estimated), or {_of_plant(blocks['plant'])}"
     return {"plant": plant, **_of_noise(model, blocks)}
+
+
+def vague_notes(model: Model, vague: Sequence[str]) -> list[str]:
+    """Notes on parameters that data may take for zero: coefficients have orders, quantities do not."""
+    plant = blocks_of(model)["plant"]
+    named = "parameters" in plant or "gain" in plant.get("continuous", {})
+    quantity = (model.in_plant & named) | model.dead_times
+    of_kind = dict(zip(model.names, quantity, strict=True))
+    notes = []
+    for physical, advice in (
+        (True, "the data hardly tell of it; take more of them, or list what is known in plant.known"),
+        (False, "an order may be too high"),
+    ):
+        listed = ", ".join(name for name in vague if of_kind[name] == physical)
+        if listed:
+            notes.append(f"zero lies within a standard deviation of {listed}: {advice}")
+    return notes
 
 
 def _of_plant(plant: Mapping[str, Json]) -> str:

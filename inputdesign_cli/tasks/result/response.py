@@ -41,7 +41,13 @@ _CHANCE = 0.05
 
 @dataclass(frozen=True)
 class ResponseTerms:
-    """How the question was put, as far as its results repeat it; see `ResponseTask`."""
+    """How the question was put, as far as its results repeat it.
+
+    Attributes:
+        experiment: with the samples that count (one where the shortest is asked for).
+        asked: samples that the spec gives the experiment.
+        most_samples: of the longest record, where the spec limits it.
+    """
 
     header: Header
     experiment: Experiment

@@ -36,7 +36,7 @@ def grid_program(A, metrics, limits, weights):
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_the_gap_closes_and_the_certificate_holds(n, seed):
-    A, metrics, limits, weights = case(n, 256, seed)
+    A, metrics, limits, weights = case(n, 96, seed)
     design = design_within(A, metrics, limits, weights)
     assert abs(design.gap) < 1e-10
     powers = np.einsum("pkab,kba,k->p", metrics, design.spectrum, weights).real

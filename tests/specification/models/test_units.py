@@ -1,0 +1,89 @@
+"""Numbers with units: what is proposed is the same quantity in the unit of the spec."""
+
+import math
+import re
+
+import pytest
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.errors import SpecError
+
+# Seconds, written out beside the package's own table.
+LONG = {"ms": 0.001, "sec": 1, "min": 60, "minutes": 60, "h": 3600, "hours": 3600, "d": 86400, "us": 1e-6}
+TIMES = {
+    "sample_time": "sample_time: {}",
+    "experiment.duration": "experiment: {{duration: {}}}",
+    "limits.duration": "limits: {{duration: {}}}",
+    "plant.continuous.dead_time": "plant: {{continuous: {{gain: 2, time_constant: 9, dead_time: {}}}}}",
+    "plant.continuous.time_constant": "plant: {{continuous: {{gain: 2, time_constant: [[{}]]}}}}",
+    "experiment.controller.pid.Ti": "experiment: {{controller: {{pid: {{Kp: 1, Ti: {}}}}}}}",
+}
+FREQUENCIES = {
+    "limits.band": "limits: {{band: [0, {}]}}",
+    "spectrum.frequencies": "spectrum: {{type: multisine, frequencies: [{}, 2]}}",
+}
+
+
+def hint_of(key, template, text, time_unit="s"):
+    with pytest.raises(SpecError) as caught:
+        parse_spec(template.format(text) + f"\ntime_unit: {time_unit}\n")
+    (found,) = [d for d in caught.value.diagnostics if d.key.startswith(key)]
+    return found.hint
+
+
+def proposed(hint):
+    return float(re.search(r"write ([\d.e+-]+)", hint.replace("the number without a unit: ", "")).group(1))
+
+
+@pytest.mark.parametrize("unit", LONG)
+@pytest.mark.parametrize("time_unit", ["s", "ms", "min", "h"])
+def test_durations_are_converted(unit, time_unit):
+    for key, template in TIMES.items():
+        asked = 2.5 * LONG[unit] / LONG.get(time_unit, 1)
+        assert proposed(hint_of(key, template, f"2.5 {unit}", time_unit)) == pytest.approx(asked), key
+
+
+@pytest.mark.parametrize("time_unit", ["s", "ms", "min"])
+def test_frequencies_are_converted(time_unit):
+    long = LONG.get(time_unit, 1)
+    for unit, radians in {"Hz": 2 * math.pi, "rad/s": 1, "rad/min": 1 / 60, "rpm": math.pi / 30}.items():
+        for key, template in FREQUENCIES.items():
+            hint = hint_of(key, template, f"0.25{unit}", time_unit)
+            assert proposed(hint) == pytest.approx(0.25 * radians * long), (key, unit)
+
+
+@pytest.mark.parametrize(
+    ("key", "template"),
+    [
+        ("signal.offset", "signal: {{offset: {}}}"),
+        ("signal.offset", "signal: {{offset: [{}, 2]}}"),
+        ("limits.amplitude", "limits: {{amplitude: {}}}"),
+        ("limits.amplitude", "limits: {{amplitude: {{output: {}}}}}"),
+        ("limits.rate", "limits: {{rate: {}}}"),
+        ("signal.quantisation.range", "signal: {{quantisation: {{bits: 8, range: {}}}}}"),
+    ],
+)
+@pytest.mark.parametrize("unit", ["%", " %", "V", "degC"])
+def test_signals_keep_the_unit_of_their_channel(key, template, unit):
+    assert proposed(hint_of(key, template, f"'40{unit}'")) == 40
+
+
+def test_shares_are_fractions():
+    accuracy = "accuracy: {{model_error: {{relative: {}}}}}"
+    assert (
+        proposed(
+            hint_of("accuracy.model_error.relative", accuracy, "5%").replace(
+                "write it as a fraction:", "write"
+            )
+        )
+        == 0.05
+    )
+    confidence = "accuracy: {{model_error: {{relative: 0.1, confidence: {}}}}}"
+    assert "0.95" in hint_of("accuracy.model_error.confidence", confidence, "95%")
+
+
+def test_what_is_not_known_is_not_guessed():
+    hint = hint_of("cost.input_power", "cost: {{input_power: {}}}", "40%")
+    assert "0.4 where a fraction" in hint
+    assert "40 where the unit is percent" in hint
+    assert "in s" in hint_of("sample_time", "sample_time: {}", "3 fortnights")
