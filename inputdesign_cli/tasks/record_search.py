@@ -19,6 +19,7 @@ from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.record import Made, RecordRequest, design_cost, designed_spectrum, make_record
+from inputdesign_cli.tasks.result.too_short import refuse_too_short
 from inputdesign_cli.tasks.result.too_tight import too_tight
 from inputdesign_cli.tasks.shortest_record import ShortestRecord, Way, longest_search
 
@@ -43,11 +44,14 @@ def fitting_record(request: RecordRequest, question: Question, design: Design, s
         samples: of the experiment.
 
     Raises:
-        InfeasibleError: `limits-too-tight`, with what was tried and what would do.
+        InfeasibleError: `limits-too-tight`, with what was tried and what would do; `record-too-short`.
     """
     record = make_record(request, design, samples)
     plain = Made(record, request, design)
-    if record is None or record.met or not request.searched:
+    if record is None:
+        return plain
+    if record.met or not request.searched:
+        refuse_too_short(request, design.problem.experiment, record)
         return plain
     misses, tried, remedy = [record], Counter[str](), ""
     for of, spectrum, power in _others(request, question, design):

@@ -109,3 +109,33 @@ signal: {candidates: 1}
         found = solve(parse_spec(text % dead_time)).result
         assert any("times what the designed spectrum does" in note for note in found.get("notes", [])) == told
         assert (found["signal"]["extra_power"] > 1.0) == told
+
+
+DELAYED = """
+plant: {%s}
+noise: {variance: 0.04}
+experiment: {samples: 60}
+accuracy: {standard_deviation: {%s: 0.05}}
+spectrum: {type: fir, order: 3}
+signal: {candidates: 1, seed: 1}
+solver: {any_spectrum: false}
+"""
+
+
+@pytest.mark.parametrize("late", [20, 45, 52, 55, 56, 57, 57.5, 58, 59, 59.9])
+@pytest.mark.parametrize("held", [True, False], ids=["held", "in q^-1"])
+def test_no_record_is_handed_over_that_costs_a_thousand_times_the_design(late, held):
+    """Few samples lie behind the dead time, down to one, which tells two or three parameters at no power."""
+    words = "parameters: {K: 2, T: 6, L: %g}, continuous: {numerator: [K], denominator: [T, 1], delay: L}, "
+    zeros = ", ".join(["0"] * int(late + 1))
+    text = (words % late + "sample: zoh", "K") if held else (f"B: [{zeros}, 0.3], F: [1, -0.8]", "f1")
+    try:
+        found = solve(parse_spec(DELAYED % text)).result
+    except InfeasibleError as error:
+        (told,) = error.diagnostics
+        assert (told.code, told.key, late > 40) == ("record-too-short", "experiment.samples", True)
+        assert "experiment.samples: 120" in told.hint
+    else:
+        assert late < 57
+        assert found["signal"]["extra_power"] < 1e3
+        assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
