@@ -52,7 +52,7 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
             )
     lo, hi = experiment.band
     grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
-    if not grown:
+    if not grown and not (lo == 0.0 and _wanders(experiment)):
         return experiment
     lowest = _lowest_line(spec, hi)
     if lowest is not None and lowest > 0.0:
@@ -63,21 +63,37 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     fir = spec.plant.sampled and (spec.spectrum is None or spec.spectrum.type == "fir")
     other = "spectrum: {type: free} with " if fir else ""
     raise spec.complain(
-        "infinite-information",
+        "infinite-information" if grown else "infinite-output",
         f"the plant integrates: power at frequency zero tells without end of {grown}, so that no design with "
-        "power there has a value",
+        "power there has a value"
+        if grown
+        else "the plant integrates: power at frequency zero makes the outputs wander without end, so that "
+        "they have no power",
         hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}limits: {{band: "
         f"[{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}; or make the experiment in closed loop{loop}",
         key="spectrum" if spec.spectrum is not None else "plant",
     )
 
 
-def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
-    """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero."""
+def _wanders(experiment: Experiment) -> bool:
+    """Whether outputs grow without end towards zero, where what they tell does not: where noise drifts."""
+    if experiment.loop is not None or experiment.model.continuous:
+        return False
+    size = np.abs(experiment.model.plant_at(_beside(experiment))).max(axis=(1, 2))
+    return bool(size[1] > _GROWS * size[0])
+
+
+def _beside(experiment: Experiment) -> Array:
+    """Two frequencies near zero."""
     source = experiment.model if experiment.loop is None else experiment.loop
     distance = np.abs(source.singularities)
     scale = float(np.min(distance[distance > 1e-7], initial=experiment.band[1]))
-    size: Array = np.abs(gradient(scale * np.array([_FAR, _CLOSE]))).max(axis=(2, 3))
+    return scale * np.array([_FAR, _CLOSE])
+
+
+def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
+    """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero."""
+    size: Array = np.abs(gradient(_beside(experiment))).max(axis=(2, 3))
     grows = size[1] > _GROWS * size[0]
     return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
 
