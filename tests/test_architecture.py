@@ -21,7 +21,7 @@ ORDER = [
     {"runs"},
     {"monte_carlo"},
     {"tasks"},
-    {"sweep", "campaign", "figures"},
+    {"sweep", "campaign", "figures", "wizard"},
     {"report"},
     {"live"},
     {"cli", "__main__"},
@@ -121,9 +121,9 @@ def test_no_two_files_need_each_other():
     assert circles(import_graph()) == []
 
 
-# Who may know the spec: those that read it, those that turn it into objects or hand it to those, and the
-# page of a report that restates it in words.
-SPEC_ROOMS = {"specification", "sweep", "cli"}
+# Who may know the spec: those that read or write it, those that turn it into objects or hand it to those, and
+# the page of a report that restates it in words.
+SPEC_ROOMS = {"specification", "sweep", "wizard", "cli"}
 SPEC_FILES = {"tasks/__init__.py", "report/question.py"}
 
 

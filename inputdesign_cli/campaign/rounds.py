@@ -243,8 +243,10 @@ def _decided(
             "capped": plan.capped,
             "seed": seed,
             "offset": decision.offsets.tolist(),
+            **({} if plan.claim is None else {"design": plan.claim()}),
+            **({"why": plan.why} if plan.why else {}),
         }
-        if plan.kind != "pilot":
+        if plan.designed:
             more.setdefault("first_cost", plan.cost)
         time, *signals = decision.part.columns.values()
         names = list(decision.part.columns)[1:]

@@ -24,6 +24,7 @@ from inputdesign_cli.cli.sweep import sweep
 from inputdesign_cli.cli.terminal import guarded
 from inputdesign_cli.cli.validate import validate
 from inputdesign_cli.cli.watch import watch
+from inputdesign_cli.cli.wizard import wizard
 from inputdesign_cli.compute.threads import use_one_thread
 from inputdesign_cli.version import __version__
 
@@ -75,6 +76,7 @@ COMMANDS = (
     signal,
     examples,
     init,
+    wizard,
     explain,
     schema,
 )

@@ -26,8 +26,10 @@ from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.streams import ending_early
 from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.cli.trade import TradeWords, tell_trade
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 from inputdesign_cli.compute.time_limit import stoppable
+from inputdesign_cli.errors import STANDARD_INPUT
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
@@ -47,6 +49,7 @@ def solve(
     no_output: NoOutput = False,
     keep_partial: KeepPartial = False,
     fast: Fast = False,
+    trade: TradeWords = "",
     figures: Figures = True,
     figure_format: FigureFormat = "png",
     json_output: Json = False,
@@ -58,6 +61,9 @@ def solve(
     proof of optimality; prints a summary.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
+    if trade and (no_output or keep_partial or str(spec) == STANDARD_INPUT):
+        message = "--trade needs a spec on disc and a directory to write, and does not go with --keep-partial"
+        raise typer.BadParameter(message)
     if fast:
         overrides = [*(overrides or []), "solver.any_spectrum=false"]
     if not keep_partial:
@@ -65,6 +71,11 @@ def solve(
         keep(
             results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet
         )
+        if trade:
+            read = read_spec(spec, overrides, confine)
+            beside = place.directory.with_name(f"{place.directory.name}-trade")
+            words, silent = [word for word in trade.split(",") if word], quiet or json_output
+            tell_trade(spec, read, words, beside, overrides=overrides or [], confine=confine, quiet=silent)
         return
     with stoppable() as stop, ending_early(stop) as came:
         results, place = _results("solve", place, overrides, confine, quiet)

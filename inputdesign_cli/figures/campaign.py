@@ -22,8 +22,10 @@ from inputdesign_cli.figures.style import (
 from inputdesign_cli.runs.curves import CampaignCurves, EstimateCurves, RatioCurves, TradeCurves
 
 COLUMNS = 3
-BINS = 40
+# Of few runs fine bins would show each run by itself.
+BINS, RUNS_A_BIN = 40, 4
 SHOWN = 0.99
+WIDE = 5.0  # costs beyond it are shown over their logarithm
 
 
 def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
@@ -73,7 +75,12 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
     axes = page.add_subplot()
     everything = np.concatenate(list(curves.ratios.values()))
     low, top = float(everything.min()), float(np.quantile(everything, SHOWN))
-    bins = np.linspace(min(low, 0.95), max(top, 1.05), BINS + 1).tolist()
+    runs = max(ratios.size for ratios in curves.ratios.values())
+    number = int(np.clip(runs // RUNS_A_BIN, 2 * COLUMNS, BINS))
+    low, top = min(low, 0.95), max(top, 1.05)
+    step = (top - low) / number
+    # An edge at one: no bin mixes those that have what is asked with those that miss it.
+    bins = (1.0 + step * np.arange(np.floor((low - 1.0) / step), np.ceil((top - 1.0) / step) + 1.0)).tolist()
     handles: list[Artist] = []
     for (name, ratios), colour in zip(curves.ratios.items(), PALETTE, strict=False):
         shares = np.full(ratios.size, 100.0 / max(ratios.size, 1))
@@ -111,7 +118,8 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
         handles.append(Line2D([], [], color=colour, marker="o", label=name.replace("_", " ")))
     axes.axvline(1.0, color=BLACK, linestyle=DASHED)
     handles.append(Line2D([], [], color=BLACK, linestyle=DASHED, label="knows the plant"))
-    plain_decades(axes, "x")
+    if max(dear for _, _, dear, *_ in curves.points.values()) > WIDE:
+        plain_decades(axes, "x")
     axes.set_xlabel("cost over that of the design that knows the plant (mean, 5 to 95 %)")
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)

@@ -9,7 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all
+from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all, lowered
 from inputdesign_cli.runs.results import Array
 
 # How much higher a page is with a panel under one other, or under several.
@@ -73,7 +73,7 @@ def draw_panels(
             axes.set_ylabel(magnitude)
             axes.set_title(panel.names, loc="right", color=GREY)
         else:
-            axes.set_title(f"$G_{{{i + 1}{j + 1}}}$ {panel.names}".strip(), loc="left", color=GREY)
+            axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
         if below is not None or any(row > i and column == j for row, column in places):
             axes.tick_params(labelbottom=False)
             axes.set_xlabel("")

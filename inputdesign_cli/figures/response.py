@@ -24,15 +24,15 @@ def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
     above.set_ylabel("magnitude")
     _phase(below, panel)
     below.set_ylabel("phase (degrees)")
-    below.set_xlabel(rf"frequency $\omega$ (rad/{time_unit})")
+    below.set_xlabel(f"frequency ω (rad/{time_unit})")
 
 
 def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
     w, size, modelled = panel.frequency, np.abs(panel.G), np.abs(panel.model)
     axes.set_yscale("log")
     handles: list[Artist] = []
-    handles += axes.plot(w, size, ".", color=BLUE, markersize=4, label="$|G|$, data alone")
-    handles += axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="$|G|$, model")
+    handles += axes.plot(w, size, ".", color=BLUE, markersize=4, label="|G|, data alone")
+    handles += axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="|G|, model")
     least = 0.1 * min(float(size.min()), float(modelled.min()))
     below = np.maximum(size - panel.radius, least)
     axes.fill_between(w, below, size + panel.radius, color=BLUE, alpha=0.15, linewidth=0)

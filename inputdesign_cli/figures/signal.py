@@ -9,7 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLUE, DASHED, GREEN, GREY, LOWERED, ORANGE, legend_over_all
+from inputdesign_cli.figures.style import BLUE, DASHED, GREEN, GREY, ORANGE, legend_over_all, lowered
 from inputdesign_cli.runs.curves import PredictedPanel, SignalCurves
 from inputdesign_cli.runs.results import Array
 
@@ -65,7 +65,7 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
 
 def _name(axes: Axes, name: str, label: str, what: str) -> None:
     """The user's name and unit of a channel, or its symbol with the unit."""
-    symbol = f"{name[0]}{name[1:].translate(LOWERED)}(t)"
+    symbol = f"{name[0]}{lowered(name[1:])}(t)"
     nameless = not label or label.startswith("(")  # a unit alone
     axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
 

@@ -16,12 +16,12 @@ from inputdesign_cli.figures.style import (
     DASHED,
     GREEN,
     GREY,
-    LOWERED,
     ORANGE,
     PALETTE,
     frequency_axis,
     legend_above,
     log_axes,
+    lowered,
     marked,
 )
 from inputdesign_cli.runs.curves import DirectionCurves, OptimalityCurves, SpectrumCurves
@@ -59,7 +59,7 @@ def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
 def _plot_density(
     axes: Axes, w: Array, density: Array, record: Array | None, curves: SpectrumCurves
 ) -> list[Artist]:
-    phi = f"Φ{curves.symbol.translate(LOWERED)}"
+    phi = f"Φ{lowered(curves.symbol)}"
     handles: list[Artist] = []
     handles += axes.plot(w, density, color=BLUE, linewidth=2.0, label=f"{phi}, design")
     if record is not None:
@@ -102,8 +102,8 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
         drawn = above.plot(w, curves.record, color=GREY, linewidth=0.8, zorder=1)
         drawn[0].set_label("record, smoothed")
         handles += drawn[:1]
-    of = f"power of each line of ${curves.symbol}$"
-    above.set_ylabel(of if curves.lines else rf"density of ${curves.symbol}$")
+    of = f"power of each line of {curves.symbol}"
+    above.set_ylabel(of if curves.lines else f"density of {curves.symbol}")
     shown = entries[:, [i for i, _ in pairs], [j for _, j in pairs]]
     if float(shown.max(initial=0.0)) > LOG_FROM * float(np.median(shown)):
         _logarithmic(above, shown)
@@ -113,7 +113,7 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     values = np.asarray(np.linalg.eigvalsh(curves.spectrum)[:, ::-1], dtype=float)
     handles = []
     for number in range(min(r, MOST)):
-        label = rf"$\lambda_{{{number + 1}}}$"
+        label = f"λ{lowered(number + 1)}"
         handles += _plot_power(below, w, values[:, number], lines=curves.lines, number=number, label=label)
     if curves.white is not None:
         handles.append(_plot_white(below, curves.white))
@@ -132,7 +132,7 @@ def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[
         values = entries[:, i, j]
         if float(values.max(initial=0.0)) <= NOTHING * peak:
             continue
-        name = rf"$|\Phi_{{{i + 1}{j + 1}}}|$"
+        name = f"|Φ{lowered(i + 1, j + 1)}|"
         same = [names for names, other in found if np.abs(values - other).max() <= NOTHING * peak]
         if same:
             same[0].append(name)
@@ -148,8 +148,8 @@ def draw_directions(page: Figure, curves: DirectionCurves, time_unit: str) -> No
     gains: list[Artist] = []
     powers: list[Artist] = []
     for i, (gain, power) in enumerate(zip(curves.gain.T, curves.power.T, strict=True)):
-        gains += upper.plot(w, gain, color=PALETTE[i % MOST], label=rf"$\sigma_{i + 1}(G)$")
-        label = rf"$v_{i + 1}^* \Phi_u v_{i + 1}$"
+        gains += upper.plot(w, gain, color=PALETTE[i % MOST], label=f"σ{lowered(i + 1)}(G)")
+        label = "v{0}* Φᵤ v{0}".format(lowered(i + 1))
         powers += _plot_power(lower, w, power, lines=curves.lines, number=i, label=label)
     log_axes(upper, "y", "mask")
     upper.set_ylabel("gains of the plant")

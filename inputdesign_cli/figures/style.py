@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -42,7 +43,7 @@ _LETTERS_PER_INCH, _BESIDE_LABEL = 12.0, 6
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
 
-LOWERED = str.maketrans("ur0123456789", "ᵤᵣ₀₁₂₃₄₅₆₇₈₉")
+_LOWERED = str.maketrans("ur0123456789", "ᵤᵣ₀₁₂₃₄₅₆₇₈₉")
 _RAISED = str.maketrans("-.0123456789", "⁻·⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 _RC: dict[Any, Any] = {
@@ -63,12 +64,20 @@ _RC: dict[Any, Any] = {
     "lines.linewidth": 1.6,
     "legend.frameon": False,
     "legend.fontsize": TYPE_SIZE,
-    "mathtext.fontset": "dejavusans",
+    # Names and units are the user's: no $ begins a formula, and ours are plain text too.
+    "text.parse_math": False,
 }
 
 
 # Digits before a power of ten that are written where an axis shows less than a decade.
 _LABELLED = ("1", "3")
+
+
+def lowered(*indices: str | int) -> str:
+    """Indices as plain text: `₁₂`, and `₁₀,₂` where one has two digits."""
+    texts = [str(index) for index in indices]
+    apart = "," if len(texts) > 1 and any(len(text) > 1 for text in texts) else ""
+    return apart.join(texts).translate(_LOWERED)
 
 
 class _LogTicks(LogFormatterSciNotation):
@@ -89,7 +98,9 @@ def rendered(
     A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves.
     """
     buffer = io.BytesIO()
-    with mpl.rc_context(_RC):
+    with mpl.rc_context(_RC), warnings.catch_warnings():
+        # A box stands for a letter of the user's that the font lacks; tables and pages have it.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
         page = painted(paint, NARROW if narrow else SIZE)
         for axes in page.axes:
             _strokes(axes)

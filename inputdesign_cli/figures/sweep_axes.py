@@ -20,10 +20,10 @@ _DECADES_IN_FULL = 3.0
 # Ticks at points: so many at most, and so far apart, in shares of the axis.
 _MOST_TICKS, _ROOM = 12, 0.055
 _NAMES = {
-    "experiment.samples": "number of samples $N$",
+    "experiment.samples": "number of samples N",
     "spectrum.order": "order of the FIR spectrum",
-    "accuracy.mean_squared_error.neglected_norm": r"bound $\alpha$ on the neglected parameters",
-    "accuracy.mean_squared_error.target": r"mean squared error $\gamma$ that is admitted",
+    "accuracy.mean_squared_error.neglected_norm": "bound α on the neglected parameters",
+    "accuracy.mean_squared_error.target": "mean squared error γ that is admitted",
 }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above, log_axes
+from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above, log_axes, lowered
 from inputdesign_cli.figures.sweep_axes import LOG_FROM, curve, mark_failures, plain_numbers, scale_key
 from inputdesign_cli.figures.sweep_table import SweepTable
 
@@ -42,10 +42,9 @@ def draw_moments(table: SweepTable, along: str, page: Figure) -> None:
     for name, colour, width in zip(entries, PALETTE, widths, strict=False):
         y = table.numbers(name)
         assert y is not None
-        label = f"$R_{{{','.join(_place(name)) if len(entries) > 3 else ''.join(_place(name))}}}$"
-        handles += curve(axes, x, y, color=colour, linewidth=width, label=label)
+        handles += curve(axes, x, y, color=colour, linewidth=width, label=f"R{lowered(*_place(name))}")
         values.append(y)
-    handles += curve(axes, x, trace, color=BLACK, linestyle=DASHED, label="trace $R$")
+    handles += curve(axes, x, trace, color=BLACK, linestyle=DASHED, label="trace R")
     mark_failures(axes, x[~np.isfinite(trace)])
     span = float(np.nanmax(trace) / np.nanmin(trace))
     if span > LOG_FROM and min(float(np.nanmin(part)) for part in values) > 0:

@@ -65,7 +65,7 @@ def draw_error_bands(page: Figure, curves: ErrorBandCurves, time_unit: str) -> N
         curves.panels,
         plot,
         time_unit,
-        magnitude=r"$|\hat{G} - G_0|$",
+        magnitude="|Ĝ − G₀|",
         title=f"Errors of the models: {curves.name}",
     )
 
@@ -113,7 +113,7 @@ def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
         axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
         if name in curves.theory:
             axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
-    axes.set_xlabel(r"loss of a run, $\sqrt{\Sigma_t |y - y_0|^2}$ (solid: mean of the runs, dashed: theory)")
+    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²) (solid: mean of the runs, dashed: theory)")
     axes.set_ylabel("share of the runs (%)")
     axes.set_xlim(0.0, top)
     legend_above(axes, handles)

@@ -22,8 +22,9 @@ from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, 
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
-PowerKind = Literal["input", "output", "excitation"]
+PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
+"""The powers that results tell; that of the moves of u from sample to sample is only limited."""
 _NODES_AT_ONCE = 256
 
 
@@ -128,7 +129,11 @@ class Experiment(Coordinates):
         return self._squeezed(self.samples * products.at(weight))
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
-        """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x or x, of all channels or of one."""
+        """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x, x or moves, of all channels or of one."""
+        if kind == "moves":
+            moving = np.abs(self._moving(w)) ** 2
+            density = self.power_density("input", w, channel)
+            return density * moving.reshape(-1, *(1,) * (density.ndim - 1))
         if self.depends_on_plant(kind):
             G = self.response(kind, w)
             rows = G if channel is None else G[:, channel : channel + 1]
@@ -138,29 +143,35 @@ class Experiment(Coordinates):
 
     def cost_density(self, weights: Sequence[tuple[PowerKind, int | None, float]], w: ArrayLike) -> NDArray:
         """(n,) or (n, r, r): that of a weighted sum of powers, each of a kind and of a channel or all."""
-        t = None if self.loop is None else self.loop.responses(w)
+        caused = None if self.loop is None else self.loop.excited(w)
         total: NDArray | float = 0.0
         for kind, channel, weight in weights:
-            if t is None or not self.depends_on_plant(kind):
+            if caused is None or not self.depends_on_plant(kind):
                 total = total + weight * self.power_density(kind, w, channel)
                 continue
-            G = t.y_x if kind == "output" else t.u_x
+            G = caused[0 if kind == "output" else 1]
             rows = G if channel is None else G[:, channel : channel + 1]
             total = total + weight * self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         return np.asarray(total)
 
     def depends_on_plant(self, kind: PowerKind) -> bool:
         """Whether a power is that of a signal that the plant takes part in, not of x itself."""
-        return kind == "output" or (kind == "input" and self.loop is not None)
+        return kind == "output" or (kind in ("input", "moves") and self.loop is not None)
 
     def response(self, kind: PowerKind, w: ArrayLike) -> ComplexArray:
-        """(n, p or r, r): from x to the outputs, the inputs or x itself."""
+        """(n, p or r, r): from x to the outputs, the inputs, their moves or x itself."""
+        if kind == "moves":
+            return self._moving(w)[:, None, None] * self.response("input", w)
         if not self.depends_on_plant(kind):
             return np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
         if self.loop is None:
             return self.model.plant_at(w)
-        t = self.loop.responses(w)
-        return t.y_x if kind == "output" else t.u_x
+        y, u = self.loop.excited(w)
+        return y if kind == "output" else u
+
+    def _moving(self, w: ArrayLike) -> ComplexArray:
+        """(n,): 1 - q^-1, of samples that are held."""
+        return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
     def _squeezed(self, density: NDArray) -> NDArray:
         return density[:, 0, 0].real if self.inputs == 1 else density

@@ -69,6 +69,10 @@ class FiniteRecord:
         """(channels,): the powers of these signals."""
         return np.mean(self.signals(of, record) ** 2, axis=0)
 
+    def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
+        """(plants, channels): the same at every plant."""
+        return self.mean_squares(of, record)[None]
+
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """(n, r): the transpose of `signals`, applied to weights (n, channels)."""
         return weights if self._is_record(of) else self._answers.adjoint(of, weights)
@@ -87,10 +91,15 @@ class FiniteRecord:
 class FiniteRecords(FiniteRecord):
     """The same for several plants at once: what is known and what a record tells are stacks of matrices.
 
-    Powers are those at the first plant, that of `experiment`; the `others` follow it.
+    Signals are those at the first plant, that of `experiment`; the `others` follow it.
     """
 
     others: tuple[Experiment, ...] = ()
+
+    def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
+        """(1 + others, channels): the powers at every plant, or once where they are those of the record."""
+        plants = self._each[:1] if self._is_record(of) else self._each
+        return np.array([plant.mean_squares(of, record) for plant in plants])
 
     def information(self, record: Array) -> NDArray[np.float64]:
         """(1 + others, k, k): each as in `FiniteRecord`."""

@@ -78,18 +78,18 @@ def graded_quadrature(
         knots: frequencies at which the integrand has a kink; panels end there.
     """
     near = np.asarray(singularities, dtype=complex)
+    longest = min(0.5, _PHASE_PER_PANEL / max(highest_lag, 1)) / 2**refine
     return _panels(
-        near.tobytes(), np.asarray(knots, dtype=float).tobytes(), float(lo), float(hi), highest_lag, refine
+        near.tobytes(), np.asarray(knots, dtype=float).tobytes(), float(lo), float(hi), longest, refine
     )
 
 
-# The integrals of one design ask for the same few rules again and again.
-@lru_cache(maxsize=32)
+# The integrals of one design ask for the same few rules again and again, at each of its plants.
+@lru_cache(maxsize=512)
 def _panels(
-    singularities: bytes, knots: bytes, lo: float, hi: float, highest_lag: int, refine: int
+    singularities: bytes, knots: bytes, lo: float, hi: float, longest: float, refine: int
 ) -> Quadrature:
     near, ends = np.frombuffer(singularities, dtype=complex), np.frombuffer(knots)
-    longest = min(0.5, _PHASE_PER_PANEL / max(highest_lag, 1)) / 2**refine
     edges = _edges(lo, hi, near, longest, 1.0 / 2**refine, ends)
     x, weight = _rule()
     half = 0.5 * np.diff(edges)[:, None]

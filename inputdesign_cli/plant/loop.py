@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property, singledispatch
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.frequencies import logarithmic_distance
@@ -35,19 +35,6 @@ def beside_zero(w: ArrayLike, nearest: float) -> ComplexArray | Array:
     """The frequencies `w`, those of the axis moved at least so far from zero."""
     given = np.asarray(w)
     return given if np.iscomplexobj(given) else np.where(np.abs(given) < nearest, nearest, given)
-
-
-@dataclass(frozen=True)
-class LoopResponse:
-    """Transfer functions (n, to, from) from the excitation x and from e.
-
-    x is r in closed loop and u in open loop.
-    """
-
-    y_x: ComplexArray
-    u_x: ComplexArray
-    y_e: ComplexArray
-    u_e: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -173,24 +160,30 @@ class Loop(ABC):
                 key="experiment.controller",
             )
 
-    def responses(self, w: ArrayLike) -> LoopResponse:
-        """From r and from e at normalised frequencies `w`: y_x (n, p, r), u_x (n, r, r), y_e (n, p, p), u_e.
-
-        y_x = G S_i, u_x = S_i = (I + C G)^-1, y_e = S_o H, u_e = -C S_o H with S_o = (I + G C)^-1.
-        """
-        beside = self._beside_zero(w)
-        left, noise = self.left_at(beside), self.noise_at(beside)
-        n, p, r = len(left), self.model.outputs, self.model.inputs
+    def excited(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """What r causes at normalised frequencies `w`: G S_i (n, p, r) at y, S_i = (I + C G)^-1 at u."""
+        left, p = self.left_at(self._beside_zero(w)), self.model.outputs
+        r = left.shape[1] - p
         if p == r == 1:
-            return _single_responses(left, noise)
+            R, minus_N, P, Q = _blocks(left)
+            below = R * Q - minus_N * P
+            return -minus_N * Q / below, R * Q / below
+        right = np.zeros((len(left), p + r, r), dtype=complex)
         inputs = p + np.arange(r)
-        right = np.zeros((n, p + r, r + p), dtype=complex)
         right[:, inputs, np.arange(r)] = left[:, inputs, inputs]
-        right[:, :p, r:] = noise
-        solved: ComplexArray = np.linalg.solve(left, right).astype(complex)
-        return LoopResponse(
-            y_x=solved[:, :p, :r], u_x=solved[:, p:, :r], y_e=solved[:, :p, r:], u_e=solved[:, p:, r:]
-        )
+        return _split(np.linalg.solve(left, right), p)
+
+    def disturbed(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """What e causes: S_o H (n, p, p) at y with S_o = (I + G C)^-1, and -C S_o H (n, r, p) at u."""
+        beside = self._beside_zero(w)
+        left, noise, p = self.left_at(beside), self.noise_at(beside), self.model.outputs
+        if left.shape[1] == 2:
+            R, minus_N, P, Q = _blocks(left)
+            below = R * Q - minus_N * P
+            return Q * noise / below, -P * noise / below
+        right = np.zeros((len(left), left.shape[1], p), dtype=complex)
+        right[:, :p] = noise
+        return _split(np.linalg.solve(left, right), p)
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
@@ -206,23 +199,19 @@ class Loop(ABC):
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""
-        t = self.responses(w)
-        return self.model.prediction_gradient(self._beside_zero(w), t.y_x, t.u_x, np.zeros_like(t.y_x))
+        y, u = self.excited(w)
+        return self.model.prediction_gradient(self._beside_zero(w), y, u, np.zeros_like(y))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what e contributes, through the noise model and around the loop."""
-        t = self.responses(w)
-        e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), t.y_e.shape)
-        return self.model.prediction_gradient(self._beside_zero(w), t.y_e, t.u_e, e)
+        y, u = self.disturbed(w)
+        e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), y.shape)
+        return self.model.prediction_gradient(self._beside_zero(w), y, u, e)
 
 
-def _single_responses(left: ComplexArray, noise: ComplexArray) -> LoopResponse:
-    """One input and one output, by Cramer's rule from the matrix on the left (n, 2, 2) and R H (n, 1, 1)."""
-    R, minus_N, P, Q = _blocks(left)
-    below = R * Q - minus_N * P
-    return LoopResponse(
-        y_x=-minus_N * Q / below, u_x=R * Q / below, y_e=Q * noise / below, u_e=-P * noise / below
-    )
+def _split(solved: NDArray, outputs: int) -> tuple[ComplexArray, ComplexArray]:
+    """y and u of a solution (n, p + r, ..)."""
+    return solved[:, :outputs].astype(complex), solved[:, outputs:].astype(complex)
 
 
 def _blocks(left: ComplexArray) -> tuple[ComplexArray, ...]:

@@ -21,9 +21,12 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
     """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    c = np.asarray(coefficients, dtype=float)
-    value: ComplexArray = np.full(np.shape(q), c[-1], dtype=complex)
-    for coefficient in c[-2::-1]:  # Horner
+    c = np.asarray(coefficients, dtype=float).tolist()
+    if len(c) == 1:
+        return np.full(np.shape(q), c[0], dtype=complex)
+    value: ComplexArray = c[-1] * q
+    value += c[-2]
+    for coefficient in c[-3::-1]:  # Horner
         value *= q
         value += coefficient
     return value

@@ -103,6 +103,14 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     yield "plants", f"what is asked holds at the plant of the spec and {kept} {drawn}{left}", again
     if bound:
         yield "binding", ", ".join(bound) + more, ""
+    if "searched" in found:
+        told = found["searched"]
+        more = f" after {told['added']} were added" if told["added"] else ""
+        yield (
+            "worst plant",
+            f"{told['share']:.4g} of what is admitted is the worst that was found in {told['region']}{more}",
+            f"searched by ascent from {told['tried']} plants, not proved",
+        )
     if "fresh" in found:
         told = found["fresh"]
         low, high = (f"{100 * share:.3g}" for share in told["limits"])

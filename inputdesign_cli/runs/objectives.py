@@ -50,24 +50,17 @@ OBJECTIVES = {
         "Within the limits the error of the model can be kept to {} times the admissible error",
         label="factor on the admissible error",
     ),
-    "D": Objective(
-        "log det M", f"{_MOST}log det M", f"{_BEST}log det M = {{}}", "log det $M$", maximised=True
-    ),
+    "D": Objective("log det M", f"{_MOST}log det M", f"{_BEST}log det M = {{}}", maximised=True),
     "A": Objective(
-        "-trace M^-1",
-        f"{_MOST}-trace of M^-1",
-        f"{_BEST}-trace M^-1 = {{}}",
-        "-trace $M^{-1}$",
-        maximised=True,
+        "-trace M^-1", f"{_MOST}-trace of M^-1", f"{_BEST}-trace M^-1 = {{}}", "-trace M⁻¹", maximised=True
     ),
     "E": Objective(
         "smallest eigenvalue of M",
         f"{_MOST}smallest eigenvalue of M",
         f"{_BEST}a smallest eigenvalue of M of {{}}",
-        "smallest eigenvalue of $M$",
         maximised=True,
     ),
-    "T": Objective("trace M", f"{_MOST}trace of M", f"{_BEST}trace M = {{}}", "trace $M$", maximised=True),
+    "T": Objective("trace M", f"{_MOST}trace of M", f"{_BEST}trace M = {{}}", maximised=True),
     "closed_loop_error": Objective(
         "error of the loop",
         "the least error of the loop with the controller designed on the model",

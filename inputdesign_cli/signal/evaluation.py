@@ -61,10 +61,10 @@ class Evaluator:
         return self.ratio(samples) / MET if self.share(samples) >= 1.0 / MET else np.inf
 
     def share(self, samples: Array) -> float:
-        """The largest factor on its powers that the limits leave to the record."""
-        powers = {kind: self.plant.mean_squares(kind, samples) for kind, _, _ in self.limits}
+        """The largest factor on its powers that the limits leave to the record, at every plant."""
+        powers = {kind: self.plant.mean_squares_of_each(kind, samples) for kind, _, _ in self.limits}
         spent = [
-            (most, float(powers[kind].sum() if channel is None else powers[kind][channel]))
+            (most, float(max(powers[kind].sum(axis=1) if channel is None else powers[kind][:, channel])))
             for kind, channel, most in self.limits
         ]
         return min((most / power for most, power in spent if power > 0.0), default=np.inf)

@@ -10,13 +10,15 @@ from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left
 from inputdesign_cli.information import FiniteRecord
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.bounds import Bounds, limiter_of
-from inputdesign_cli.signal.constraints import compressed
+from inputdesign_cli.signal.constraints import compressed, peak_ratio
 from inputdesign_cli.signal.evaluation import MET, Evaluator, Target
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.level_search import first_level, last_level, level_of_power
 from inputdesign_cli.signal.limiter import Limiter
 from inputdesign_cli.signal.settings import LEVELLED, Method
 
+# Times the level that fits as it is: how much is clipped of the records that are tried.
+_CLIPPED = (1.0, 1.4, 2.0, 3.0)
 # Times the level that would do without limits: there they all bite.
 _FAR = 40.0
 # A record that costs more than the design by this share is worth more candidates.
@@ -119,7 +121,7 @@ class _Candidates:
             samples = limiter.record(values * (settings.level / np.where(peaks > 0.0, peaks, 1.0)), 1.0)
             return samples, evaluator.figure(samples) <= 1.0
         if not evaluator.target.meets:
-            return (self._affordable(values, 1.0) if limiter.plain else self._of_designed_power(values)), True
+            return (self._affordable(values, 1.0) if limiter.plain else self._best_within(values)), True
         held = np.repeat(values, settings.hold, axis=0)
         level = evaluator.needed_level(held)
         if level is None:
@@ -136,6 +138,27 @@ class _Candidates:
             if met:
                 return limiter.record(values, level), True
         return self._affordable(values, level), False
+
+    def _best_within(self, values: Array) -> Array:
+        """The most telling record between the highest that fits as it is and that of the designed power.
+
+        What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
+        """
+        strongest = self._of_designed_power(values)
+        if self.limiter.settings.method in LEVELLED:
+            return strongest
+        fit = self._fitting(values)
+        tried = [strongest, *(self._affordable(values, share * fit) for share in _CLIPPED)]
+        within = [samples for samples in tried if _power(samples) <= _power(strongest) * MET]
+        return min(within, key=self.evaluator.ratio)
+
+    def _fitting(self, values: Array) -> float:
+        """The largest level at which the values need no change."""
+        limiter = self.limiter
+        factors = [limits.factor(column) for limits, column in zip(limiter.inputs, values.T, strict=True)]
+        if limiter.constraints:
+            factors.append(1.0 / peak_ratio(values, limiter.constraints))
+        return min(min(factors), 1.0)
 
     def _of_designed_power(self, values: Array) -> Array:
         """The record of the power of the design, or of the most below that the limits allow."""

@@ -14,6 +14,7 @@ _WHOLE = 1e-9
 def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
     """Put `samples` beside each `duration`: as many as fit.
 
+    An experiment without a length takes all that limits allow, unless the shortest one is asked for.
     A duration or sample time that cannot be read is left to the validation.
     """
     step = data.get("sample_time", 1.0)
@@ -32,6 +33,17 @@ def in_samples(data: dict[str, Plain]) -> Iterator[PathDiagnostic]:
                 yield PathDiagnostic("out-of-range", message, "look at sample_time and time_unit", path)
             else:
                 section["samples"] = samples
+    _take_all(data)
+
+
+def _take_all(data: dict[str, Plain]) -> None:
+    limits, experiment = data.get("limits"), data.get("experiment", {})
+    if data.get("objective") == "shortest_experiment" or not isinstance(limits, dict):
+        return
+    if isinstance(experiment, dict) and not {"samples", "duration"} & experiment.keys():
+        most = limits.get("samples")
+        if isinstance(most, int) and _positive(most):
+            data["experiment"] = {**experiment, "samples": most}
 
 
 def _positive(value: Plain) -> bool:

@@ -5,6 +5,7 @@ from inputdesign_cli.spectrum.basis import (
     Face as Face,
     Functional as Functional,
     Pricing as Pricing,
+    weighted_mean as weighted_mean,
 )
 from inputdesign_cli.spectrum.directions import (
     best_directions as best_directions,

@@ -46,6 +46,20 @@ class Functional:
         return float(self.vector @ x)
 
 
+def weighted_mean(functionals: Sequence[Functional], weights: Array) -> Functional:
+    """sum_i w_i f_i over those of nonzero weight, `weights` (n,) with the sum one."""
+    parts = [(f, float(w)) for f, w in zip(functionals, weights, strict=True) if w != 0.0]
+    last: list[tuple[Array, NDArray]] = []
+
+    def density(w: Array) -> NDArray:
+        if not last or last[0][0] is not w:  # asked for again on the same grid
+            last[:] = [(w, np.asarray(sum(weight * f.density(w) for f, weight in parts)))]
+        return last[0][1]
+
+    vector = np.asarray(sum(weight * f.vector for f, weight in parts))
+    return Functional(vector, density, any(f.concentrated for f, _ in parts))
+
+
 @dataclass(frozen=True)
 class Face:
     """A part of the cone of spectra, small enough for a solver: x = columns y with y in a simple cone.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement, criterion_of
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
-from inputdesign_cli.design.convex.cost import weights_of
+from inputdesign_cli.design.convex.cost import paid_for, weights_of
 from inputdesign_cli.design.convex.demands import Scenario
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.errors import InaccurateError
@@ -80,11 +80,12 @@ class _Audit:
             yield from reread.missed(goal)
         if goal == "factor":
             yield from self._reached(plants, value)
-        paid = plants if problem.mean_cost else plants[:1]
-        cost = sum(
-            w * sum(reread.power(kind, channel) for reread in paid) / len(paid)
-            for kind, channel, w in weights_of(self.done.cost)
-        )
+        weights = weights_of(self.done.cost)
+        costs = [
+            sum(w * plants[number].power(kind, channel) for kind, channel, w in weights)
+            for number in problem.paying
+        ]
+        cost = paid_for(problem.paid, costs)
         if not abs(cost - self.written["cost"]) <= _APART * cost:
             yield f"the spectrum costs {cost:.10g}, not {self.written['cost']:.10g}"
         for limit in self.done.question.limits:

@@ -60,7 +60,12 @@ def _of_lines(terms: ResponseTerms, written: Mapping[str, Json]) -> Iterator[str
         yield f"the lines leave {worst:.10g} times the deviation admitted, not {claimed['worst_ratio']:.10g}"
     if terms.goal in ("cost", "samples") and not worst <= 1.0 + _APART:
         yield f"the lines leave {worst:.10g} times the deviation that is admitted"
-    found = {"input": powers, "excitation": powers, "output": np.einsum("lpr,lr->lp", np.abs(G) ** 2, powers)}
+    found = {
+        "input": powers,
+        "excitation": powers,
+        "output": np.einsum("lpr,lr->lp", np.abs(G) ** 2, powers),
+        "moves": (2.0 - 2.0 * np.cos(w))[:, None] * powers,
+    }
 
     def power(kind: str, channel: int | None) -> float:
         total = found[kind].sum(axis=0)

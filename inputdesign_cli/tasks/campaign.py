@@ -7,8 +7,8 @@ it looks at is the information, not the error ([anscombe-1952], [chow-robbins-19
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import Literal, Protocol
 
@@ -18,9 +18,10 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.identification import ModelQuestion
 
-Kind = Literal["pilot", "nominal", "robust", "white"]
+Kind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 REACHED = 1.0 + 1e-9
 """A ratio no larger than this meets what is asked."""
 # Of the way from the last estimate that could be built on to one that cannot.
@@ -111,8 +112,10 @@ class Planned:
     Attributes:
         record: (rest, r) about the operating point, of which `take` samples are applied.
         power: of the record, and the `cost` of the design, per sample at the estimate.
-        kind: what it was made for.
+        kind: what it was made for; a `stopgap` is white noise where there is no design.
         capped: whether it falls short of what is asked, by the cap or by limits.
+        claim: gives what is proved of the design, as in a result; None of white noise.
+        why: there is no design.
     """
 
     record: Array
@@ -121,6 +124,13 @@ class Planned:
     cost: float
     kind: Kind
     capped: bool = False
+    claim: Callable[[], Mapping[str, Json]] | None = field(default=None, compare=False, repr=False)
+    why: str = ""
+
+    @property
+    def designed(self) -> bool:
+        """Whether a design is behind it, so that the first such plan sets the cap."""
+        return self.kind not in ("pilot", "stopgap")
 
     @property
     def applied(self) -> Array:
@@ -185,7 +195,7 @@ class Planner(Protocol):
             first: cost of a sample of the first plan, which the cap is relative to.
 
         Raises:
-            IdesignError: there is none.
+            IdesignError: there is no first one.
         """
 
     def cheapest(self, model: Model) -> float:

@@ -240,6 +240,11 @@ def _shrunk(found: Identified, stands: Standing | None) -> list[str]:
 
 def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
     notes = []
+    if plan.why:
+        notes.append(
+            f"there is no design at this estimate ({plan.why}): the next part is white noise at the cost of "
+            "the first plan, or of the pilot, and the estimate after it decides"
+        )
     if plan.capped:
         notes.append(
             "the plan falls short of what is asked: campaign.power_cap or limits leave no more until "

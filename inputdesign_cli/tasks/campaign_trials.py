@@ -98,7 +98,7 @@ class _Run:
                 )
             except (InfeasibleError, InaccurateError, SpecError):
                 return self._ended("unplanned")
-            if self.first is None and plan.kind != "pilot":
+            if self.first is None and plan.designed:
                 self.first = plan.cost
             last = self.r[-1] if len(self.r) else np.zeros(self.r.shape[1])
             self.r = np.concatenate([self.r, plan.following(last, rules.rate).applied])

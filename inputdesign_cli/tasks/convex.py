@@ -52,9 +52,10 @@ from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_cu
 from inputdesign_cli.tasks.result.status import proof_status
 from inputdesign_cli.tasks.result.unfinished import no_other_spectra, no_record_in_time, unfinished_notes
 from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound
-from inputdesign_cli.tasks.robust import Plants, without_dearest
+from inputdesign_cli.tasks.robust import Plants, delivered_samples, without_dearest
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 from inputdesign_cli.tasks.unknown_start import start_notes
+from inputdesign_cli.tasks.worst_case import with_worst_plants
 
 
 @dataclass(frozen=True)
@@ -131,8 +132,8 @@ class ConvexTask:
             )
         record = made.record
         tables, curves = self._illustrations(done, record, result)
-        if self.plants is not None:
-            robust = robust_result(done, self.plants)
+        if done.plants is not None:
+            robust = robust_result(done, done.plants)
             result["robust"] = robust.entry
             tables, curves = tables | robust.tables, curves | robust.curves
         files: dict[str, bytes] = {}
@@ -192,13 +193,17 @@ class ConvexTask:
             kept = without_dearest(question, design, self.plants.discard)
             question = replace(question, others=[question.others[number] for number in kept])
             design, how = self._by_exchange(question)
+        plants = self.plants
+        if plants is not None and plants.region is not None:
+            found = with_worst_plants(plants, plants.region, question, (design, how), self._by_exchange)
+            plants, question, (design, how) = found
+            kept = list(range(len(question.others)))
         if self.columns is not None:
             design, climbed = restrict_columns(self.columns, design)
             how |= climbed
-        experiment = design.problem.experiment
-        if design.problem.goal == "samples":
-            experiment = replace(experiment, samples=max(int(np.ceil(design.result.s * (1 - 1e-9))), 1))
-        return Designed(self.header, question, design, experiment, self.cost, confidence, kept), how
+        experiment = replace(design.problem.experiment, samples=delivered_samples(design))
+        done = Designed(self.header, question, design, experiment, self.cost, confidence, kept, plants)
+        return done, how
 
     def _by_exchange(self, question: Question) -> tuple[Design, dict[str, Json]]:
         ended: dict[str, Json] = {}

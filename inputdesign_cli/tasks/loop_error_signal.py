@@ -23,6 +23,7 @@ class LoopErrorSignalSettings:
         filtered: by a filter from white noise; otherwise it is a multisine of equal `periods`.
         order: of a rational filter, states for each input; None: as many taps as it takes.
         candidates: records of which the best is taken.
+        amplitude, rate: (n,) the largest values of the inputs and their moves, where they are limited.
     """
 
     samples: int
@@ -31,6 +32,13 @@ class LoopErrorSignalSettings:
     order: int | None
     candidates: int
     seed: int
+    amplitude: Array | None = None
+    rate: Array | None = None
+
+    def excess(self, u: Array) -> float:
+        """The factor by which the power of u (N, n) would have to fall for the limits on single samples."""
+        signals = ((u, self.amplitude), (np.diff(u, axis=0, prepend=0.0), self.rate))
+        return max((float(np.max((s / most) ** 2)) for s, most in signals if most is not None), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,7 @@ def realise(design: LoopErrorDesign, settings: LoopErrorSignalSettings) -> LoopE
         powers = periodogram(u).powers
         # What brings the record to its limits, by its own spectrum.
         excess = np.max(np.einsum("pkab,kba->p", metrics, powers).real / design.problem.most)
+        excess = max(float(excess), settings.excess(u))
         try:
             M = design.criterion.information(w, powers / excess, np.ones(w.size))
             attained = design.criterion.value(M)

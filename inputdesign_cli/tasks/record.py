@@ -151,7 +151,7 @@ def make_record(
     upper = tuple(
         (limit.kind, limit.channel, limit.bound)
         for limit in problem.limits
-        if limit.upper and limit.scenario == 0
+        if limit.upper and limit.scenario == 0 and limit.kind != "moves"  # single ones are limited
     )
     bounds = replace(request.bounds, powers=upper)
     meets = problem.goal != "factor" and request.meets
@@ -174,23 +174,23 @@ def make_record(
         at = FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in numbers if n))
         record = best_record(generator, at, target_at(numbers), bounds, first=first)
         least = max(record.worst_ratio, MET) if meets else record.worst_ratio
-        missed = {
-            n: ratio
-            for n in range(len(plants))
-            if n not in numbers
-            and (ratio := _ratio_at(FiniteRecord(plants[n], samples, request.step), scores[n], record))
-            > least
-        }
-        if not missed:
+        left = [n for n in range(len(plants)) if n not in numbers]
+        others = {n: FiniteRecord(plants[n], samples, request.step) for n in left}
+        ratios = {n: _ratio_at(others[n], scores[n], record) for n in left}
+        shares = {n: _power_share(others[n], upper, record) for n in left}
+        missed = [n for n in left if ratios[n] > least]
+        beyond = [n for n in left if shares[n] > MET]
+        if not (missed or beyond):
             return record
         # What serves the worst few serves most of the others.
-        numbers += sorted(missed, key=lambda n: -missed[n])[:FEW]
+        worst_few = sorted(missed, key=lambda n: -ratios[n])[:FEW]
+        numbers += [*worst_few, *sorted(set(beyond) - set(worst_few), key=lambda n: -shares[n])[:FEW]]
 
 
 def _binding(design: Design) -> list[int]:
     """The nominal plant, and the scenarios that bind the design."""
-    weight = np.trace(design.result.certificate.weights, axis1=1, axis2=2)
-    return [n for n, share in enumerate(weight) if n == 0 or share > _TAKES_PART * weight.sum()]
+    shares = design.result.certificate.shares
+    return [n for n, share in enumerate(shares) if n == 0 or share > _TAKES_PART]
 
 
 def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Record) -> float:
@@ -199,6 +199,23 @@ def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Reco
         return score(plant.information(record.samples))
     except np.linalg.LinAlgError:
         return np.inf
+
+
+def _power_share(
+    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
+) -> float:
+    """The largest share of a limit on powers that a record uses at one plant, where the plant takes part."""
+    powers = {
+        kind: plant.mean_squares(kind, record.samples)
+        for kind, _, _ in limits
+        if plant.experiment.depends_on_plant(kind)
+    }
+    used = (
+        float(powers[kind].sum() if channel is None else powers[kind][channel]) / most
+        for kind, channel, most in limits
+        if kind in powers
+    )
+    return max(used, default=0.0)
 
 
 def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGenerator:

@@ -24,9 +24,10 @@ from inputdesign_cli.monte_carlo.response import ResponseStudy, study_response
 from inputdesign_cli.plant.noise_spectrum import NoiseSpectrum
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.signal import Lines, Record, low_peak_phases, multisine_record, schroeder_phases
+from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.audit_response import audit_response
 from inputdesign_cli.tasks.record import RecordRequest
+from inputdesign_cli.tasks.response_record import LineRecords
 from inputdesign_cli.tasks.result.response import (
     Planned,
     ResponseTerms,
@@ -35,11 +36,11 @@ from inputdesign_cli.tasks.result.response import (
     response_results,
     study_results,
 )
-from inputdesign_cli.tasks.result.response_limits import too_long, unreachable
+from inputdesign_cli.tasks.result.response_limits import too_long, too_tight, unreachable
 from inputdesign_cli.tasks.simulation import Simulation
 
 KEY = "accuracy.frequency_response"
-_STREAM = 0x5EED
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class ResponseTask(ResponseTerms):
         begun = time.perf_counter()
         records = {"design": plan.record.samples}
         if self.simulation.compare:
-            records["white"] = self._realised(flat_powers(plan), len(plan.record.samples))
+            records["white"] = self._records.best(flat_powers(plan), len(plan.record.samples))
         truth, nominal = self.simulation.truth, self.experiment
         if truth is not None:
             nominal = truth.experiment(nominal, results.result["power"]["output"])
@@ -137,9 +138,13 @@ class ResponseTask(ResponseTerms):
         except UnreachableError as error:
             raise unreachable(self.header.units, error, samples) from error
         if self.goal == "samples":
-            whole = self.periods.blocks * self.periods.period
-            samples = whole * int(np.ceil(1.0 / design.value / whole * (1.0 - 1e-12)))
+            samples = self._whole(1.0 / design.value)
         return design, samples
+
+    def _whole(self, samples: float) -> int:
+        """So many samples at least, in whole periods."""
+        whole = self.periods.blocks * self.periods.period
+        return whole * int(np.ceil(samples / whole * (1.0 - 1e-12)))
 
     def _solved(self) -> tuple[Planned, Results]:
         started = time.perf_counter()
@@ -149,8 +154,17 @@ class ResponseTask(ResponseTerms):
         length = counted + self.periods.blocks * self.periods.skip * self.periods.period
         self._check_length(length)
         solved = time.perf_counter()
+        samples = self._records.best(powers, length)
+        beyond = self._records.beyond(samples)
+        if self.goal == "samples" and beyond > 1.0:
+            # The lines are scaled into the limits, and more periods make up for it.
+            length -= counted
+            counted = self._whole(beyond**2 / design.value)
+            length += counted
+            self._check_length(length)
+            samples = self._records.best(powers, length)
+            beyond = self._records.beyond(samples)
         experiment = replace(self.experiment, samples=counted)
-        samples = self._realised(powers, length)
         noise = self.lines.noise
         if not self.tabulated:
             spectrum = NoiseSpectrum.of(self.experiment.model)
@@ -162,6 +176,10 @@ class ResponseTask(ResponseTerms):
         scale = 1.0
         if self.goal == "cost" and self.record.meets:
             scale = min(worst, float(np.sqrt(flat.alike(design.powers / flat.needed))))
+            if scale * beyond > 1.0 + _ROUNDING:
+                raise too_tight(self.header.units, self.record.limit_keys, scale * beyond, length)
+        elif self.given is None:
+            scale = 1.0 / max(beyond, 1.0)
         samples, exact = scale * samples, exact / scale
         record = Record(samples, "multisine", worst / scale, extra_power=scale**2 - 1.0)
         plan = Planned(
@@ -194,26 +212,9 @@ class ResponseTask(ResponseTerms):
                 key=KEY,
             )
 
-    def _realised(self, powers: NDArray[np.float64], length: int) -> Array:
-        """(length, r): of several choices of phases that of the lowest peak."""
-        r, period, settings = powers.shape[1], self.grid.period, self.record.settings
-        diagonal = np.einsum("lr,rs->lrs", powers, np.eye(r)).astype(complex)
-        lines = Lines(self.grid.frequencies, diagonal, period)
-        best: Array | None = None
-        for number in range(settings.candidates):
-            rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(_STREAM, number)))
-            angles = 2.0 * np.pi * rng.random(len(powers))
-            if settings.phases in ("schroeder", "optimised") and number == 0:
-                angles = schroeder_phases(lines, period * r)
-            if settings.phases == "optimised":
-                angles = low_peak_phases(lines, period * r, angles)
-            u = multisine_record(lines, length, rng, "orthogonal", angles=angles)
-            if best is None or np.max(np.abs(u)) < np.max(np.abs(best)):
-                best = u
-            if settings.phases == "schroeder":
-                break
-        assert best is not None
-        return best
+    @property
+    def _records(self) -> LineRecords:
+        return LineRecords(self.experiment, self.grid, self.record.settings, self.record.bounds)
 
     def _shifted(self, u: Array, deviations: NDArray[np.float64]) -> float:
         """How far what the start leaves shifts G, in standard deviations at most."""

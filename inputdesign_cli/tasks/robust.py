@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.compute.time_limit import seconds_left
+from inputdesign_cli.design.convex.cost import Paid
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Alternative, Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis
+from inputdesign_cli.tasks.region import Region
 
 CONFIDENCE = 0.999
 """Of the statements on plants that were not drawn."""
@@ -46,6 +48,32 @@ class Batch:
 
 
 @dataclass(frozen=True)
+class Kept:
+    """How near a plant comes to missing what is asked: ratio over what is admitted, and where.
+
+    `cost` is that of the design at the plant, where that is looked at.
+    """
+
+    share: float
+    frequency: float | None = None
+    cost: float = 0.0
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The worst plant that was found in a region, at `theta` (k,), and what it keeps.
+
+    `tried` plants were looked at in the last search; `added` were found before and are served by the design.
+    """
+
+    region: str
+    theta: Array
+    kept: Kept
+    tried: int
+    added: int
+
+
+@dataclass(frozen=True)
 class Plants:
     """The scenarios of a design.
 
@@ -53,28 +81,24 @@ class Plants:
         batch: the plants beside the nominal one.
         source: the key of the spec that they come from.
         names: of the k parameters.
-        r_adm, mean_cost: as the spec has them.
+        r_adm: as the spec has it.
+        paid: see `Problem`.
         discard: how many of the plants the design may leave out.
         afresh: draws others from the same distribution; None where the plants were listed one by one.
         unknowns: of the program, None where they have no number.
+        region: where the design is to serve the worst plant that is found, too; `searched` what was found.
     """
 
     batch: Batch
     source: str
     names: tuple[str, ...]
     r_adm: str
-    mean_cost: bool
+    paid: Paid
     discard: int = 0
     afresh: Callable[[], Batch] | None = None
     unknowns: int | None = None
-
-
-@dataclass(frozen=True)
-class Kept:
-    """How near a plant comes to missing what is asked: ratio over what is admitted, and where."""
-
-    share: float
-    frequency: float | None = None
+    region: Region | None = None
+    searched: Searched | None = None
 
 
 def without_dearest(question: Question, design: Design, discard: int) -> list[int]:
@@ -84,10 +108,8 @@ def without_dearest(question: Question, design: Design, discard: int) -> list[in
     """
     kept = list(range(len(question.others)))
     while discard > 0:
-        weight = np.trace(design.result.certificate.weights, axis1=1, axis2=2)[1:]
-        dear = [
-            n for n in np.argsort(-weight, kind="stable").tolist() if weight[n] > _TAKES_PART * weight.sum()
-        ]
+        weight = design.result.certificate.shares[1:]
+        dear = [n for n in np.argsort(-weight, kind="stable").tolist() if weight[n] > _TAKES_PART]
         # Half of those that bind at a time: a plant that goes frees others.
         gone = set(dear[: min(discard, max(len(dear) // 2, 1))])
         if not gone:
@@ -116,6 +138,13 @@ def kept_by(problem: Problem, design: Design, samples: int) -> list[Kept]:
             if share > worst[number].share:
                 worst[number] = Kept(share, violation.frequency)
     return worst
+
+
+def delivered_samples(design: Design) -> int:
+    """Of the experiment: a whole number where the shortest one is sought."""
+    if design.problem.goal != "samples":
+        return design.problem.experiment.samples
+    return max(int(np.ceil(design.result.s * (1 - 1e-9))), 1)
 
 
 def delivered(problem: Problem, design: Design, samples: int) -> NDArray[np.float64]:
@@ -150,6 +179,7 @@ def _tried(design: Design, basis: Basis, power: float, samples: int, plant: Alte
             requirements=own.requirements,
             side=own.side,
             others=(),
+            limits=(),
             basis=basis,
             finer=None,
         )
@@ -160,6 +190,8 @@ def _tried(design: Design, basis: Basis, power: float, samples: int, plant: Alte
             for _, violation in alone.demands.violations(informations, side=side):
                 if violation.ratio / admitted > worst.share:
                     worst = Kept(violation.ratio / admitted, violation.frequency)
+        if design.problem.paid == "worst" and design.problem.goal == "cost":
+            return replace(worst, cost=alone.cost_at(design.result.x))
         return worst
     except (np.linalg.LinAlgError, IdesignError):  # a plant of which the experiment does not tell everything
         return Kept(np.inf)

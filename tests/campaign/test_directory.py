@@ -49,6 +49,11 @@ def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_pa
         names = ("plan_{}.csv", "record_{}.csv", "record_{}_as_given.csv", "model_{}.yaml")
         assert all((begun / name.format(f"{number:02d}")).is_file() for name in names)
     assert np.array_equal(planned(begun)[:, 0], np.arange(len(planned(begun))))
+    for entry in campaign["rounds"][:-1]:
+        objective = entry["plan"]["design"]["objective"]
+        assert entry["plan"]["cost"] == pytest.approx(objective["value"])
+        assert 0.0 < objective["lower_bound"] <= objective["value"] * (1 + 1e-9)
+        assert objective["relative_gap"] <= 1e-7
     estimate = campaign["rounds"][-1]["estimate"]
     spread = campaign["rounds"][-1]["standard_deviation"]
     assert abs(estimate["b1"] - 3.5) < 4 * spread["b1"]

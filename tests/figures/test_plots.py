@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 from inputdesign_cli.figures.plots import draw, draw_all
 from inputdesign_cli.runs.curves import (
@@ -228,7 +229,7 @@ def test_the_spectrum_beside_the_white_level(page):
 def test_the_entries_stand_where_the_plant_has_them_and_others_stay_empty(page):
     *panels, below = page(CURVES["bounds of entries"]).axes
     titles = {axes.get_subplotspec().num1: axes.get_title(loc="left") for axes in panels}
-    assert titles == {1: "$G_{12}$", 2: "$G_{21}$"}
+    assert titles == {1: "G₁₂", 2: "G₂₁"}
     first, second = panels
     np.testing.assert_array_equal(lines_by_label(first)["r_adm, admitted"].get_ydata(), 0.01 * G)
     assert "r_adm, admitted" not in lines_by_label(second)
@@ -287,6 +288,26 @@ def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
     ]
 
 
+NAMES = [r"$\frac{1}{0", "$$", "$x$", r"\$", "_u", "100 %", "{}", "日本", "a_b^c", "&<b>", "{0}", "°C"]
+
+
+def test_names_and_units_are_drawn_as_they_are():
+    """Warnings are errors in these tests: letters that the font lacks cause none."""
+    wave, long = np.sin(np.arange(50.0)), ["w" * 40, "$" * 40]
+    for names in (*zip(*[iter(NAMES)] * 4, strict=True), long):
+        labels = {f"u{i}": f"{name} ({name})" for i, name in enumerate(names)}
+        assert draw(SignalCurves(T[:50], dict.fromkeys(labels, wave), labels=labels))
+    for name in (NAMES[0], NAMES[7], *long):
+        assert draw(FitCurves(T, (replace(FIT, label=name),) * 2), "s", "svg")
+    assert draw(bound(BoundPanel(W, 0.008 * G, G, names=" → ".join(long))))
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_no_text_of_a_figure_is_a_formula(name, page):
+    texts = [text for text in page(CURVES[name]).findobj(Text) if text.get_text()]
+    assert not [text.get_text() for text in texts if text.get_parse_math() or "$" in text.get_text()]
+
+
 @pytest.mark.parametrize("name", CURVES)
 def test_no_curve_lies_under_a_legend(name, page):
     figure = page(CURVES[name])
@@ -306,7 +327,7 @@ def test_a_spectrum_of_no_lines_is_an_empty_page():
 
 def test_entries_that_coincide_share_a_curve_and_rounding_has_none(page):
     above, _ = page(CURVES["matrix of one direction"]).axes
-    assert list(lines_by_label(above)) == [r"$|\Phi_{11}|$ = $|\Phi_{22}|$"]
+    assert list(lines_by_label(above)) == ["|Φ₁₁| = |Φ₂₂|"]
     assert [axes.get_xscale() for axes in page(CURVES["matrix"]).axes] == ["log", "log"]
 
 

@@ -119,7 +119,7 @@ def test_moments_are_drawn_over_the_parameter_with_infeasible_points_marked(page
     assert [name for name, _ in sweep_figures(given)] == ["curves", "moments"]
     axes = pages(given, tmp_path)[-1].axes[0]
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["$R_{11}$", "$R_{12}$", "$R_{22}$", "trace $R$"]
+    assert labels == ["R₁₁", "R₁₂", "R₂₂", "trace R"]
     assert axes.get_yscale() == "log"
     assert [list(line.get_xdata()) for line in axes.lines if line.get_marker() == "x"] == [[1.0]]
 
@@ -134,7 +134,7 @@ def test_of_large_moments_the_diagonal_is_drawn(pages, tmp_path):
     entries = [(f"R_{i}_{j}", [1.0, 2.0]) for i in range(1, 5) for j in range(i, 5)]
     axes = pages(moments_table(["0", "1"], entries, [4.0, 8.0]), tmp_path)[-1].axes[0]
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["$R_{1,1}$", "$R_{2,2}$", "$R_{3,3}$", "$R_{4,4}$", "trace $R$"]
+    assert labels == ["R₁₁", "R₂₂", "R₃₃", "R₄₄", "trace R"]
 
 
 def test_three_keys_have_a_panel_for_each_value_of_the_third_and_the_best_point_is_named(pages, tmp_path):

@@ -196,13 +196,15 @@ def test_signals_are_those_of_the_equations_sample_by_sample(experiment):
 
 def test_responses_are_those_of_matrix_algebra(experiment):
     w = np.array([0.3, 1.0, 2.5])
-    t, model = experiment.loop.responses(w), experiment.model
+    model = experiment.model
+    y_r, u_r = experiment.loop.excited(w)
+    y_e, u_e = experiment.loop.disturbed(w)
     G, K = np.zeros((3, 2, 3), dtype=complex), experiment.loop.controller.at(w)
     for (i, j), (A, B, C, D) in sampled(model).items():
         for at, z in enumerate(np.exp(1j * w)):
             G[at, i, j] = (C @ np.linalg.solve(z * np.eye(len(A)) - A, B) + D).item()
     inner, outer = np.linalg.inv(np.eye(3) + K @ G), np.linalg.inv(np.eye(2) + G @ K)
-    for found, expected in ((t.y_x, G @ inner), (t.u_x, inner), (t.y_e, outer), (t.u_e, -K @ outer)):
+    for found, expected in ((y_r, G @ inner), (u_r, inner), (y_e, outer), (u_e, -K @ outer)):
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
 
 

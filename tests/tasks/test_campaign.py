@@ -117,6 +117,11 @@ def test_a_plan_is_the_ordinary_design_with_the_data_as_prior():
         )
     )
     assert np.allclose(by_hand.signal, plan.record)
+    # What is kept of the plan is what the result says, with its bound.
+    told, kept = by_hand.result, plan.claim()
+    assert kept["objective"]["lower_bound"] == pytest.approx(told["objective"]["lower_bound"], rel=1e-9)
+    assert kept["objective"]["lower_bound"] <= kept["objective"]["value"] * (1 + 1e-9)
+    assert kept["spectrum"]["coefficients"] == pytest.approx(told["spectrum"]["coefficients"], rel=1e-9)
     # The ratio is what the design says of the prior alone.
     question = at.question(model, known.information)
     assert ratio_of(question, question.information) == pytest.approx(known.ratio)
@@ -154,6 +159,36 @@ def test_a_plan_beyond_the_cap_is_longer_and_at_last_weaker():
     assert len(weaker.record) == 600 - 60
     assert weaker.cost == pytest.approx(0.05 * free.cost)
     assert not at.plan(rules, known, 60, 5, 10 * free.cost).capped
+
+
+COLOURED = """
+plant: {B: [0, 3.6], F: [1, -0.7]}
+noise: {C: [1, -0.9], variance: 1.0}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.1}, standard_deviation: {c1: 0.03}}
+spectrum: {type: fir, order: 4}
+signal: {candidates: 1}
+campaign: {stages: [100, 200], max_samples: 500}
+"""
+
+
+def test_where_no_power_is_enough_the_campaign_goes_on():
+    """var c1 = (1 - c1^2) / N by the noise alone: with c1 = 0 it takes 1111 samples, whatever is applied."""
+    at, rules = planner(COLOURED), build_rules(parse_spec(COLOURED))
+    first = at.plan(rules, None, 0, 5, None)
+    assert first.kind == "nominal"
+    model = at.nominal.model.at(np.array([3.6, 0.0, -0.7]), np.array([[1.0]]))
+    u, y = record(100)
+    known = standing(at, model, lambda m: information_of_data(m, u, y), at.nominal.model)
+    plan = at.plan(rules, known, 100, 5, first.cost)
+    assert (plan.kind, plan.claim, plan.take) == ("stopgap", None, 200)
+    assert "no power is enough" in plan.why
+    assert plan.cost == pytest.approx(first.cost)
+    assert np.mean(plan.record**2) == pytest.approx(first.cost, rel=1e-9)  # the power of the input is paid
+    half = at.plan(
+        build_rules(parse_spec(COLOURED, overrides=["campaign.power_cap=0.5"])), known, 100, 5, 2.0
+    )
+    assert half.cost == pytest.approx(1.0)
 
 
 def test_an_unstable_estimate_is_shrunk_to_the_last_stable_one():

@@ -123,6 +123,8 @@ def test_what_cannot_be_drawn_is_said(text, stated, code, key):
         ("scenarios: [{b1: 3}], risk: 0.1", "conflicting-keys"),
         (f"covariance: {COVARIANCE}, scenarios: 10, risk: 0.1", "conflicting-keys"),
         ("covariance: [[1, 2], [2, 1]]", "not-positive-definite"),
+        ("covariance: [[1, 1], [1, 1]]", "not-positive-definite"),
+        ("scenarios: [{F: [1, -0.5, 0.2]}]", "not-a-number"),
         ("intervals: {b1: [4, 3]}", "bad-interval"),
         (f"covariance: {COVARIANCE}, scenarios: 5000", "too-large"),
         (f"covariance: {COVARIANCE}, discard: 0.7", "out-of-range"),

@@ -157,6 +157,40 @@ def test_power_at_the_pole_is_refused_in_open_loop(change):
     assert "of k" in found.message
 
 
+WEAK = """
+noise: {variance: 0.04}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.2, band: [0.01, 1]}}
+spectrum: {type: fir, order: 2}
+solver: {any_spectrum: false}
+signal: {samples: 100, seed: 1, candidates: 1}
+"""
+HIDDEN = [
+    "{parameters: {k: 0.1, a: 0.2}, sample: zoh, state_space: {A: [[-a, 0], [0, 0]], "
+    "B: [[k], [k*%s]], C: [[1, 1]]}}",
+    "{parameters: {k: 1, T: 5}, sample: zoh, continuous: {numerator: [k*(1 + %s*T), k*%s], "
+    "denominator: [[T, 1], [1, 0]]}}",
+    "{parameters: {k: 0.1, f: -0.8}, B: [0, k*(1 + %s), -k*(1 - f*%s)], F: [1, f - 1, -f]}",
+]
+
+
+@pytest.mark.parametrize("plant", HIDDEN, ids=["states", "in s", "in q^-1"])
+@pytest.mark.parametrize("share", ["1", "1e-3", "1e-5", "1e-8"])
+def test_an_integrator_however_weak_has_no_finite_information(plant, share):
+    """The derivative with respect to k has the residue k * share at frequency zero."""
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(f"plant: {plant.replace('%s', share)}{WEAK}"))
+    (found,) = caught.value.diagnostics
+    assert found.code == "infinite-information"
+    assert "end of k" in found.message
+
+
+def test_an_integrator_that_no_input_reaches_tells_nothing():
+    plain = "{parameters: {k: 0.1, a: 0.2}, sample: zoh, state_space: {A: [[-a]], B: [[k]], C: [[1]]}}"
+    costs = [solve(parse_spec(f"plant: {p}{WEAK}")).result["cost"] for p in (HIDDEN[0] % "0", plain)]
+    assert costs[0] == pytest.approx(costs[1], rel=1e-6)
+
+
 def test_a_band_without_the_pole_will_do():
     text = f"plant: {IN_WORDS[0]}{TANK}limits: {{band: [0.02, 1.5]}}\n"
     white = ["spectrum={type: white}", "solver.tolerance=1e-9"]  # one unknown is told to about 1e-10

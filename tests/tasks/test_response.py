@@ -199,7 +199,7 @@ def test_lines_that_tell_nonlinearity_stay_silent():
         ({"experiment.controller": {"numerator": [0.1], "denominator": [1]}}, "not-supported", "controller"),
         ({"noise.drift": True}, "not-supported", "drift"),
         ({"spectrum": {"type": "fir"}}, "not-supported", "spectrum"),
-        ({"limits.amplitude": 1.0}, "not-supported", "amplitude"),
+        ({"limits.energy": 1.0}, "not-supported", "energy"),
         ({"signal.hold": 2}, "not-supported", "hold"),
         ({"accuracy.model_error": {"relative": 0.1}}, "not-supported", "model_error"),
         ({"accuracy.frequency_response.lines": 500}, "too-few-lines", "lines"),

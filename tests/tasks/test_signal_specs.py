@@ -92,7 +92,8 @@ def test_a_converter_of_too_small_a_range_is_named():
 def test_limits_that_no_length_makes_up_for():
     with pytest.raises(InfeasibleError) as error:
         solve(parse_spec(BASE + "limits: {rate: 0.003}\nsignal: {candidates: 1}\n"))
-    assert "would be needed" in error.value.diagnostics[0].hint
+    assert error.value.diagnostics[0].code == "infeasible"  # by the power of the moves
+    assert "samples a spectrum can" in error.value.diagnostics[0].hint
 
 
 def test_the_shortest_experiment_delivers_the_longer_record():

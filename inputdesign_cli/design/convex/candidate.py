@@ -42,7 +42,7 @@ def candidate_at(problem: Problem, z: Array, s: float) -> Candidate:
     informations = problem.fixed_information + problem.excited(z)
     if problem.scaled:
         informations = informations + s * problem.scaled_information
-    return Candidate(z, s, informations, s if problem.scaled else problem.price.at(z))
+    return Candidate(z, s, informations, s if problem.scaled else problem.cost_at(z))
 
 
 def least_scale(problem: Problem, z: Array) -> float:

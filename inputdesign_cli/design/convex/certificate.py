@@ -7,18 +7,21 @@ for the goal "cost",
 
     cost(z) >= t (sum r - sum_s tr(Y_s M0_s) + sum_lower w b) - sum_upper w b
 
+(where the largest of several costs is paid, a mean of them with weights mu >= 0 of the sum one stands for the
+cost, which is no less)
+
 and for the goals with s, from 0 <= sum_upper w (s b - a(z)) + t (tr(Y M') - r ...) and cost = 0, with the
 sum over the scenarios understood,
 
     s >= t (sum r - tr(Y M_fixed)) / (sum_upper w b - t sum_lower w b + t tr(Y M_scaled) - t sum_side r).
 
-The multipliers of the solver only suggest Y and w; the bounds hold whatever they are.
+The multipliers of the solver only suggest Y, w and mu; the bounds hold whatever they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +30,13 @@ from inputdesign_cli.design.convex.gradients import weighty_ones
 from inputdesign_cli.design.convex.master import Proof, Row
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Functional
+from inputdesign_cli.spectrum import Functional, weighted_mean
 
 # Every upper limit keeps a share of the weight of all, so that no spectrum is free of charge: what it costs
 # the bound is that share. A limit that hardly matters has a weight below the accuracy of the solver, and
 # what only it prices would then set the scale: the largest share is tried last.
 _LEAST_SHARES = (1e-9, 1e-8, 5e-8, 2e-7, 1e-6)
+_TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,8 @@ class Certificate:
 
     `weights` Y_s (S, k, k) and `limits` (a weight for each power limit) are scaled such that
     price - value >= 0 on the cone of spectra, with the functionals of the module's text; `directions` are
-    the spectra for which that is tightest (see `spectrum.Pricing`).
+    the spectra for which that is tightest (see `spectrum.Pricing`). `costs` are the weights of the costs of
+    which the largest is paid.
     """
 
     bound: float
@@ -50,6 +55,14 @@ class Certificate:
     limits: Array
     price: Functional | None = None
     value: Functional | None = None
+    costs: Array = field(default_factory=lambda: np.ones(1))
+
+    @property
+    def shares(self) -> Array:
+        """(S,): the part that each scenario takes in the proof, by what it requires or by what it costs."""
+        required = np.trace(self.weights, axis1=1, axis2=2)
+        shares = required / max(float(required.sum()), _TINY)
+        return np.maximum(shares, self.costs) if self.costs.size > 1 else shares
 
 
 def certify(problem: Problem, proof: Proof, rows: Sequence[Row] = ()) -> Certificate:
@@ -84,7 +97,7 @@ def _certified(
     required = sum(cut.level for cut in proof.cuts if not cut.side)
     scaled_required = sum(cut.level for cut in proof.cuts if cut.side)
     of_rows = proof.rows if problem.goal == "cost" else _kept(rows, proof.rows, share)
-    price: Functional | None = problem.price if problem.goal == "cost" else None
+    price = weighted_mean(problem.costs, proof.costs) if problem.goal == "cost" else None
     upper = lower = fixed_lower = 0.0
     for row, w in zip(rows, of_rows, strict=True):
         if w == 0.0:
@@ -100,7 +113,10 @@ def _certified(
                 fixed_lower += w * row.bound
     if price is None:
         raise ValueError("a goal with s needs an upper limit")
-    pricing = problem.basis.price(price, value, problem.gradients.grid_of(weighty_ones(weights)))
+    # Of several costs each is that of a plant; their densities are looked at where they may change fast.
+    paid = np.flatnonzero(proof.costs) if proof.costs.size > 1 else np.zeros(0, dtype=int)
+    grid = problem.gradients.grid_of(sorted({*weighty_ones(weights), *paid.tolist()}))
+    pricing = problem.basis.price(price, value, grid)
     gain = required - float(np.sum(weights * problem.fixed_information)) + fixed_lower
     t = pricing.scale if gain > 0 and np.isfinite(pricing.scale) else 0.0
     if problem.goal == "cost":
@@ -122,6 +138,7 @@ def _certified(
         limits=shares,
         price=price * unit,
         value=value * (t * unit),
+        costs=proof.costs,
     )
 
 

@@ -120,5 +120,5 @@ def _stated(question: Question, experiment: Experiment) -> Problem:
         limits=(*question.limits, *implied, *everywhere),
         densities=densities,
         goal=question.goal,
-        mean_cost=question.mean_cost,
+        paid=question.paid,
     )

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
 from inputdesign_cli.information import PowerKind
 
 Weight = float | tuple[float, ...]
+# The plants whose powers are paid for: the nominal one, all of them evenly, or the dearest.
+Paid = Literal["nominal", "mean", "worst"]
+
+
+def paid_for(paid: Paid, costs: Sequence[float]) -> float:
+    """What a design costs whose powers cost so much at each of the plants that are looked at."""
+    return max(costs) if paid == "worst" else sum(costs) / len(costs)
 
 
 def weights_of(cost: Mapping[PowerKind, Weight]) -> list[tuple[PowerKind, int | None, float]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import heapq
+import operator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -89,6 +91,13 @@ class Demands:
             for requirement in listed
         )
 
+    def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
+        """Whether just this is asked of the same nominal plant, and the rest of the same other plants."""
+        nominal, *known = self.scenarios
+        same = len(known) == len(others) and all(map(operator.is_, known, others))
+        alike = nominal.requirements is asked.requirements and nominal.side is asked.side
+        return same and alike and nominal.experiment is asked.experiment
+
     @property
     def criterion(self) -> Criterion | None:
         """The criterion of the nominal plant that is to be maximised, if that is the goal."""
@@ -120,7 +129,9 @@ class Demands:
         if len(self.scenarios) == 1:
             return list(self._violated(0, informations[0], above, side))
         found, bad = list[tuple[int, Violation]](), 0
-        for number in self._by_most(informations, above, side):
+        for number in self._by_most(informations, side):
+            if not self._seen[int(side)].ratios[number] > above:
+                break
             own = list(self._violated(number, informations[number], above, side))
             found += own
             bad += bool(own)
@@ -131,21 +142,29 @@ class Demands:
     def largest(self, informations: NDArray[np.float64], *, default: float) -> float:
         """The largest ratio of the requirements, side ones left out; the default without any."""
         found: list[float] = []
-        for number in self._by_most(informations, -np.inf, False) if len(self.scenarios) > 1 else [0]:
+        for number in self._by_most(informations, False) if len(self.scenarios) > 1 else [0]:
             if found and self._seen[0].ratios[number] <= max(found):
                 break  # the next ones are no larger
             found += [v.ratio for _, v in self._violated(number, informations[number], -np.inf, False)]
         return max(found, default=default)
 
-    def _by_most(self, informations: NDArray[np.float64], above: float, side: bool) -> list[int]:
-        """The scenarios whose ratios may exceed `above`, those that may have the largest first."""
+    def _by_most(self, informations: NDArray[np.float64], side: bool) -> Iterator[int]:
+        """The scenarios, those that may have the largest ratios first; what they may have at most is noted.
+
+        A scenario is looked at when no other may have more, so that most of them never are.
+        """
         seen = self._seen[int(side)]
-        for number in np.flatnonzero(seen.most(informations) > above).tolist():
+        waiting = [(-most, number, False) for number, most in enumerate(seen.most(informations).tolist())]
+        heapq.heapify(waiting)
+        while waiting:
+            _, number, looked_at = heapq.heappop(waiting)
+            if looked_at:
+                yield number
+                continue
             asked = [self.asked[index] for index in self._asked_of[number]]
-            most = [a.requirement.most(informations[number]) for a in asked if a.side == side]
-            seen.note(number, informations[number], max(most, default=0.0))
-        now = seen.most(informations)
-        return [n for n in np.argsort(-now, kind="stable").tolist() if now[n] > above]
+            own = [a.requirement.most(informations[number]) for a in asked if a.side == side]
+            seen.note(number, informations[number], max(own, default=0.0))
+            heapq.heappush(waiting, (-float(seen.ratios[number]), number, True))
 
     def _violated(
         self, number: int, information: Array, above: float, side: bool

@@ -79,8 +79,9 @@ def solve_design(
     question = replace(question, basis=question.basis.in_units(np.sqrt(powers)))
     start = question.basis.spread(powers)
     whitened = whitened_problem(question, powers)
+    whitened = replace(whitened, seen=whitened.demands)
     problem = suited(whitened, question, start)
-    flat = replace(problem.on(flat_basis(problem.experiment)), mean_cost=False)
+    flat = replace(problem.on(flat_basis(problem.experiment)), paid="nominal")
     if question.others and _begins_flat(question.basis):
         flat = replace(flat, finer=problem)
     white = _white(question, flat, power)

@@ -40,4 +40,4 @@ def without_faint_lines(problem: Problem, found: ExchangeResult) -> ExchangeResu
     if problem.scaled:
         return replace(found, x=x)
     x *= 1.0 + 2.0 * lost[faint][-1]
-    return replace(found, x=x, objective=at.price.at(x), informations=at.informations(x))
+    return replace(found, x=x, objective=at.cost_at(x), informations=at.informations(x))

@@ -14,11 +14,11 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 @dataclass(frozen=True)
 class PowerLimit:
-    """A power of input, output or excitation is at most (`upper`) or at least `bound`.
+    """A power of input, output, excitation or moves of the input is at most (`upper`) or at least `bound`.
 
     `channel` counts from 0; None is the sum over the channels. `scenario` is the number of the plant at which
     the power is taken. `implied` says that a limit on single samples
-    stands behind it: |u| <= a leaves u no more power than a^2.
+    stands behind it: |u| <= a leaves u no more power than a^2, moves of at most r leave theirs r^2.
     """
 
     kind: PowerKind
@@ -35,7 +35,14 @@ class PowerLimit:
     @property
     def key(self) -> str:
         """Its name in the spec."""
+        if self.kind == "moves":
+            return "limits.rate"
         return f"limits.amplitude.{self.kind}" if self.implied else f"limits.{self.kind}_power"
+
+    @property
+    def of_samples(self) -> str:
+        """What it bounds of single samples, where it is implied."""
+        return "moves" if self.kind == "moves" else "a peak"
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,16 @@
 """The finite program of one round: a face of the cone of spectra, finitely many cuts and rows.
 
 Unknowns: y (the spectrum on the face), svec(M') of the scenarios that have cuts, s where the goal has one,
-and the auxiliary unknowns of the cuts. Everything is scaled by the best design so far: there each M' is the
-identity and the objective is one, so that whatever is active has multipliers and slacks of order one.
+the largest cost where it is that of several, and the auxiliary unknowns of the cuts. Everything is scaled by
+the best design so far: there each M' is the identity and the objective is one, so that whatever is active has
+multipliers and slacks of order one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ _SOLVER_MARGIN = 1e-2
 _SOLVER_FLOOR = 1e-10
 _SINGULAR = 1e-14
 _AT_ONCE = 256  # basis functions
+# Shares of a cost below this one, of the largest, are those of rounding.
+_NO_SHARE = 1e-9
 # Without a requirement that keeps M definite, weak directions are not blown up beyond this.
 _INDEFINITE = 1e-3
 
@@ -69,11 +72,12 @@ class Proof:
     """What the multipliers of one round suggest, in the problem's own units.
 
     `cuts` holds what each cut implies, whatever the solver did; `rows` (number of rows,) are nonnegative
-    weights of the limits.
+    weights of the limits, `costs` those of the costs of which the largest is paid, with the sum one.
     """
 
     cuts: tuple[Implied, ...]
     rows: Array
+    costs: Array = field(default_factory=lambda: np.ones(1))
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,9 @@ def solve_master(
             feasible where scaling up is no remedy.
     """
     ray = best.z[:, None] / problem.price.at(best.z) if keep else np.zeros((best.z.size, 0))
-    columns = np.concatenate([face.columns, ray], axis=1)
+    several = not problem.scaled and len(problem.costs) > 1
+    largest = np.zeros((best.z.size, int(several)))  # an unknown that excites nothing
+    columns = np.concatenate([face.columns, ray, largest], axis=1)
     inside, number = face.columns.shape[1], columns.shape[1]
     objective, worth = best.objective, problem.price.at(best.z)
     definite = problem.demands.definite
@@ -128,6 +134,11 @@ def solve_master(
         signs = np.eye(number + 1)[inside:]
         cost = np.eye(number + 1)[number]
     limits, limit_offset = _limits(problem, columns, rows, best.s, worth)
+    if several:
+        cost = np.eye(number)[-1]
+        below = cost - worth / objective * np.array([one.vector for one in problem.costs]) @ columns
+        limits = np.concatenate([limits, below])
+        limit_offset = np.concatenate([limit_offset, np.zeros(len(below))])
     program = FiniteProgram(
         cost=cost,
         face=face,
@@ -142,21 +153,29 @@ def solve_master(
     if solution is None:
         return None
     y = worth * _in_cone(face, solution.v[:inside])
-    kept = worth * np.maximum(solution.v[inside:number], 0.0)
+    kept = worth * np.maximum(solution.v[inside : inside + ray.shape[1]], 0.0)
     told = {plant: iter(found) for plant, found in zip(involved, solution.proofs, strict=True)}
     proofs = []
     for placed in cuts:
         turn, (Y, r) = turns[placed.scenario], next(told[placed.scenario])
         proofs.append(Implied(objective * turn.T @ Y @ turn, objective * r, placed.scenario, placed.side))
     scales = np.array([_level(problem, row, best.s) for row in rows])
-    weights = objective * np.maximum(solution.limit_weights, 0.0) / scales
+    weights = objective * np.maximum(solution.limit_weights[: len(rows)], 0.0) / scales
     return MasterSolution(
         y=y,
         z=face.columns @ y + ray @ kept,
         s=best.s * float(solution.v[-1]) if problem.scaled else 1.0,
-        proof=Proof(tuple(proofs), weights),
+        proof=Proof(tuple(proofs), weights, _shares(solution.limit_weights[len(rows) :])),
         converged=solution.converged,
     )
+
+
+def _shares(weights: Array) -> Array:
+    """Of several costs, with the sum one; a single one has it all."""
+    if not weights.size:
+        return np.ones(1)
+    weights = np.where(weights > _NO_SHARE * weights.max(), np.maximum(weights, 0.0), 0.0)
+    return weights / weights.sum() if weights.any() else np.full(weights.size, 1.0 / weights.size)
 
 
 def _turned(

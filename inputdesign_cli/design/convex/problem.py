@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.accuracy import Requirement
-from inputdesign_cli.design.convex.cost import Weight, weights_of
+from inputdesign_cli.design.convex.cost import Paid, Weight, weights_of
 from inputdesign_cli.design.convex.demands import Demands, Scenario
 from inputdesign_cli.design.convex.gradients import Gradients, weighty_ones
 from inputdesign_cli.design.convex.limits import (
@@ -32,7 +32,7 @@ from inputdesign_cli.design.convex.limits import (
 from inputdesign_cli.information import Experiment, PowerKind
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, Functional
+from inputdesign_cli.spectrum import Basis, Functional, weighted_mean
 
 Goal = Literal["cost", "factor", "samples"]
 
@@ -54,13 +54,14 @@ class Problem:
     `requirements` are made for the coordinates of `experiment`, that of the nominal plant. `side`
     requirements (goal "factor") must be met by M(x) itself. `others` are the scenarios besides, of the same
     structure and length: each M_s meets the requirements of its own. A spectrum causes other powers at each
-    of them: limits name theirs, and the cost is that of the nominal plant, or with `mean_cost` the mean over
-    all.
+    of them: limits name theirs, and `paid` says whether the cost is that of the nominal plant, the mean over
+    all, or that of the dearest.
 
     A density limit stands beside a limit on the power of the excitation (`design.limits.implied_power`). With
     `floors_fixed` (goal "factor") lower limits do not scale: the least multiple of the upper limits for which
     they can be met. `finer` is a problem of the same experiment on the same or a larger basis, of whose
-    integrals those of this basis are the head.
+    integrals those of this basis are the head. `seen` are the demands of a like problem, which are those of
+    this one where both ask the same of the same plants.
     """
 
     experiment: Experiment
@@ -73,8 +74,9 @@ class Problem:
     side: tuple[Requirement, ...] = ()
     floors_fixed: bool = False
     others: tuple[Scenario, ...] = field(default=(), repr=False)
-    mean_cost: bool = False
+    paid: Paid = "nominal"
     finer: Problem | None = field(default=None, repr=False)
+    seen: Demands | None = field(default=None, repr=False)
     _before: list[Problem] = field(default_factory=list, init=False, repr=False)
 
     @cached_property
@@ -82,7 +84,10 @@ class Problem:
         """What is required at all S plants, the nominal one first."""
         if self._before:  # with what has been seen of them
             return self._before[0].demands
-        return Demands((Scenario(self.experiment, self.requirements, self.side), *self.others))
+        asked = Scenario(self.experiment, self.requirements, self.side)
+        if self.seen is not None and self.seen.are_of(asked, self.others):
+            return self.seen
+        return Demands((asked, *self.others))
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
@@ -112,8 +117,8 @@ class Problem:
         _ = grown.demands, grown.gradients, grown.information_maps
         for key in self._powers:
             grown.power(*key)
-        if self.mean_cost and self.others:
-            _ = grown._mean_price
+        for number in self._costs:
+            grown._cost_of(number)
         grown._before.clear()
         return grown
 
@@ -199,38 +204,61 @@ class Problem:
 
     @cached_property
     def price(self) -> Functional:
-        """What x is measured by: the cost, or without one the sum of all powers over their upper limits."""
+        """What x is measured by: the mean of the costs, or where none is sought powers over limits."""
         if self.goal == "cost":
-            if self.mean_cost and self.others:
-                return self._mean_price
-            parts = [self.power(kind, channel) * weight for kind, channel, weight in weights_of(self.cost)]
-        else:
-            caps = [limit for limit in self.limits if limit.upper]
-            parts = [self._limited(limit) * (1.0 / limit.bound) for limit in caps]
-        total = parts[0]
-        for part in parts[1:]:
-            total = total + part
-        return total
+            return self.costs[0] if len(self.costs) == 1 else self._mean(self.costs)
+        parts = [self._limited(limit) * (1.0 / limit.bound) for limit in self.limits if limit.upper]
+        return sum(parts[1:], start=parts[0])
 
     @cached_property
-    def _mean_price(self) -> Functional:
-        """The mean of the cost over all plants."""
-        weights, plants = weights_of(self.cost), [scenario.experiment for scenario in self.scenarios]
-        last: list[tuple[Array, NDArray]] = []
+    def costs(self) -> tuple[Functional, ...]:
+        """What a design costs is the largest of these (goal "cost")."""
+        weights = weights_of(self.cost)
+        if self.paid == "nominal" or not self._others_pay:
+            parts = [self.power(kind, channel) * weight for kind, channel, weight in weights]
+            return (sum(parts[1:], start=parts[0]),)
+        each = tuple(self._cost_of(number) for number in self.paying)
+        return each if self.paid == "worst" else (self._mean(each),)
+
+    @property
+    def _others_pay(self) -> bool:
+        """Whether there are other plants at which the cost may be another."""
+        kinds = (kind for kind, _, _ in weights_of(self.cost))
+        return bool(self.others) and any(self.experiment.depends_on_plant(kind) for kind in kinds)
+
+    @staticmethod
+    def _mean(costs: tuple[Functional, ...]) -> Functional:
+        return weighted_mean(costs, np.full(len(costs), 1.0 / len(costs)))
+
+    @property
+    def paying(self) -> range:
+        """The numbers of the scenarios whose powers are paid for."""
+        return range(1 if self.paid == "nominal" else len(self.scenarios))
+
+    def cost_at(self, x: Array) -> float:
+        """What a spectrum costs (goal "cost")."""
+        return max(cost.at(x) for cost in self.costs)
+
+    def _cost_of(self, scenario: int) -> Functional:
+        """The cost at one plant."""
+        known = self._costs.get(scenario)
+        if known is not None:
+            return known
+        plant, weights = self.scenarios[scenario].experiment, weights_of(self.cost)
 
         def density(w: Array) -> NDArray:
-            if not last or last[0][0] is not w:
-                total = sum(plant.cost_density(weights, w) for plant in plants)
-                last[:] = [(w, np.asarray(total / len(plants)))]
-            return last[0][1]
+            return plant.cost_density(weights, w)
 
-        def vector(basis: Basis) -> Array:
-            each = (
-                basis.integrals(partial(plant.cost_density, weights), plant.singularities) for plant in plants
-            )
-            return np.asarray(sum(each) / len(plants))
+        vector = self._along(
+            lambda problem: problem._cost_of(scenario).vector,
+            lambda basis: basis.integrals(density, plant.singularities),
+        )
+        self._costs[scenario] = Functional(vector, density)
+        return self._costs[scenario]
 
-        return Functional(self._along(lambda problem: problem._mean_price.vector, vector), density)
+    @cached_property
+    def _costs(self) -> dict[int, Functional]:
+        return {}
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
         """The power of input, output or excitation (of one channel) as a functional of the spectrum."""

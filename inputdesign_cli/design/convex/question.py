@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from inputdesign_cli.accuracy.calibration import with_alpha
-from inputdesign_cli.design.convex.cost import Weight
+from inputdesign_cli.design.convex.cost import Paid, Weight
 from inputdesign_cli.design.convex.demands import RequirementFactory, Scenario
 from inputdesign_cli.design.convex.limits import DensityLimit, PowerLimit
 from inputdesign_cli.design.convex.problem import Goal
@@ -34,7 +34,7 @@ class Question:
 
     `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
     `side` must hold besides. The other goals meet all of them. All of that is asked of the nominal plant,
-    that of `experiment`, and of each of the `others`; `mean_cost` as in `Problem`.
+    that of `experiment`, and of each of the `others`; `paid` as in `Problem`.
     """
 
     experiment: Experiment
@@ -46,7 +46,7 @@ class Question:
     limits: Sequence[PowerLimit] = ()
     densities: Sequence[DensityLimit] = ()
     others: Sequence[Alternative] = ()
-    mean_cost: bool = False
+    paid: Paid = "nominal"
 
     @property
     def plants(self) -> list[Alternative]:

@@ -111,10 +111,10 @@ class State:
     def _misses(self, z: Array, s: float) -> tuple[list[tuple[int, Violation]], list[DensityBreach]]:
         problem = self.problem
         informations = candidate_at(problem, z, s).informations
-        found = problem.demands.violations(informations, above=1.0)
+        found = problem.demands.violations(informations, above=1.0, few=FEW)
         if problem.side:
             root = np.sqrt(s)
-            sides = problem.demands.violations(informations, above=1.0 / root, side=True)
+            sides = problem.demands.violations(informations, above=1.0 / root, side=True, few=FEW)
             found += [(i, replace(v, ratio=root * v.ratio)) for i, v in sides]
         return found, problem.density_breaches(z, s, above=1.0)
 
@@ -129,7 +129,7 @@ class State:
         self.idle = idle[kept].tolist()
         self.keys = [self.keys[i] for i in kept]
         self.cuts = [self.cuts[i] for i in kept]
-        self.proof = Proof(tuple(proof.cuts[i] for i in kept), proof.rows)
+        self.proof = replace(proof, cuts=tuple(proof.cuts[i] for i in kept))
 
     def _definite(self, z: Array, s: float) -> tuple[Array, float]:
         """(z, s), or halfway to the best design when z leaves some parameter without information."""

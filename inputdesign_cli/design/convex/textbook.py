@@ -79,7 +79,7 @@ def solve_on_grid(
     for cut, lmi in zip(cuts, lmis, strict=True):
         Y, r = cut.proof([svec(_symmetric(lmi.dual_value))])
         proofs.append(Implied(unit_cost * inverse.T @ Y @ inverse, unit_cost * r))
-    return GridResult(x, problem.price.at(x), certify(problem, Proof(tuple(proofs), np.zeros(0))))
+    return GridResult(x, problem.cost_at(x), certify(problem, Proof(tuple(proofs), np.zeros(0))))
 
 
 def _positive(c, order: int, positivity: str) -> list:

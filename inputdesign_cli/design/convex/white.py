@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.optimize
@@ -19,6 +20,7 @@ _POLISH = 3
 # Logarithms: an excitation so much stronger is as good as any, and a ratio that moves less stands still.
 _PLENTY, _STILL = 46.0, 1e-6
 _FAINT = -650.0  # below, powers underflow
+_SUITED = 8.0  # how far from their own power coordinates serve
 
 
 def least_white_power(experiment: Experiment, factories: Sequence[RequirementFactory]) -> float:
@@ -33,51 +35,70 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
     """
     power = 1.0
     for _ in range(_POLISH):
-        coordinates = experiment.whitened(power)
-        requirements = tuple(make(coordinates) for make in factories)
-        problem = Problem(coordinates, flat_basis(coordinates), {"excitation": 1.0}, requirements)
-
-        def excess(log_power: float, problem: Problem = problem) -> float:
-            seconds_left()
-            informations = problem.informations(np.array([np.exp(log_power)]))
-            return np.log(max(problem.demands.worst_ratio(informations).ratio, 1e-300))
-
-        if np.linalg.matrix_rank(problem.baseline_information) == coordinates.size:
+        trial = _Trial.of(experiment, factories, np.log(power))
+        problem = trial.problem
+        if np.linalg.matrix_rank(problem.baseline_information) == experiment.size:
             without = worst([v for _, v in problem.demands.violations(problem.baselines)])
             if without.ratio <= 1.0:
                 return 0.0
-        lo = hi = np.log(power)
-        hi = _enough(excess, hi)
+        lo, hi, trial = _enough(trial)
         try:
-            while excess(lo) <= 0:
+            while trial.excess(lo) <= 0:
                 lo -= 2.0
                 if lo < _FAINT:
                     return 0.0  # nothing is asked
         except np.linalg.LinAlgError:
             return 0.0  # the noise alone tells what is asked, and nothing of other parameters
-        found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
+        found = float(np.exp(scipy.optimize.brentq(trial.excess, lo, hi, xtol=1e-13, rtol=1e-14)))
         if abs(found - power) <= 1e-3 * power:
             return found
         power = found
     return power
 
 
-def _enough(excess: Callable[[float], float], start: float) -> float:
-    """The logarithm of a power from `start` on at which the excess, the logarithm of a ratio, is gone."""
-    at, found, still = start, excess(start), False
+@dataclass(frozen=True)
+class _Trial:
+    """Flat excitation in coordinates that suit the power whose logarithm is `at`."""
+
+    experiment: Experiment
+    factories: Sequence[RequirementFactory]
+    at: float
+    problem: Problem
+
+    @classmethod
+    def of(cls, experiment: Experiment, factories: Sequence[RequirementFactory], at: float) -> _Trial:
+        coordinates = experiment.whitened(float(np.exp(at)))
+        requirements = tuple(make(coordinates) for make in factories)
+        flat = Problem(coordinates, flat_basis(coordinates), {"excitation": 1.0}, requirements)
+        return cls(experiment, factories, at, flat)
+
+    def near(self, at: float) -> _Trial:
+        """The same, in other coordinates where what only the noise tells would be lost in these."""
+        return self if abs(at - self.at) <= _SUITED else _Trial.of(self.experiment, self.factories, at)
+
+    def excess(self, log_power: float) -> float:
+        """The logarithm of the worst ratio.
+
+        Raises:
+            OutOfTimeError: see `seconds_left`.
+        """
+        seconds_left()
+        informations = self.problem.informations(np.array([np.exp(log_power)]))
+        return float(np.log(max(self.problem.demands.worst_ratio(informations).ratio, 1e-300)))
+
+
+def _enough(trial: _Trial) -> tuple[float, float, _Trial]:
+    """Logarithms of two powers, from that of the trial on, at the second of which the excess is gone."""
+    start = before = at = trial.at
+    found = trial.excess(at)
     while found > 0.0:
-        at += 2.0
-        try:
-            later = excess(at)
-        except np.linalg.LinAlgError:
-            if still:
-                raise _out_of_reach(found) from None
-            raise
-        still = found - later < _STILL
-        if still and at > start + _PLENTY:
+        before, at = at, at + 2.0
+        trial = trial.near(at)
+        later = trial.excess(at)
+        if found - later < _STILL and at > start + _PLENTY:
             raise _out_of_reach(found)
         found = later
-    return at
+    return before, at, trial
 
 
 def _out_of_reach(excess: float) -> InfeasibleError:

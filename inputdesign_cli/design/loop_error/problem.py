@@ -28,9 +28,9 @@ _WHITE = Rational(np.ones(1))
 
 @dataclass(frozen=True)
 class PowerLimit:
-    """mean tr(M Phi) <= most, M of one input or output, or of all of them (channel None)."""
+    """mean tr(M Phi) <= most, M of one input or output, of its moves, or of all of them (channel None)."""
 
-    kind: Literal["input", "output"]
+    kind: Literal["input", "output", "moves"]
     most: float
     channel: int | None = None
 
@@ -44,13 +44,19 @@ class PowerLimit:
         """Of what the inputs cause at the outputs."""
         return cls("output", most, channel)
 
-    def metric(self, G: ComplexArray) -> ComplexArray:
-        """M (K, n, n)."""
-        size = G.shape[2] if self.kind == "input" else G.shape[1]
+    @classmethod
+    def of_moves(cls, most: float, channel: int | None = None) -> PowerLimit:
+        """Of the moves of the inputs from sample to sample."""
+        return cls("moves", most, channel)
+
+    def metric(self, w: ArrayLike, G: ComplexArray) -> ComplexArray:
+        """M (K, n, n), G that of the plant at the frequencies."""
+        size = G.shape[1] if self.kind == "output" else G.shape[2]
         picked = np.eye(size) if self.channel is None else np.diag(np.eye(size)[self.channel])
-        if self.kind == "input":
-            return np.broadcast_to(picked.astype(complex), (G.shape[0], size, size))
-        return np.asarray(adjoint(G) @ picked @ G)
+        if self.kind == "output":
+            return np.asarray(adjoint(G) @ picked @ G)
+        share = np.abs(1.0 - np.exp(-1j * np.atleast_1d(w))) ** 2 if self.kind == "moves" else np.ones(len(G))
+        return np.asarray(share[:, None, None] * picked.astype(complex))
 
 
 @dataclass(frozen=True)
@@ -89,7 +95,7 @@ class LoopErrorProblem:
     def metrics(self, w: ArrayLike) -> ComplexArray:
         """M_i (p, K, n, n) of the limits."""
         G = self.plant.plant_at(w)
-        return np.array([limit.metric(G) for limit in self.limits])
+        return np.array([limit.metric(w, G) for limit in self.limits])
 
     @cached_property
     def most(self) -> Array:

@@ -129,8 +129,11 @@ class Limits(Section):
     def bounds_power(self) -> bool:
         """Whether some limit bounds the power of the excitation, so that the best experiment exists."""
         powers = (self.input_power, self.output_power, self.excitation_power, self.spectrum)
-        sampled = self.amplitude is not None and self.amplitude.input is not None
-        return sampled or self.energy is not None or any(p is not None and p.max is not None for p in powers)
+        return (
+            self.amplitude is not None
+            or self.energy is not None
+            or any(p is not None and p.max is not None for p in powers)
+        )
 
 
 def _some(limit: Section, first: str, second: str, example: str) -> Iterator[PathDiagnostic]:

@@ -30,7 +30,7 @@ CovarianceSource = Annotated[
     Discriminator(lambda value: TAG + ("file" if isinstance(value, str) else "matrix")),
 ]
 SOURCES = ("covariance", "information", "intervals")
-_OF_DRAWS = ("risk", "discard", "seed", "stable_within")
+_OF_DRAWS = ("risk", "discard", "seed", "stable_within", "worst_case")
 
 
 def _rising(ends: tuple[float, float]) -> tuple[float, float]:
@@ -84,6 +84,11 @@ class Uncertainty(Section):
     discard: Annotated[NonNegative, Field(lt=0.5)] = Field(
         default=0.0, description="Share of the drawn plants that the design may leave out, the dearest."
     )
+    worst_case: Fraction | None = Field(
+        default=None,
+        description="Confidence of the ellipsoid (of intervals: all of them) in which the worst plant is "
+        "searched and added to those that are served, until none is found to be missed. Never proved.",
+    )
     seed: Index = Field(default=1, description="Seed of the draws.")
     stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = Field(
         default=None,
@@ -97,13 +102,13 @@ class Uncertainty(Section):
     floor: Annotated[NonNegative, Field(lt=1)] = Field(
         default=0.1, description="Least admissible error of a plant, as a share of that of the nominal plant."
     )
-    cost: Literal["nominal", "mean"] | None = Field(
+    cost: Literal["nominal", "mean", "worst"] | None = Field(
         default=None,
-        description="The powers that are paid for: of the nominal plant, or their mean over all (default in "
-        "closed loop).",
+        description="The powers that are paid for: of the nominal plant, their mean over all (default in "
+        "closed loop), or those of the plant where they cost most.",
     )
     fresh: Annotated[Index, SIZES["uncertainty.fresh"]] = Field(
-        default=1000, description="Plants drawn afresh that the finished design is tried on."
+        default=3000, description="Plants drawn afresh that the finished design is tried on."
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
@@ -124,6 +129,9 @@ class Uncertainty(Section):
         yield from self.at_most_one(*SOURCES)
         if not listed:
             yield from self.at_most_one("scenarios", "risk")
+        if self.worst_case is not None and self.discard:
+            message = "{key} leaves plants out, and worst_case adds the worst ones"
+            yield PathDiagnostic("conflicting-keys", message, "remove one of the two", ("discard",))
         for key in ("covariance", "information"):
             matrix = self.covariance if key == "covariance" else self.information
             if isinstance(matrix, tuple):

@@ -10,23 +10,28 @@ from functools import cached_property
 
 import numpy as np
 
+from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.signal import DesignedSpectrum
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.specification.models.uncertainty import SOURCES
+from inputdesign_cli.spectrum import FlatBasis
+from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.identification import ask, restated
 from inputdesign_cli.tasks.build.system import build_experiment, build_loop, record_step
 from inputdesign_cli.tasks.build.uncertainty import farthest_radius
 from inputdesign_cli.tasks.campaign import REACHED, Kind, Planned, Rules, Standing
+from inputdesign_cli.tasks.given import GivenExcitation
 from inputdesign_cli.tasks.identification import ModelQuestion
-from inputdesign_cli.tasks.record import RecordRequest, design_cost
+from inputdesign_cli.tasks.record import RecordRequest, design_cost, given_record
 from inputdesign_cli.tasks.record_search import fitting_record
-from inputdesign_cli.tasks.result.design import Designed
+from inputdesign_cli.tasks.result.design import Designed, design_result
 
 # A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
 _CLOSE, _MOSTLY = 1.1, 0.5
@@ -88,7 +93,14 @@ class SpecPlanner:
         changes = self._changes(known, rest, seed, white=rules.white, goes_on=on)
         if known is None and rules.robust_last:
             del changes["uncertainty"]  # what the spec knows of the plant
-        return self._affordable(changes, known, cap, longest).cut(take)
+        try:
+            return self._affordable(changes, known, cap, longest).cut(take)
+        except IdesignError as error:
+            if known is None:
+                raise
+            # The estimate may be far off, and the next part will tell: nothing is decided by it.
+            cost = np.inf if first is None else min(cap, first)
+            return self._stopgap(rules, cost, rest, seed, error).cut(take)
 
     def cheapest(self, model: Model) -> float:
         """Cost, summed over the samples, of the design that knows the plant: the oracle."""
@@ -137,9 +149,9 @@ class SpecPlanner:
 
     def _designed(self, changes: Mapping[str, Json], known: Standing | None) -> _Found:
         task = build_convex(self._spec({**changes, "solver.any_spectrum": False}, known))
-        done, _ = task.designed()
+        done, how = task.designed()
         kind: Kind = "white" if "spectrum" in changes else "nominal" if task.plants is None else "robust"
-        return _Found(task.record, done, kind)
+        return _Found(task.record, done, how, task.tolerance, kind)
 
     def _pilot(self, power: float, take: int, seed: int) -> Planned:
         """White noise of this power, even over the inputs."""
@@ -148,6 +160,20 @@ class SpecPlanner:
         drawn = Redrawn.flat("pilot", "white", powers, nominal.band, take, step)
         record = drawn.draw(1, take, np.random.default_rng(seed))[0]
         return Planned(record, take, _power(record), 0.0, "pilot")
+
+    def _stopgap(self, rules: Rules, cost: float, rest: int, seed: int, why: IdesignError) -> Planned:
+        """White noise, a sample of which costs so much, or as the pilot where nothing else was applied."""
+        task = build_convex(self._spec(self._changes(None, rest, seed), None))
+        unit = weighted_sum(task.cost, GivenExcitation.even(self.nominal, 1.0).power)
+        power = cost / unit if np.isfinite(cost) else rules.pilot_power or 0.0
+        flat = FlatBasis(self.nominal.inputs, self.nominal.band)
+        spectrum = DesignedSpectrum.of(
+            flat, np.array([power]), inputs=self.nominal.inputs, step=task.record.step
+        )
+        record = given_record(task.record, self.nominal, spectrum, lambda information: 0.0)
+        samples = np.zeros((rest, self.nominal.inputs)) if record is None else record.samples
+        cost = power * unit
+        return Planned(samples, rest, _power(samples), cost, "stopgap", why=why.diagnostics[0].message)
 
     def _spec(self, changes: Mapping[str, Json], known: Standing | None) -> Spec:
         spec = self.spec if known is None else restated(self.spec, known.model, _SOURCE)
@@ -201,6 +227,8 @@ class _Found:
 
     request: RecordRequest
     done: Designed
+    how: Mapping[str, Json]
+    tolerance: float
     kind: Kind
 
     @cached_property
@@ -215,7 +243,17 @@ class _Found:
         made = fitting_record(self.request, done.question, done.design, done.experiment.samples).record
         silent = np.zeros((done.experiment.samples, done.experiment.inputs))
         record = silent if made is None else made.samples
-        return Planned(record, len(record), _power(record), self.cost, self.kind)
+        return Planned(record, len(record), _power(record), self.cost, self.kind, claim=self._claim)
+
+    def _claim(self) -> Mapping[str, Json]:
+        """What is proved of the design, evaluated once more by other means.
+
+        Raises:
+            InaccurateError: `internal-disagreement`.
+        """
+        result = design_result(self.done, dict(self.how), self.tolerance)
+        audit(self.done, result, on_grid=False)
+        return {key: result[key] for key in ("status", "objective", "spectrum")}
 
 
 def _power(record: Array) -> float:

@@ -61,7 +61,7 @@ def build_convex(spec: Spec) -> ConvexTask:
         limits=[*build_power_limits(spec), *([] if grid else implied_limits(spec))],
         densities=build_density_limits(spec, experiment),
         others=[] if plants is None else plants.batch.plants,
-        mean_cost=plants is not None and plants.mean_cost,
+        paid="nominal" if plants is None else plants.paid,
     )
     check_every_direction_counts(spec, question)
     alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -19,8 +19,11 @@ from inputdesign_cli.specification.models.spectrum import (
 )
 from inputdesign_cli.tasks.build.header import build_units
 
-_FAR, _CLOSE = 1e-3, 1e-4
-_GROWS = 5.0
+# Poles so near to zero are poles there; those of gradients are of no higher order.
+_AT_ZERO, _HIGHEST = 1e-7, 8
+# On half the distance to the next pole so many points leave the sums exact to rounding.
+_POINTS = 64
+_ROUNDING = 1e-10
 # Of the band, what is left out where nothing else says it.
 _MARGIN = 0.01
 
@@ -76,26 +79,35 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
 
 
 def _wanders(experiment: Experiment) -> bool:
-    """Whether outputs grow without end towards zero, where what they tell does not: where noise drifts."""
-    if experiment.loop is not None or experiment.model.continuous:
+    """Whether outputs grow without end towards zero, where what they tell may not: where noise drifts."""
+    model = experiment.model
+    if experiment.loop is not None or model.continuous:
         return False
-    size = np.abs(experiment.model.plant_at(_beside(experiment))).max(axis=(1, 2))
-    return bool(size[1] > _GROWS * size[0])
-
-
-def _beside(experiment: Experiment) -> Array:
-    """Two frequencies near zero."""
-    source = experiment.model if experiment.loop is None else experiment.loop
-    distance = np.abs(source.singularities)
-    scale = float(np.min(distance[distance > 1e-7], initial=experiment.band[1]))
-    return scale * np.array([_FAR, _CLOSE])
+    return bool(np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None])))
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
     """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero."""
-    size: Array = np.abs(gradient(_beside(experiment))).max(axis=(2, 3))
-    grows = size[1] > _GROWS * size[0]
+    grows = _grows(experiment, gradient)
     return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
+
+
+def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]) -> NDArray[np.bool_]:
+    """(k,): which parts of a response (n, k, ..) grow without end towards zero.
+
+    Its principal part there tells, however small: Cauchy's integrals over a circle in the plane of
+    frequencies that holds no other pole. On the axis a weak pole would be seen from very near only.
+    """
+    source = experiment.model if experiment.loop is None else experiment.loop
+    distance = np.abs(source.singularities)
+    nearest = float(np.min(distance[distance > _AT_ZERO], initial=experiment.band[1]))
+    # Far off the axis late signals differ too much in size.
+    radius = min(0.5 * nearest, 1.0 / max(source.memory, 1.0))
+    turn = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
+    around = response(radius * turn)
+    powers = turn ** np.arange(1, _HIGHEST + 1)[:, None]
+    principal: Array = np.abs(np.tensordot(powers, around, 1)).max(axis=(0, 2, 3)) / _POINTS
+    return np.asarray(principal > _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
 
 
 def _lowest_line(spec: Spec, hi: float) -> float | None:

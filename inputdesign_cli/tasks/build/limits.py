@@ -13,7 +13,7 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.limits import Curve
 from inputdesign_cli.tasks.build.header import build_units
-from inputdesign_cli.tasks.build.signal_settings import stated_peaks
+from inputdesign_cli.tasks.build.signal_settings import stated_moves, stated_peaks
 from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
 from inputdesign_cli.tasks.build.weights import build_weight
 
@@ -46,13 +46,18 @@ def build_power_limits(spec: Spec) -> list[PowerLimit]:
 
 
 def implied_limits(spec: Spec) -> list[PowerLimit]:
-    """What limits on single samples leave of the powers: with |u| <= a an input has no more than a^2."""
-    kinds: list[PowerKind] = ["input", "output"]
+    """What limits on single samples leave of the powers: with |u| <= a an input has no more than a^2.
+
+    Of values that are held over h samples there is one move in h.
+    """
+    kinds: list[PowerKind] = ["input", "output", "moves"]
+    most = [*stated_peaks(spec), stated_moves(spec) if spec.plant.sampled else None]
     return [
         PowerLimit(kind, float(a) ** 2, channel=channel if peak.size > 1 else None, implied=True)
-        for kind, peak in zip(kinds, stated_peaks(spec), strict=True)
+        for kind, peak in zip(kinds, most, strict=True)
         if peak is not None
         for channel, a in enumerate(peak)
+        if np.isfinite(a)
     ]
 
 

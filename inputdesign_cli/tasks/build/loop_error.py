@@ -24,6 +24,7 @@ from inputdesign_cli.specification.models.plant import TruePlant
 from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.signal_settings import build_bounds, stated_moves, stated_peaks
 from inputdesign_cli.tasks.build.system import held_plant, polynomial_model
 from inputdesign_cli.tasks.build.weights import held, rational
 from inputdesign_cli.tasks.loop_error import KEY, LoopErrorTask, LossTrial
@@ -170,6 +171,17 @@ def _limits(spec: Spec) -> tuple[PowerLimit, ...]:
             found += [kind(most, channel) for channel, most in enumerate(limit.max)]
         elif limit.max is not None:
             found.append(kind(limit.max))
+    samples = ((PowerLimit.of_input, stated_peaks(spec)[0]), (PowerLimit.of_moves, stated_moves(spec)))
+    found += [
+        kind(float(most) ** 2, channel)
+        for kind, bounds in samples
+        if bounds is not None
+        for channel, most in enumerate(bounds)
+        if np.isfinite(most)
+    ]
+    if spec.limits.amplitude is not None and spec.limits.amplitude.output is not None:
+        what = "enforce peaks of outputs for closed_loop_error"
+        raise refuse("limits.amplitude.output", what=what, hint="limit output_power")
     return tuple(found)
 
 
@@ -199,6 +211,8 @@ def _signal(spec: Spec, error: ClosedLoopError, inputs: int) -> LoopErrorSignalS
         order=signal.order,
         candidates=signal.candidates or _CANDIDATES,
         seed=signal.seed or 0,
+        amplitude=stated_peaks(spec)[0],
+        rate=build_bounds(spec).rate,
     )
 
 
@@ -222,7 +236,7 @@ def _trial(spec: Spec, problem: LoopErrorProblem) -> LossTrial:
     )
 
 
-_LIMITS = ("amplitude", "rate", "energy", "spectrum")
+_LIMITS = ("energy", "spectrum")
 _SIGNAL_KEYS = ("hold", "lines", "amplitudes", "offset", "ramp", "bits", "quantisation", "scale", "also")
 
 
@@ -231,7 +245,7 @@ def _check_supported(spec: Spec) -> None:
         what = f"handle {name} beside closed_loop_error"
         raise refuse(f"accuracy.{name}", what=what, hint="keep one of them")
     for name in spec.limits.stated(*_LIMITS):
-        what, hint = f"enforce limits.{name} for closed_loop_error", "limit input_power, output_power or band"
+        what, hint = f"enforce limits.{name} for closed_loop_error", "limit powers, amplitude, rate or band"
         raise refuse(f"limits.{name}", what=what, hint=hint)
     spectrum, signal = spec.spectrum, spec.signal
     if spectrum is not None and spectrum.type not in ("pointwise", "free"):

@@ -286,7 +286,7 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
     asked = error.sensitivity
     loop_kept = spec.accuracy.loop
     if loop_kept is not None:
-        given = loop_controller(spec, loop_kept)
+        given = loop_controller(spec, loop_kept, model)
     else:
         given = None if asked is None else asked.controller or spec.experiment.controller
     if asked is None or given is None:

@@ -12,6 +12,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.specification import Spec, load_estimate
 from inputdesign_cli.specification.models.uncertainty import SOURCES, Uncertainty
+from inputdesign_cli.tasks.build.model_error import confidence_factor
 from inputdesign_cli.tasks.build.parameters import check_known, embedded
 from inputdesign_cli.tasks.build.prior import inverse
 from inputdesign_cli.tasks.build.system import read_excitation_record, record_step
@@ -31,6 +32,17 @@ def drawing(spec: Spec, stated: Uncertainty, experiment: Experiment) -> Draw:
         DataError: a record cannot be used.
     """
     return _Source(spec, stated, experiment).drawing()
+
+
+def reach(
+    spec: Spec, stated: Uncertainty, experiment: Experiment, confidence: float
+) -> tuple[str, Array, Array, bool]:
+    """What the draws are from, up to a confidence: in words, centre (k,), columns (k, m), whether a box.
+
+    Raises:
+        SpecError, DataError: see `drawing`.
+    """
+    return _Source(spec, stated, experiment).reach(confidence)
 
 
 @dataclass(frozen=True)
@@ -65,6 +77,23 @@ class _Source(Unsure):
             return theta
 
         return draw
+
+    def reach(self, confidence: float) -> tuple[str, Array, Array, bool]:
+        """The intervals, or the ellipsoid of a confidence."""
+        names, nominal = list(self.nominal.names), self.nominal.theta
+        if self.stated.intervals is not None:
+            index = [names.index(name) for name in self.stated.intervals]
+            low, high = np.array(list(self.stated.intervals.values())).T
+            centre, columns = nominal.copy(), np.zeros((nominal.size, len(index)))
+            centre[index] = 0.5 * (low + high)
+            columns[index, np.arange(len(index))] = 0.5 * (high - low)
+            return "the intervals", centre, columns[:, low < high], True
+        covariance = self._covariance()
+        varied = np.diag(covariance) > 0.0
+        root = np.linalg.cholesky(covariance[np.ix_(varied, varied)])
+        columns = np.zeros((nominal.size, len(root)))
+        columns[varied] = confidence_factor(confidence, len(root)) * root
+        return f"the ellipsoid of confidence {confidence:g}", nominal, columns, False
 
     def _even(self, intervals: Mapping[str, tuple[float, float]]) -> Draw:
         names, nominal = list(self.nominal.names), self.nominal.theta

@@ -16,7 +16,7 @@ from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.spectrum import GivenMultisine
 from inputdesign_cli.tasks.build.header import build_header, build_units
 from inputdesign_cli.tasks.build.identification import operating_point
-from inputdesign_cli.tasks.build.limits import build_power_limits
+from inputdesign_cli.tasks.build.limits import build_power_limits, implied_limits
 from inputdesign_cli.tasks.build.line_grid import build_grid, build_periods, stated_response
 from inputdesign_cli.tasks.build.model_error import positive_table
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
@@ -28,7 +28,7 @@ from inputdesign_cli.tasks.response import KEY, ResponseTask
 
 _GOALS: dict[str, Goal] = {"least_cost": "cost", "best_accuracy": "factor", "shortest_experiment": "samples"}
 _ZERO = 1e-12
-_LIMITS = ("amplitude", "rate", "energy", "spectrum")
+_LIMITS = ("energy", "spectrum")
 _SIGNAL = (
     "hold",
     "lines",
@@ -72,7 +72,7 @@ def build_response_task(spec: Spec) -> ResponseTask:
         goal=goal,
         given=_given(spec, grid),
         cost=build_cost(spec),
-        limits=tuple(build_power_limits(spec)),
+        limits=(*build_power_limits(spec), *implied_limits(spec)),
         most_samples=spec.limits.samples,
         tolerance=spec.solver.tolerance,
         tabulated=stated.noise is not None,
@@ -213,7 +213,7 @@ def _check_supported(spec: Spec) -> None:
         raise refuse("noise.drift", what=what, hint="write a root of D inside the unit circle")
     for name in spec.limits.stated(*_LIMITS):
         what = f"enforce limits.{name} for a frequency response"
-        raise refuse(f"limits.{name}", what=what, hint="limit powers; the crest factor is reported")
+        raise refuse(f"limits.{name}", what=what, hint="limit powers, amplitude or rate")
     if spec.limits.band is not None:
         what, hint = "take limits.band here", f"state {KEY}.band"
         raise refuse("limits.band", what=what, hint=hint)

@@ -100,6 +100,18 @@ def stated_peaks(spec: Spec) -> tuple[Array | None, Array | None]:
     )
 
 
+def stated_moves(spec: Spec) -> Array | None:
+    """(r,): the largest root of a mean square of moves that the limit on single ones leaves.
+
+    Infinite where the limit on |u| says as much: moves between -a and a are 2 a at most.
+    """
+    if spec.limits.rate is None:
+        return None
+    rate, (peak, _) = per_channel(spec.limits.rate, spec.plant.inputs), stated_peaks(spec)
+    told = np.ones(rate.size, dtype=bool) if peak is None else rate < 2.0 * peak
+    return np.where(told, rate / np.sqrt(spec.signal.hold or 1), np.inf)
+
+
 def build_bounds(spec: Spec) -> Bounds:
     """What single samples of the record may not exceed, channel by channel.
 
@@ -168,6 +180,8 @@ def _method(spec: Spec) -> Method:
 def _usual_method(spec: Spec) -> Method:
     """Where nothing is stated: noise where a spectral factor may be had, one input and output in q^-1."""
     plant, spectrum = spec.plant, spec.spectrum
+    if spec.accuracy.frequency_response is not None:
+        return "multisine"
     single = plant.kind == "polynomial" and plant.inputs == plant.outputs == 1
     banded = spectrum is not None and spectrum.type == "polynomial" and not spec.closed_loop
     return "filtered_noise" if single and not banded else "multisine"

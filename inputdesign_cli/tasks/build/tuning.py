@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.plant import Model
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.controller import Controller, Pid, PidController
 from inputdesign_cli.specification.models.loop import LoopMargin, Tuning
@@ -28,15 +29,34 @@ class Process:
     dead_time: float
 
 
-def loop_controller(spec: Spec, stated: LoopMargin) -> Controller | None:
+def loop_controller(spec: Spec, stated: LoopMargin, model: Model) -> Controller | None:
     """C of the loop: tuned, as stated, or that of the experiment.
+
+    Rules tune on the plant at hand: where it is uncertain, each plant that it might be has its own settings,
+    as after the experiment.
+
+    Args:
+        model: the plant, of the structure of the spec's, whose named parameters may have other values.
 
     Raises:
         SpecError: `not-supported` for plants that the rules of tuning do not know.
     """
     if stated.tuning is None:
         return stated.controller or spec.experiment.controller
-    return PidController(pid=tuned(process_of(spec), stated.tuning))
+    return PidController(pid=tuned(process_of(_with_values(spec, model)), stated.tuning))
+
+
+def _with_values(spec: Spec, model: Model) -> Spec:
+    """The spec with the values that the named parameters of its plant have in a model."""
+    if spec.plant.kind != "continuous":
+        return spec
+    values = dict(zip(model.names, model.theta.tolist(), strict=True))
+    changes: dict[str, object] = {
+        ".".join(("plant", *map(str, known.place))): values[known.label]
+        for known in spec.plant.named_parameters
+        if values.get(known.label, known.value) != known.value
+    }
+    return spec.with_(**changes) if changes else spec
 
 
 def tuned(process: Process, tuning: Tuning) -> Pid:

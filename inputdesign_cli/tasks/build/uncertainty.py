@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.design.convex.cost import Paid
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.design.convex.scenario_theory import samples_for
 from inputdesign_cli.errors import SpecError
@@ -20,10 +21,11 @@ from inputdesign_cli.specification.models.uncertainty import SOURCES
 from inputdesign_cli.spectrum import Basis
 from inputdesign_cli.tasks.build.demand import check_effects
 from inputdesign_cli.tasks.build.integrators import on_finite_information
-from inputdesign_cli.tasks.build.parameter_draws import Draw, Unsure, drawing
+from inputdesign_cli.tasks.build.parameter_draws import Draw, Unsure, drawing, reach
 from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked
 from inputdesign_cli.tasks.build.system import build_loop
+from inputdesign_cli.tasks.region import Region
 from inputdesign_cli.tasks.robust import CONFIDENCE, Batch, Plants
 
 _KEY = "uncertainty"
@@ -52,10 +54,10 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
     if stated is None:
         return None
     scenario = _Scenarios(spec, stated, experiment)
-    mean_cost = spec.closed_loop if stated.cost is None else stated.cost == "mean"
+    paid: Paid = stated.cost or ("mean" if spec.closed_loop else "nominal")
     names = experiment.model.names
     if isinstance(stated.scenarios, tuple):
-        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, mean_cost)
+        return Plants(scenario.listed(stated.scenarios), "scenarios", names, stated.r_adm, paid)
     number = stated.scenarios or _needed(spec, basis) or _DEFAULT_SCENARIOS
     draw = drawing(spec, stated, experiment)
     batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
@@ -68,10 +70,11 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         stated.stated(*SOURCES)[0],
         names,
         stated.r_adm,
-        mean_cost,
+        paid,
         discard=int(stated.discard * number),
         afresh=afresh if stated.fresh else None,
         unknowns=None if basis.free else _unknowns(spec, basis),
+        region=None if stated.worst_case is None else scenario.region(stated.worst_case),
     )
 
 
@@ -100,8 +103,9 @@ def _needed(spec: Spec, basis: Basis) -> int | None:
 
 
 def _unknowns(spec: Spec, basis: Basis) -> int:
-    """Of the program: those of the spectrum, and the factor or the length where that is sought."""
-    return basis.size + int(spec.goal != "least_cost")
+    """Of the program: those of the spectrum, and the factor, length or largest cost that is sought."""
+    stated = spec.uncertainty
+    return basis.size + int(spec.goal != "least_cost" or (stated is not None and stated.cost == "worst"))
 
 
 def farthest_radius(spec: Spec, experiment: Experiment) -> float:
@@ -240,6 +244,18 @@ class _Scenarios(Unsure):
                 ) from error
             thetas.append(theta)
         return Batch(np.array(thetas), tuple(plants), len(plants))
+
+    def region(self, confidence: float) -> Region:
+        """All plants that the draws are from, up to this confidence."""
+        name, centre, columns, box = reach(self.spec, self.stated, self.experiment, confidence)
+
+        def at(theta: Array) -> Alternative | None:
+            try:
+                return self.at(theta, self._radius)
+            except _NoPlantError:
+                return None
+
+        return Region(name, centre, columns, box, at)
 
     def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
         """So many plants, drawn again where they are unstable, or no plants.

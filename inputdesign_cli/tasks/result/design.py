@@ -10,7 +10,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import Criterion, OnModelError, Requirement, model_errors
 from inputdesign_cli.design.convex.candidate import candidate_at
-from inputdesign_cli.design.convex.cost import Weight, weighted_sum
+from inputdesign_cli.design.convex.cost import Weight, paid_for, weighted_sum
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
@@ -21,6 +21,7 @@ from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.spectrum import Basis, flat_basis
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.result.spectrum import distinct, spectrum_entry
+from inputdesign_cli.tasks.robust import Plants
 
 # A limit binds when the design uses all but this share of it.
 _ROUNDING = 1e-9
@@ -39,7 +40,7 @@ _KINDS = {"cost": "least_cost", "samples": "shortest_experiment", "factor": "acc
 class Designed:
     """A design with what it answers and the experiment of the delivered length.
 
-    `kept` are the numbers of the drawn plants that the design is for, without those that it leaves out.
+    `kept` are the numbers of the `plants` that the design is for, without those that it leaves out.
     """
 
     header: Header
@@ -49,6 +50,7 @@ class Designed:
     cost: dict[PowerKind, Weight]
     confidence: Confidence
     kept: Sequence[int] = ()
+    plants: Plants | None = None
 
     @property
     def units(self) -> Units:
@@ -170,11 +172,14 @@ def powers(problem: Problem, basis: Basis, x: Array, scenario: int = 0) -> dict[
 
 
 def _cost(done: Designed, basis: Basis, x: Array) -> float:
-    """At the nominal plant, or the mean over all plants where that is what is paid."""
+    """At the nominal plant, the mean over all plants or that of the dearest, as they are paid."""
+    return paid_for(done.design.problem.paid, costs_of(done, basis, x))
+
+
+def costs_of(done: Designed, basis: Basis, x: Array) -> list[float]:
+    """What a spectrum costs at each plant that is paid for."""
     problem = done.design.problem
-    paid = range(len(problem.scenarios)) if problem.mean_cost else (0,)
-    costs = [weighted_sum(done.cost, powers(problem, basis, x, scenario)) for scenario in paid]
-    return sum(costs) / len(costs)
+    return [weighted_sum(done.cost, powers(problem, basis, x, scenario)) for scenario in problem.paying]
 
 
 def _objective(design: Design) -> dict[str, Json]:

@@ -115,7 +115,10 @@ def _needed(unreachable: UnreachableError, limit: PowerLimit) -> str:
     if limit.implied:
         peak = np.sqrt(limit.bound)
         least_peak = rounded_up(float(np.sqrt(least)))
-        return f"{needs}, a peak of {least_peak} at least, but a peak of {peak:.6g} leaves {limit.bound:.6g}"
+        sample = limit.of_samples
+        return (
+            f"{needs}, {sample} of {least_peak} at least, but {sample} of {peak:.6g} leaves {limit.bound:.6g}"
+        )
     return f"{needs}, limit is {limit.bound:.6g}"
 
 

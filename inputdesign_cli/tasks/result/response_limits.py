@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.response import UnreachableError
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
 from inputdesign_cli.runs.units import Units
@@ -24,9 +27,7 @@ def unreachable(units: Units, error: UnreachableError, samples: int) -> Infeasib
         )
     factor = error.factor
     exhausted = " and ".join(dict.fromkeys(named(limit) for limit in error.limits))
-    needed = [
-        f"{limit.key} to {rounded_up(limit.bound * factor**2)}" for limit in dict.fromkeys(error.limits)
-    ]
+    needed = [f"{limit.key} to {rounded_up(_raised(limit, factor))}" for limit in dict.fromkeys(error.limits)]
     more = int(np.ceil(samples * factor**2))
     return InfeasibleError(
         Diagnostic(
@@ -41,6 +42,11 @@ def unreachable(units: Units, error: UnreachableError, samples: int) -> Infeasib
     )
 
 
+def _raised(limit: PowerLimit, factor: float) -> float:
+    """The number of the spec with which deviations `factor` times as large become those admitted."""
+    return factor * limit.bound**0.5 if limit.implied else factor**2 * limit.bound
+
+
 def too_long(units: Units, length: int, most: int) -> InfeasibleError:
     """The shortest record is longer than limits allow."""
     limit = units.length(length, "limits")
@@ -52,4 +58,17 @@ def too_long(units: Units, length: int, most: int) -> InfeasibleError:
             f"write {limit}, allow more power, or ask for less accuracy",
             limit.split(":")[0],
         )
+    )
+
+
+def too_tight(units: Units, keys: Sequence[str], beyond: float, length: int) -> InfeasibleError:
+    """The lines would do, but no record of them that was found keeps to the limits on single samples."""
+    more = int(np.ceil(length * beyond**2))
+    return InfeasibleError.because(
+        "limits-too-tight",
+        f"no record of {length} samples within {' and '.join(keys)} was found that meets the accuracy: that "
+        f"of the lowest peaks would have to be {rounded_up(beyond, 4)} times as large as they allow",
+        f"about {more} samples do ({units.length(more)}); raise the limits, admit {rounded_up(beyond, 4)} "
+        "times as much, or write objective: shortest_experiment",
+        keys[0],
     )

@@ -13,9 +13,9 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.result.design import Designed
+from inputdesign_cli.tasks.result.design import Designed, costs_of
 from inputdesign_cli.tasks.result.fan import fan_curves
-from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, kept_by, tried_on
+from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, Searched, kept_by, tried_on
 
 # A plant binds when it keeps all but this share of what is admitted.
 _BINDS = 1e-5
@@ -47,12 +47,19 @@ def robust_result(done: Designed, plants: Plants) -> RobustResult:
         "rejected": batch.rejected,
         "discarded": len(batch.plants) - len(kept),
         "r_adm": plants.r_adm,
-        "cost": "mean" if plants.mean_cost else "nominal",
+        "cost": plants.paid,
         "worst_share": float(shares[worst]),
         "worst_scenario": numbers[worst],
         "active": [_active(units, plants, numbers[place], at_each[place]) for place in binding[:_LISTED]],
         "support": len(support),
     }
+    if plants.paid == "worst" and done.problem.goal == "cost":
+        found = done.design.result
+        costs = costs_of(done, found.basis, found.x)
+        dearest = int(np.argmax(costs))
+        entry["dearest"] = {"scenario": numbers[dearest], "cost": costs[dearest]}
+    if plants.searched is not None:
+        entry["searched"] = _searched(units, plants, plants.searched)
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
     if plants.afresh is not None and done.design.result.x.any():
@@ -66,9 +73,9 @@ def robust_result(done: Designed, plants: Plants) -> RobustResult:
 
 def _binding(done: Designed, shares: Array) -> list[int]:
     """The plants that bind, those of the largest multipliers first."""
-    weight = np.trace(done.design.result.certificate.weights, axis1=1, axis2=2)
+    weight = done.design.result.certificate.shares
     order = np.lexsort((-shares, -weight))
-    taking_part = (weight > _BINDS * weight.sum()) | (shares >= 1.0 - _BINDS)
+    taking_part = (weight > _BINDS) | (shares >= 1.0 - _BINDS)
     return [place for place in order.tolist() if taking_part[place]]
 
 
@@ -81,10 +88,22 @@ def _active(units: Units, plants: Plants, number: int, kept: Kept) -> dict[str, 
     return item
 
 
+def _searched(units: Units, plants: Plants, found: Searched) -> dict[str, Json]:
+    """The worst plant that was found, which is no proof that there is no worse one."""
+    entry: dict[str, Json] = {"proved": False, "region": found.region, "share": found.kept.share}
+    if found.kept.frequency is not None:
+        entry["frequency"] = found.kept.frequency / units.frequency
+    entry["parameters"] = dict(zip(plants.names, found.theta.tolist(), strict=True))
+    return entry | {"added": found.added, "tried": found.tried}
+
+
 def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
-    """Shares of plants that may be missed; after discarding the theory is silent, and fresh draws count."""
+    """Shares of plants that may be missed.
+
+    Where some were left out, or sought, the theory is silent, and fresh draws count.
+    """
     drawn = len(plants.batch.plants)
-    if kept < drawn:
+    if kept < drawn or (plants.searched is not None and plants.searched.added):
         return {}
     beta = 1.0 - CONFIDENCE
     risk: dict[str, Json] = {"confidence": CONFIDENCE, "after": risk_after(drawn, beta, support)}
@@ -97,10 +116,12 @@ def _fresh(done: Designed, plants: Plants) -> dict[str, Json]:
     """How many of other plants from the same distribution the design misses."""
     assert plants.afresh is not None
     batch = plants.afresh()
-    shares = np.array([one.share for one in tried_on(done.design, done.experiment.samples, batch)])
-    missed = int(np.sum(shares > MET))
+    tried = tried_on(done.design, done.experiment.samples, batch)
+    shares = np.array([one.share for one in tried])
+    dearer = np.array([one.cost for one in tried]) > MET * done.design.result.objective  # of cost: worst
+    missed = int(np.sum((shares > MET) | dearer))
     finite = shares[np.isfinite(shares)]
-    return {
+    entry: dict[str, Json] = {
         "draws": len(batch.plants),
         "rejected": batch.rejected,
         "missed": missed,
@@ -108,6 +129,8 @@ def _fresh(done: Designed, plants: Plants) -> dict[str, Json]:
         "limits": list(binomial_limits(missed, len(batch.plants))),
         "largest": float(finite.max(initial=0.0)),
     }
+    promised = plants.paid == "worst" and done.problem.goal == "cost"
+    return entry | ({"dearer": int(np.sum(dearer))} if promised else {})
 
 
 def _table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:

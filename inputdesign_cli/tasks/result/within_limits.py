@@ -145,7 +145,8 @@ class Bought:
 def named(limit: PowerLimit) -> str:
     """A limit for a sentence: the power of input 2; what a peak leaves of it."""
     of = limit.kind if limit.channel is None else f"{limit.kind} {limit.channel + 1}"
-    peak = f" that a peak of {np.sqrt(limit.bound):.6g} leaves" if limit.implied else ""
+    of = of.replace("moves", "moves of input") if limit.kind == "moves" else of
+    peak = f" that {limit.of_samples} of {np.sqrt(limit.bound):.6g} leaves" if limit.implied else ""
     return f"the power of {of}{peak}" if limit.channel is not None else f"the {of} power{peak}"
 
 

@@ -32,17 +32,17 @@ def question(experiment, others=(), *, order=8, fraction=0.1, **kwargs):
     )
 
 
-@pytest.mark.parametrize("mean_cost", [False, True])
+@pytest.mark.parametrize("paid", ["nominal", "mean", "worst"])
 @pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("goal", ["cost", "factor", "samples"])
-def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, limited, mean_cost):
+def test_copies_of_the_nominal_plant_change_nothing(first_order, goal, limited, paid):
     """Paid for by the power of the output too, which is that of each plant."""
     experiment = dataclasses.replace(first_order, samples=1) if goal == "samples" else first_order
     limits = [PowerLimit("output", 1.0)] if limited or goal != "cost" else []
     asked = question(experiment, cost={"input": 1.0, "output": 1.0}, goal=goal, limits=limits)
     once = solve_design(asked, tolerance=1e-8)
     same = Alternative(asked.experiment, asked.requirements)
-    again = solve_design(dataclasses.replace(asked, others=[same] * 2, mean_cost=mean_cost), tolerance=1e-8)
+    again = solve_design(dataclasses.replace(asked, others=[same] * 2, paid=paid), tolerance=1e-8)
     assert again.result.objective == pytest.approx(once.result.objective, rel=1e-6)
     assert again.any_spectrum.objective == pytest.approx(once.any_spectrum.objective, rel=1e-5)
     assert again.white_power == pytest.approx(once.white_power, rel=1e-9)
@@ -62,21 +62,22 @@ def test_more_scenarios_never_cost_less(first_order):
 
 
 @pytest.mark.filterwarnings("ignore:Solution may be inaccurate")
-def test_the_design_agrees_with_a_plain_program(first_order):
-    """One matrix inequality for each plant and frequency, a Gram matrix for positivity, the mean cost."""
+@pytest.mark.parametrize("paid", ["mean", "worst"])
+def test_the_design_agrees_with_a_plain_program(first_order, paid):
+    """One matrix inequality for each plant and frequency, a Gram matrix for positivity."""
     order, others = 6, alternatives(first_order, around(first_order, 3, 0.03, seed=2), 0.1)
-    asked = question(first_order, others, order=order, cost={"input": 1.0, "output": 1.0}, mean_cost=True)
+    asked = question(first_order, others, order=order, cost={"input": 1.0, "output": 1.0}, paid=paid)
     design = solve_design(asked, tolerance=1e-8)
     unit, problem = design.result.objective, design.problem
     c = cp.Variable(order + 1)
     gram = cp.Variable((order + 1, order + 1), PSD=True)
     constraints = [cp.sum(cp.diag(gram, lag)) == c[lag] for lag in range(order + 1)]
-    price = np.mean(
-        [
-            sum(problem.power(kind, None, s).vector for kind in ("input", "output"))
-            for s in range(len(problem.scenarios))
-        ],
-        axis=0,
+    prices = [
+        sum(problem.power(kind, None, s).vector for kind in ("input", "output"))
+        for s in range(len(problem.scenarios))
+    ]
+    cost = (
+        np.mean(prices, axis=0) @ c if paid == "mean" else cp.max(cp.hstack([price @ c for price in prices]))
     )
     grid = np.union1d(np.geomspace(0.01, np.pi, 20), design.result.active_frequencies)
     for s, (scenario, told) in enumerate(zip(problem.scenarios, design.result.informations, strict=True)):
@@ -87,7 +88,7 @@ def test_the_design_agrees_with_a_plain_program(first_order):
         for w in grid:
             slack = M - K @ scenario.requirements[0].cut(float(w)).matrix @ K.T
             constraints.append(0.5 * (slack + slack.T) >> 0)
-    plain = cp.Problem(cp.Minimize(price @ c), constraints).solve(solver=cp.CLARABEL)
+    plain = cp.Problem(cp.Minimize(cost), constraints).solve(solver=cp.CLARABEL)
     assert plain == pytest.approx(1.0, rel=1e-5)
 
 
@@ -152,3 +153,39 @@ def test_one_constant_between_a_tenth_and_ten():
         assert np.exp(np.average(np.log(w[mine]), weights=power[mine])) == pytest.approx(place, rel=0.02)
     # One sinusoid: 1 / (theta^2 M) = (w^2 + theta^2)^2 / (theta w)^2, worst at both ends when it is best.
     assert max((1.0 + theta**2) ** 2 / theta**2 for theta in (0.1, 10.0)) == pytest.approx(102.0, abs=0.05)
+
+
+def test_the_certificate_of_the_worst_cost_holds_for_random_spectra():
+    """max_s cost_s >= a mean of the costs >= sum_s tr(Y_s (M_s - M0_s)), the mean over several plants."""
+    text = "plant: {B: [0, 1], F: [1, -1.6, 0.94]}\nnoise: {variance: 1}\nexperiment: {samples: 500}\n"
+    model = build_model(parse_spec(text + "accuracy: {criterion: A}\nlimits: {input_power: 1}\n"))
+    nominal = Experiment(model, 500)
+    others = alternatives(nominal, [np.array([1.0, -1.6 + d, 0.94]) for d in (-0.1, 0.1)], 0.1)
+    asked = question(nominal, others, order=12, cost={"output": 1.0}, paid="worst")
+    design = solve_design(asked, tolerance=1e-7)
+    certificate, problem = design.result.certificate, design.problem
+    assert certificate.bound == pytest.approx(design.result.objective, rel=1e-7)
+    assert np.sum(certificate.costs > 1e-3) >= 2
+    assert certificate.costs.sum() == pytest.approx(1.0, abs=1e-12)
+    paid = [problem.power("output", None, s).at(design.result.x) for s in range(3)]
+    assert max(paid) == pytest.approx(design.result.objective, rel=1e-12)
+    assert np.all(np.array(paid)[certificate.costs > 1e-3] > (1 - 1e-5) * max(paid))
+    other = solve_design(dataclasses.replace(asked, paid="mean"), tolerance=1e-7).result
+    powers = np.array([problem.power("output", None, s).at(other.x) for s in range(3)])
+    assert powers.mean() <= np.mean(paid) * (1 + 1e-7)
+    assert powers.max() >= max(paid) * (1 - 1e-7)
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        taps = rng.normal(size=13)
+        x = np.correlate(taps, taps, mode="full")[12:]
+        worth = np.sum(certificate.weights * (problem.informations(x) - problem.baselines))
+        assert max(cost.at(x) for cost in problem.costs) >= worth * (1 - 1e-9)
+
+
+def test_what_was_seen_belongs_to_the_plants_that_it_was_seen_of(first_order):
+    """A problem at another plant, or with other requirements, starts to look anew."""
+    problem = solve_design(question(first_order), tolerance=1e-6).problem
+    assert problem.on(LinesBasis.anywhere(0.0, np.pi, 1)).demands is problem.demands
+    elsewhere = dataclasses.replace(problem, experiment=problem.experiment.whitened(1.0))
+    assert elsewhere.scenarios[0].experiment is elsewhere.experiment
+    assert problem.with_requirements(lambda _: ()).scenarios[0].requirements == ()

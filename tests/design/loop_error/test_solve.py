@@ -211,7 +211,7 @@ BAD = [
     ("not-identifiable", "indistinguishable",
      ["noise={C: [1, -0.5], D: [1, -0.5], variance: 1}"]),
     ("needs-limits", "nothing limits", ["limits=null"]),
-    ("not-supported", "limits.amplitude", ["limits.amplitude=3"]),
+    ("not-supported", "limits.amplitude", ["limits.amplitude={output: 3}"]),
     ("not-supported", "least powers", ["limits.input_power={max: 2, min: 1}"]),
     ("not-supported", "type fir", ["spectrum={type: fir, order: 3}"]),
     ("not-supported", "model_error", ["accuracy.model_error={relative: 0.1}"]),

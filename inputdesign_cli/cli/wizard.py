@@ -1,0 +1,142 @@
+"""`idesign wizard`: questions in the user's words, a commented spec, and what it comes to."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inputdesign_cli.cli.options import Overwrite, Quiet
+from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.errors import OutputError, SpecError
+
+if TYPE_CHECKING:
+    from inputdesign_cli.runs.results import Result
+    from inputdesign_cli.specification import Spec
+
+
+def wizard(
+    answers: Annotated[
+        Path | None,
+        typer.Option("--answers", metavar="FILE", help="Take answers from a YAML file: question: text."),
+    ] = None,
+    given: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--answer",
+            "-a",
+            metavar="KEY=TEXT",
+            help="Answer a question: plant, wish, range, time, limits, noise, drift, loop, signals or "
+            "converter. Repeatable; comes before --answers.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="FILE", help="The spec to write (default experiment.yaml)."),
+    ] = Path("experiment.yaml"),
+    solve: Annotated[
+        bool | None,
+        typer.Option("--solve/--no-solve", help="Design the experiment at once, or not; else it is asked."),
+    ] = None,
+    trade: Annotated[
+        bool, typer.Option("--trade", help="Draw accuracy against time and amplitude, too.")
+    ] = False,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Ask for an experiment in your words, and write a commented spec.
+
+    At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
+    They are asked in the terminal where no option answers them. What is written is an ordinary spec.
+    """
+    from inputdesign_cli.wizard.questions import read_answers
+
+    if output.exists() and not overwrite:
+        hint = "choose another name with -o, or overwrite it with --overwrite"
+        raise OutputError.because("output-exists", f"{output} exists already", hint)
+    known = read_answers(answers, given or [])
+    terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+    asked = answers is None and not given
+    if asked and terminal:
+        known = _asked(known)
+    elif asked:
+        _refuse()
+    with status("thinking ...", quiet=quiet):
+        from inputdesign_cli import tasks
+        from inputdesign_cli.runs.run_directory import write_bytes, write_text
+        from inputdesign_cli.wizard.composing import compose
+        from inputdesign_cli.wizard.solving import enough_lines
+
+        draft = compose(known, output.stem, output.parent)
+        for name, content in draft.files.items():
+            write_bytes(output.parent / name, content)
+        tasks.validate(draft.spec())
+        draft = enough_lines(draft, _result)
+        write_text(output, draft.text)
+    if not quiet:
+        typer.echo(f"{output}: written; every line says why it stands there, and may be changed")
+    if solve is None:
+        solve = terminal and typer.confirm("Design the experiment now?", default=True)
+    if solve:
+        _solve(output, trade=trade, overwrite=overwrite, quiet=quiet)
+
+
+def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
+    with status(f"{file}: computing ...", quiet=quiet):
+        from inputdesign_cli import load_spec, tasks
+        from inputdesign_cli.wizard.solving import to_log, verdict
+
+        spec = load_spec(file)
+        results = tasks.solve(spec)
+    place = Place(None, file.stem, [file], overwrite)
+    keep(results, place, figures=True, json_output=False, quiet=True)
+    if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
+        with status(f"{file}: what else would do ...", quiet=quiet):
+            found = verdict(spec, results.result, _result)
+        if not quiet:
+            typer.echo(
+                "\n".join(["", *found.sentences, *to_log(spec, "", str(file)), f"files: {place.directory}"])
+            )
+    if trade:
+        from inputdesign_cli.cli.trade import WORDS, tell_trade
+
+        beside = place.directory.with_name(f"{place.directory.name}-trade")
+        tell_trade(file, spec, WORDS, beside, overrides=[], confine=None, quiet=quiet)
+
+
+def _result(spec: Spec) -> Result:
+    from inputdesign_cli import tasks
+
+    return tasks.solve(spec).result
+
+
+def _asked(known: dict[str, str]) -> dict[str, str]:
+    """The answers of somebody at the terminal; asked again where one cannot be understood."""
+    import questionary
+
+    from inputdesign_cli.wizard.questions import QUESTIONS
+
+    found = dict(known)
+    for one in QUESTIONS:
+        if one.key in found:
+            continue
+        typer.echo(f"  {one.allowed}", err=True)
+        text = questionary.text(one.asks, default=one.default or "").ask()
+        if text is None:  # Ctrl-C
+            raise KeyboardInterrupt
+        found[one.key] = text
+    return found
+
+
+def _refuse() -> None:
+    from inputdesign_cli.wizard.questions import QUESTIONS
+
+    needed = ", ".join(one.key for one in QUESTIONS if one.default is None)
+    raise SpecError.because(
+        "no-terminal",
+        "there is no terminal to ask in, and no answers are given",
+        f"write them into a file (--answers answers.yaml) or behind --answer KEY=TEXT; needed are {needed}",
+    )

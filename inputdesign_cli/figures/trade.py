@@ -1,0 +1,51 @@
+"""trade.png: accuracy over the length of the experiment, a curve for each amplitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above, log_axes
+from inputdesign_cli.figures.sweep_axes import curve, mark_failures, plain_numbers
+from inputdesign_cli.runs.results import Array
+
+
+@dataclass(frozen=True)
+class Trade:
+    """The worst ratio to what is asked, or the criterion, over lengths (in `unit`) and amplitudes.
+
+    Args:
+        amplitudes: their texts, one where only the length was varied.
+        values: (amplitudes, lengths), NaN without a result.
+        criterion: whether the values are those of a criterion, and not ratios that are to be one at most.
+    """
+
+    lengths: Array
+    unit: str
+    amplitudes: tuple[str, ...]
+    values: Array
+    criterion: bool
+
+
+def draw_trade(trade: Trade, page: Figure) -> None:
+    """Ratios to what is asked, which stands at one, or the criterion."""
+    axes = page.add_subplot()
+    handles = []
+    for text, row, colour in zip(trade.amplitudes, trade.values, PALETTE, strict=False):
+        name = f"amplitude {text}" if text else "best record"
+        handles += curve(axes, trade.lengths, row, color=colour, marker="o", markersize=4, label=name)
+    log_axes(axes, "x")
+    axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
+    axes.set_xlabel(f"length of the experiment ({trade.unit})")
+    mark_failures(axes, trade.lengths[np.all(np.isnan(trade.values), axis=0)])
+    if trade.criterion:
+        axes.set_ylabel("criterion")
+    else:
+        handles.append(axes.axhline(1.0, color=BLACK, linestyle=DASHED, linewidth=1.1, label="what is asked"))
+        known = np.append(trade.values[np.isfinite(trade.values)], 1.0)
+        log_axes(axes, "y")
+        plain_numbers(axes.yaxis, float(known.max() / known.min()))
+        axes.set_ylabel("error of the record / what is asked")
+    legend_above(axes, handles)

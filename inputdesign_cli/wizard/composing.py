@@ -1,0 +1,131 @@
+"""Answers -> a commented spec."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
+from inputdesign_cli.wizard.phrases import seconds, short
+from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
+from inputdesign_cli.wizard.questions import bad_answer, complete
+from inputdesign_cli.wizard.wishes import wished
+
+_MOST, _LEAST = 5000, 50
+_PLANTS, _FRESH = 30, 200
+_FIRST = 60  # sinusoids
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A spec in parts, and the files that stand beside it.
+
+    Args:
+        heads: what stands before the spectrum, tails behind it.
+        lines: of the multisine; None where the accuracy tells them.
+        why: the comment on them.
+    """
+
+    heads: tuple[str, ...]
+    tails: tuple[str, ...]
+    files: Mapping[str, bytes]
+    lines: int | None
+    folder: Path
+    why: str = "sinusoids"
+
+    @property
+    def text(self) -> str:
+        """The spec."""
+        spectrum = (
+            ()
+            if self.lines is None
+            else (f"spectrum: {{type: multisine, lines: {self.lines}}}  # {self.why}",)
+        )
+        return "\n".join([*self.heads, *spectrum, *self.tails]) + "\n"
+
+    def with_lines(self, lines: int, why: str) -> Draft:
+        """The same with another number of sinusoids."""
+        return replace(self, lines=lines, why=why)
+
+    def spec(self) -> Spec:
+        """The spec, checked; the files beside it must have been written.
+
+        Raises:
+            SpecError: the answers make no spec.
+        """
+        return parse_spec(self.text, "<wizard>", folder=self.folder)
+
+
+def compose(answers: Mapping[str, str], stem: str, folder: Path) -> Draft:
+    """The spec of the answers.
+
+    Args:
+        stem: of the name of the spec.
+        folder: where it is to stand, and what names of files are relative to.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
+    said = complete(answers)
+    span, there = input_range(said["range"]), seconds(said["time"], "time")
+    plant = understand_plant(said["plant"], stem, folder)
+    step = plant.sample_time
+    if there < _LEAST * step:
+        raise bad_answer("time", f"{short(there)} s are less than {_LEAST} samples of {short(step)} s")
+    duration = min(there, _MOST * step)
+    controller = loop_line(said["loop"], plant)
+    asked = wished(said["wish"], plant, controller is not None, duration)
+    nonparametric = any("frequency_response" in line for line in asked)
+    heads = [
+        "# Written by `idesign wizard`: every line follows from an answer. Change what you know better.",
+        f"title: {_quoted(said['wish'])}",
+        f"sample_time: {short(step)}  # {_why_step(plant)}",
+        "time_unit: s",
+        *plant.lines,
+    ]
+    if plant.lines[0].startswith("plant:"):
+        heads += noise_lines(said["noise"], said["drift"], folder)
+    else:
+        heads[2:4] = []
+    heads += _uncertain(plant, nonparametric)
+    if controller is not None:
+        heads += ["experiment:", f"  controller: {controller}  # u = r - C y; r is designed"]
+    heads += [*asked, "objective: best_accuracy  # use all that is allowed"]
+    heads += limit_lines(span, said["limits"], duration, step)
+    if duration < there:
+        heads[-1] += f", {_MOST} samples; the time there is would be {short(there)}"
+    tails = signal_lines(said["signals"], said["converter"], span)
+    if nonparametric:
+        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder)
+    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder)
+
+
+def _why_step(plant: PlantAnswer) -> str:
+    if plant.sampling is not None:
+        return "as the plant is sampled"
+    return f"a twentieth of the time constant of {short(plant.slow)} s, or a little less"
+
+
+def _uncertain(plant: PlantAnswer, nonparametric: bool) -> list[str]:
+    """How well the plant is known, where that is said and a design can heed it."""
+    if nonparametric or not (plant.covariance or plant.intervals):
+        return []
+    drawn = (
+        f"  scenarios: {_PLANTS}  # what is asked holds at so many plants drawn from that\n  fresh: {_FRESH}"
+    )
+    if plant.covariance is not None:
+        return ["uncertainty:", f"  covariance: {plant.covariance}", drawn]
+    listed = [f"    {name}: [{short(low)}, {short(high)}]" for name, (low, high) in plant.intervals.items()]
+    return ["uncertainty:  # how well it is known", "  intervals:", *listed, drawn]
+
+
+def _periodic(tails: list[str]) -> list[str]:
+    """A frequency response takes equal periods, of which the first is left to the transient."""
+    return [*tails, "  periods: 5"]
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

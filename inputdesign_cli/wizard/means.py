@@ -1,0 +1,150 @@
+"""What the experiment may use, and the noise it has to do with, in the words of a spec."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.wizard.phrases import after, needed, short
+from inputdesign_cli.wizard.plants import PlantAnswer
+from inputdesign_cli.wizard.questions import bad_answer
+from inputdesign_cli.wizard.wishes import pid
+
+_PLAIN = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
+_WHITE = 3.0  # correlations above so many deviations of chance colour the noise
+
+
+@dataclass(frozen=True)
+class Range:
+    """The amplitude about an operating point."""
+
+    amplitude: float
+    offset: float
+
+
+def input_range(text: str) -> Range:
+    """`plus/minus 5 around 40`, or `35 to 45`.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    ends = re.fullmatch(rf"(?:from\s*)?({_PLAIN})\s*(?:to|\.\.)\s*({_PLAIN})\s*\S{{0,3}}", text.strip(), re.I)
+    if ends is not None:
+        low, high = float(ends.group(1)), float(ends.group(2))
+        if not low < high:
+            raise bad_answer("range", f"{low:g} is not below {high:g}")
+        return Range(0.5 * (high - low), 0.5 * (low + high))
+    sides = re.search(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*({_PLAIN})", text, re.I)
+    if sides is None:
+        raise bad_answer("range", f'"{text}" is no range')
+    return Range(
+        needed(float(sides.group(1)), "range", "the amplitude"), after(text, "around|about|at") or 0.0
+    )
+
+
+def limit_lines(span: Range, text: str, duration: float, step: float) -> list[str]:
+    """The lines of `limits`.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    rate, output = after(text, "rate"), after(text, "output")
+    if rate is None and output is None and text.lower() not in ("none", "no"):
+        raise bad_answer("limits", f'"{text}" is none of these')
+    peak = short(span.amplitude)
+    lines = ["limits:  # counted from the operating point"]
+    if output is None:
+        lines.append(f"  amplitude: {peak}")
+    else:
+        lines.append(
+            f"  amplitude: {{input: {peak}, output: {short(needed(output, 'limits', 'the output'))}}}"
+        )
+    if rate is not None:
+        move = needed(rate, "limits", "the rate") * step
+        lines.append(f"  rate: {short(move)}  # {short(rate)} per second, {short(step)} s a sample")
+    return [*lines, f"  duration: {short(duration)}  # seconds"]
+
+
+def noise_lines(text: str, drift: str, folder: Path) -> list[str]:
+    """The lines of `noise`.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
+    if drift.lower() not in ("yes", "no"):
+        raise bad_answer("drift", f'"{drift}" is neither yes nor no')
+    drifts = (
+        ["  drift: true  # an integrator in the noise", "  C: [1, -0.8]"] if drift.lower() == "yes" else []
+    )
+    word, _, name = text.partition(" ")
+    if word.lower() == "rest":
+        level, colour, comment = _at_rest(folder / name.strip())
+        extra = drifts or ([f"  D: [1, {short(-colour)}]  # {comment}"] if colour else [])
+        return ["noise:", f"  variance: {short(level)}  # of {name.strip()}: {comment}", *extra]
+    deviation, step = after(text, "standard deviation|deviation|std"), after(text, "resolution")
+    if deviation is not None:
+        size = needed(deviation, "noise", "the standard deviation")
+        return ["noise:", f"  variance: {short(size**2)}  # standard deviation {short(size)}", *drifts]
+    size = needed(step, "noise", "a standard deviation or a resolution")
+    told = f"rounding to {short(size)} has a variance of its square over 12: the least that noise can be"
+    return ["noise:", f"  variance: {short(size**2 / 12.0)}  # {told}", *drifts]
+
+
+def _at_rest(path: Path) -> tuple[float, float, str]:
+    """Variance of the innovation, the pole of the noise (0 where it is white), and how that is known."""
+    from inputdesign_cli.tasks.build.tables import read_columns
+
+    if not path.is_file():
+        raise bad_answer("noise", f"there is no file {path}")
+    y = read_columns(path, {"y": "y"}, key="noise")["y"]
+    if y.size < 20:
+        raise bad_answer("noise", f"{path.name} has {y.size} rows, and 20 are the least")
+    v = y - y.mean()
+    power = float(np.mean(v**2))
+    if power == 0.0:
+        raise bad_answer("noise", f"y of {path.name} does not change; write the resolution of the sensor")
+    rho = float(np.mean(v[1:] * v[:-1]) / power)
+    if abs(rho) <= _WHITE / np.sqrt(y.size):
+        return power, 0.0, f"{y.size} samples, white as far as they tell"
+    rho = min(rho, 0.98)
+    return power * (1.0 - rho**2), rho, f"{y.size} samples, correlation {rho:.2g} from one to the next"
+
+
+def loop_line(text: str, plant: PlantAnswer) -> str | None:
+    """The controller of the experiment as YAML; None in open loop.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    if text.lower() == "as the plant":
+        return plant.controller
+    if text.lower() == "open":
+        return None
+    return f"{{pid: {pid(text, 'loop')}}}"
+
+
+def signal_lines(kind: str, converter: str, span: Range) -> list[str]:
+    """The lines of `signal`.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    if kind.lower() not in _TYPES:
+        raise bad_answer("signals", f'"{kind}" is none of these')
+    lines = ["signal:", f"  type: {_TYPES[kind.lower()]}", "  seed: 1"]
+    lines.append(f"  offset: {short(span.offset)}  # the operating point, added to signal.csv")
+    if converter.lower() in ("no", "none"):
+        return lines
+    bits = re.search(r"(\d+)\s*bits?", converter, re.I)
+    most = after(converter, "up to|over|to|range")
+    if bits is None or most is None:
+        raise bad_answer("converter", f'"{converter}" is none of these')
+    return [
+        *lines,
+        f"  quantisation: {{bits: {bits.group(1)}, range: {short(needed(most, 'converter', 'its range'))}}}",
+    ]

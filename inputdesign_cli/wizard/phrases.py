@@ -1,0 +1,67 @@
+"""Numbers, times and shares in what people write."""
+
+from __future__ import annotations
+
+import re
+
+from inputdesign_cli.wizard.questions import bad_answer
+
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_SECONDS = {"ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
+            "hour": 3600.0, "hours": 3600.0, "d": 86400.0}  # fmt: skip
+
+
+def after(text: str, words: str) -> float | None:
+    """The number behind the words (a pattern), a few others such as "of" or "about" in between."""
+    found = re.search(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is|ca\.?|up to)\s*)?{_NUMBER}", text, re.I)
+    return None if found is None else float(found.group(1))
+
+
+def seconds_after(text: str, words: str, key: str) -> float | None:
+    """The time behind the words in seconds, which are its unit where it has none."""
+    found = re.search(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is)\s*)?{_NUMBER}\s*([a-z]*)", text, re.I)
+    return None if found is None else float(found.group(1)) * _unit(found.group(2), key)
+
+
+def seconds(text: str, key: str) -> float:
+    """A time by itself.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    found = re.fullmatch(rf"(?:about\s*)?{_NUMBER}\s*([a-z]*)", text.strip(), re.I)
+    if found is None or float(found.group(1)) <= 0.0:
+        raise bad_answer(key, f'"{text}" is no time')
+    return float(found.group(1)) * _unit(found.group(2), key)
+
+
+def share(text: str) -> float | None:
+    """The per cent of "within 30 %" as a fraction."""
+    found = re.search(rf"{_NUMBER}\s*(?:%|per ?cent)", text, re.I)
+    return None if found is None else float(found.group(1)) / 100.0
+
+
+def needed(value: float | None, key: str, what: str) -> float:
+    """The value; it must be there and positive.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    if value is None:
+        raise bad_answer(key, f"it does not say {what}")
+    if not value > 0.0:
+        raise bad_answer(key, f"{what} must be positive, not {value:g}")
+    return value
+
+
+def short(value: float) -> str:
+    """A number as a spec has it: six digits."""
+    return f"{value:.6g}"
+
+
+def _unit(word: str, key: str) -> float:
+    if word.lower() in ("", "and", "each", "within"):
+        return 1.0
+    if word.lower() not in _SECONDS:
+        raise bad_answer(key, f'"{word}" is no unit of time: s, min or h')
+    return _SECONDS[word.lower()]

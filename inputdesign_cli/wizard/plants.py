@@ -1,0 +1,240 @@
+"""The plant in the user's words: a template, numbers, a step response, a log, a system of python-control."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.specification.yaml.reader import read
+from inputdesign_cli.wizard.phrases import after, needed, seconds_after, share, short
+from inputdesign_cli.wizard.questions import bad_answer
+
+_STEPS = (1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True)
+class PlantAnswer:
+    """What is known of the plant.
+
+    Args:
+        lines: of the spec, with comments.
+        slow, late: its slowest time constant and its dead time, in seconds.
+        intervals: what the parameters may be, by name; none where nothing is said.
+        values: the parameters by name.
+        controller: under which it usually runs, as YAML.
+        files: to be written beside the spec, by name.
+        covariance: the one of them that tells how good the estimate is.
+        sampling: seconds between samples, where that is known already.
+        tunable: whether rules of tuning know it.
+    """
+
+    lines: tuple[str, ...]
+    slow: float
+    late: float
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+    controller: str | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    covariance: str | None = None
+    sampling: float | None = None
+    tunable: bool = False
+
+    @property
+    def sample_time(self) -> float:
+        """A twentieth of the time constant, rounded down to 1, 2 or 5 times a power of ten."""
+        if self.sampling is not None:
+            return self.sampling
+        wanted = self.slow / 20.0
+        decade = 10.0 ** np.floor(np.log10(wanted))
+        return float(decade * max(step for step in _STEPS if step * decade <= wanted * (1 + 1e-9)))
+
+
+def _around(values: Mapping[str, float], part: float) -> dict[str, tuple[float, float]]:
+    ends = {name: (v * (1.0 - part), v * (1.0 + part)) for name, v in values.items()}
+    return {name: (min(pair), max(pair)) for name, pair in ends.items()}
+
+
+def _template(
+    lines: str, slow: float, late: float, controller: str | None = None, **values: float
+) -> PlantAnswer:
+    return PlantAnswer(
+        tuple(lines.strip("\n").split("\n")),
+        slow,
+        late,
+        _around(values, 0.2),
+        values,
+        controller,
+        tunable=controller is None and "natural_frequency" not in values and bool(values),
+    )
+
+
+TEMPLATES = {
+    "heater": _template(
+        "plant:  # template heater: degrees over per cent of power\n"
+        "  continuous: {gain: 2.1, time_constant: 180, dead_time: 25}\n  sample: zoh",
+        180.0, 25.0, gain=2.1, time_constant=180.0, dead_time=25.0,
+    ),
+    "tank": _template(
+        "plant:  # template tank: level over valve, it integrates\n"
+        "  parameters: {k: 0.05, L: 5}\n"
+        "  continuous: {numerator: [k], denominator: [1, 0], delay: L}\n  sample: zoh",
+        60.0, 5.0, "{pid: {Kp: 0.8, Ti: 60}}", k=0.05, L=5.0,
+    ),
+    "motor": _template(
+        "plant:  # template motor: speed over voltage\n"
+        "  continuous: {gain: 0.1, time_constant: 0.5, dead_time: 0.02}\n  sample: zoh",
+        0.5, 0.02, gain=0.1, time_constant=0.5, dead_time=0.02,
+    ),
+    "axis": _template(
+        "plant:  # template axis: a flexible axis, its first resonance\n"
+        "  continuous: {gain: 1, damping: 0.1, natural_frequency: 30}\n  sample: zoh",
+        0.2, 0.0, gain=1.0, damping=0.1, natural_frequency=30.0,
+    ),
+    "column": replace(
+        _template(
+            "plant:  # template column: two compositions over reflux and steam, seconds\n"
+            "  continuous:\n"
+            "    gain: [[12.8, -18.9], [6.6, -19.4]]\n"
+            "    time_constant: [[1002, 1260], [654, 864]]\n"
+            "    dead_time: [[60, 180], [420, 180]]\n  sample: zoh",
+            1000.0, 420.0,
+        ),
+        sampling=60.0,
+    ),
+}  # fmt: skip
+
+
+def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
+    """The plant of an answer.
+
+    Args:
+        stem: of the spec, for the names of files beside it.
+        folder: what the names of files are relative to.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
+    word, _, rest = text.partition(" ")
+    if text.lower() in TEMPLATES:
+        return TEMPLATES[text.lower()]
+    if word.lower() in ("step", "log") and rest.strip():
+        path = folder / rest.strip()
+        if not path.is_file():
+            raise bad_answer("plant", f"there is no file {path}")
+        return _stepped(path, stem) if word.lower() == "step" else _explored(path, stem)
+    if text.endswith(".json"):
+        return _of_control(folder / text)
+    if re.search(r"\bgain\b", text, re.I):
+        return _of_numbers(text)
+    raise bad_answer("plant", f'"{text}" is none of these')
+
+
+def _of_numbers(text: str) -> PlantAnswer:
+    gain = after(text, "gain")
+    if not gain:
+        raise bad_answer("plant", "it does not say the gain, or says that it is zero")
+    slow = needed(seconds_after(text, "time constant", "plant"), "plant", "the time constant")
+    late = seconds_after(text, "dead time|delay", "plant") or 0.0
+    if late < 0.0:
+        raise bad_answer("plant", "the dead time is negative")
+    values = {"gain": gain, "time_constant": slow} | ({"dead_time": late} if late else {})
+    part = share(text)
+    if part is not None and not 0.0 < part < 0.9:
+        raise bad_answer("plant", "within must be more than 0 and less than 90 %")
+    listed = ", ".join(f"{name}: {short(value)}" for name, value in values.items())
+    lines = (
+        "plant:  # as you said",
+        f"  continuous: {{{listed}}}",
+        "  sample: zoh  # what a converter holds",
+    )
+    return PlantAnswer(lines, slow, late, _around(values, part) if part else {}, values, tunable=True)
+
+
+def _stepped(path: Path, stem: str) -> PlantAnswer:
+    """Gain, time constant and dead time estimated from a record that begins at rest."""
+    from inputdesign_cli import parse_spec, tasks
+    from inputdesign_cli.tasks.build.tables import read_columns
+
+    found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
+    t, u, y = found["time"], found["u"], found["y"]
+    step, moved = float(np.median(np.diff(t))), u - u[0]
+    begun = int(np.argmax(np.abs(moved) > 0.5 * np.max(np.abs(moved))))
+    if not np.any(moved) or begun + 5 >= t.size:
+        raise bad_answer("plant", f"the input in {path.name} does not step")
+    rise = (y - y[0]) / (np.mean(y[-max(t.size // 20, 1) :]) - y[0])
+    slow = max(float(t[int(np.argmax(rise > 0.632))] - t[begun]), step)
+    gain = float((np.mean(y[-max(t.size // 20, 1) :]) - y[0]) / moved[-1])
+    late = max(float(t[int(np.argmax(rise > 0.05))] - t[begun]), step)
+    structure = parse_spec(
+        f"sample_time: {step!r}\nplant: {{continuous: {{gain: {gain!r}, time_constant: {slow!r}, "
+        f"dead_time: {late!r}}}, sample: zoh}}\n",
+        design=False,
+    )
+    point = {"u1": float(u[0]), "y1": float(np.mean(y[: max(begun, 1)]))}
+    model = tasks.identify(structure, path, operating_point=point).files["model.yaml"]
+    name, fitted = f"{stem}-model.yaml", parse_spec(model.decode(), design=False).plant
+    assert fitted.kind == "continuous"
+    values = {one.label: one.value for one in fitted.named_parameters}
+    listed = ", ".join(f"{label}: {short(value)}" for label, value in values.items())
+    return PlantAnswer(
+        (f"plant:  # estimated from {path.name}", f"  continuous: {{{listed}}}", "  sample: zoh"),
+        values["time_constant"],
+        values["dead_time"],
+        values=values,
+        files={name: model},
+        covariance=name,
+        sampling=step,
+        tunable=True,
+    )
+
+
+def _explored(path: Path, stem: str) -> PlantAnswer:
+    """The model of `idesign explore`, in a file beside the spec."""
+    from inputdesign_cli import tasks
+
+    found = tasks.explore([path])
+    name = f"{stem}-model.yaml"
+    if "model.yaml" not in found.results.files:
+        why = "; ".join(found.reasons) or "no model deserves trust"
+        raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
+    model = found.results.files["model.yaml"]
+    data = read(model.decode(), name).data
+    step = float(data.get("sample_time", 1.0)) if isinstance(data, dict) else 1.0
+    lines = (f"include: [{name}]  # plant and noise, explored in {path.name}",)
+    return PlantAnswer(lines, 20.0 * step, 0.0, files={name: model}, sampling=step)
+
+
+def _of_control(path: Path) -> PlantAnswer:
+    """num and den in s, as python-control has them, and a delay."""
+    try:
+        data = json.loads(read_regular(path))
+        num, den = ([float(c) for c in data[key]] for key in ("num", "den"))
+        late = float(data.get("delay", 0.0))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        message = f"{path} does not hold num and den: {error}"
+        raise DataError.because(
+            "bad-answer", message, 'write {"num": [2], "den": [180, 1], "delay": 25}'
+        ) from None
+    poles = np.roots(den)
+    decays = -poles.real[poles.real < 0]
+    if not decays.size:
+        raise bad_answer("plant", f"the system of {path.name} has no stable pole")
+    delay = f", delay: {short(late)}" if late else ""
+    return PlantAnswer(
+        (
+            f"plant:  # from {path.name}",
+            f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}",
+            "  sample: zoh",
+        ),
+        float(1.0 / decays.min()),
+        late,
+        tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
+    )

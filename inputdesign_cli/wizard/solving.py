@@ -1,0 +1,117 @@
+"""What a draft comes to, in the user's words; every number is that of a design that was computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.runs.results import Result
+from inputdesign_cli.specification import Spec
+from inputdesign_cli.wizard.composing import Draft
+from inputdesign_cli.wizard.phrases import short
+
+_GAP, _MOST_LINES = 0.02, 240
+_ROOM, _TRIES = 1.1, 4
+_MINUTE, _HOUR = 60.0, 3600.0
+
+Solve = Callable[[Spec], Result]
+
+
+def enough_lines(draft: Draft, solve: Solve) -> Draft:
+    """The draft with as many sinusoids as come within 2 % of every spectrum, at the plant as stated."""
+    while draft.lines is not None:
+        nominal = draft.spec().with_(uncertainty=None, **{"signal.samples": 2})
+        objective = solve(nominal)["objective"]
+        best = objective.get("any_spectrum_bound")
+        if best is None:
+            return draft.with_lines(draft.lines, "sinusoids; how near to every spectrum was not computed")
+        gap = float(objective["value"]) / float(best) - 1.0
+        told = f"so many sinusoids come within {100.0 * max(gap, 0.0):.2g} % of every spectrum"
+        if gap <= _GAP or 2 * draft.lines > min(_MOST_LINES, nominal.experiment.samples // 2):
+            return draft.with_lines(draft.lines, told)
+        draft = draft.with_lines(2 * draft.lines, told)
+    return draft
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How the best record within the means stands to what is asked: `ratio` of errors, one is enough."""
+
+    ratio: float
+    sentences: tuple[str, ...]
+
+    @property
+    def enough(self) -> bool:
+        """Whether the means are enough."""
+        return self.ratio <= 1.0
+
+
+def verdict(spec: Spec, result: Result, solve: Solve) -> Verdict:
+    """What is to be told, with a length that would do, which is tried."""
+    ratio, there = float(result["signal"]["worst_ratio"]), result["samples"] * spec.sample_time
+    means = f"{lasting(there)} at plus/minus {short(_peak(spec))}"
+    times = f"the error of this record is {ratio:.3g} times what is admitted"
+    found = _length_that_does(spec, ratio, solve)
+    said = [f"{means} is enough: {times}." if ratio <= 1.0 else f"{means} is not enough: {times}."]
+    if found is not None:
+        would = f"{lasting(found * spec.sample_time)} would do"
+        said.append(f"{would} (a record of {found} samples was designed, and does).")
+    loop = result.get("loop")
+    kept = spec.accuracy.loop
+    if kept is not None and loop and (ratio <= 1.0):
+        peak = 20.0 * np.log10(kept.peak)
+        said.append(
+            f"The peak of |S| stays below {peak:.3g} dB for every plant that the data will leave over (95 % "
+            f"confidence): a gain margin of {loop['gain_margin']:.3g} and {loop['phase_margin']:.3g} degrees."
+        )
+    drawn = result.get("robust", {}).get("scenarios")
+    if drawn:
+        said.append(
+            f"This holds at the plant as stated and at {drawn} others drawn from what you know of it."
+        )
+    return Verdict(ratio, tuple(said))
+
+
+def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
+    """Samples of a record that was designed and meets what is asked; None where none was found."""
+    samples = int(np.ceil(spec.experiment.samples * ratio**2 * _ROOM))
+    for _ in range(_TRIES):
+        changes = {"limits.duration": None, "experiment.samples": samples, "solver.any_spectrum": False}
+        try:
+            result = solve(spec.with_(**changes))
+        except IdesignError:
+            result = {}
+        found = result.get("signal", {}).get("worst_ratio")
+        if found is not None and found <= 1.0:
+            return int(result["signal"]["samples"])
+        samples = int(np.ceil(samples * (1.3 if found is None else max(1.1, _ROOM * float(found) ** 2))))
+        if ratio <= 1.0 and samples >= spec.experiment.samples:
+            return None
+    return None
+
+
+def to_log(spec: Spec, answer: str, file: str) -> list[str]:
+    """What to record, and how it is judged."""
+    offset = spec.signal.offset or 0.0
+    middle = f"u1={offset:g}" if isinstance(offset, float | int) else ""
+    return [
+        f"Bring the plant to rest at the operating point, apply signal.csv, and log time, u1 and y1 every "
+        f"{short(spec.sample_time)} {spec.time_unit}.",
+        f"Then: idesign assess {file} log.csv --operating-point {middle},y1=REST   (REST: y before it began)",
+    ]
+
+
+def lasting(seconds: float) -> str:
+    """A time as one says it."""
+    if seconds >= 2 * _HOUR:
+        return f"{seconds / _HOUR:.3g} h"
+    return f"{seconds / _MINUTE:.3g} min" if seconds >= 2 * _MINUTE else f"{seconds:.3g} s"
+
+
+def _peak(spec: Spec) -> float:
+    amplitude = spec.limits.amplitude
+    assert amplitude is not None
+    return float(np.max(amplitude.input or np.inf))

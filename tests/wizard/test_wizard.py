@@ -1,0 +1,186 @@
+"""The wizard: answers in words become a spec, and bad ones are told by the question."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, tasks
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.plants import TEMPLATES
+from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
+from inputdesign_cli.wizard.solving import enough_lines, lasting, verdict
+
+ENGINEER = {
+    "plant": "gain about 2, time constant about 3 min, dead time about 25 s, each within 30 %",
+    "wish": "PI loop with 6 dB",
+    "range": "plus/minus 5 around 40",
+    "time": "1 h",
+    "noise": "standard deviation 0.2",
+}
+WISHES = {
+    "heater": "PID loop with 6 dB",
+    "tank": "PI loop with 6 dB",
+    "motor": "parameters within 5 %",
+    "axis": "Bode plot within 10 % from 1 to 100",
+    "column": "prediction within 10 % up to 0.005",
+}
+DURATIONS = {"motor": "60 s", "axis": "60 s", "column": "10 h"}
+
+
+def test_the_sentence_of_the_engineer_is_a_spec():
+    spec = compose(ENGINEER, "x", Path()).spec()
+    assert len(QUESTIONS) <= 10
+    assert spec.uncertainty.intervals["gain"] == (1.4, 2.6)
+    assert spec.accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
+    assert spec.accuracy.loop.tuning.simc is not None
+    assert (spec.limits.amplitude.input, spec.signal.offset, spec.experiment.samples) == (5.0, 40.0, 720)
+    assert spec.noise.variance == pytest.approx(0.04)
+    assert spec.plant.continuous.time_constant == 180.0
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_templates_are_specs_that_can_be_designed(name):
+    answers = {**ENGINEER, "plant": name, "wish": WISHES[name], "time": DURATIONS.get(name, "1 h")}
+    draft = compose(answers, "x", Path())
+    spec = draft.spec().with_(uncertainty=None)
+    tasks.validate(spec)
+    assert spec.closed_loop == (name == "tank")
+    assert all("  #" in line or ":" in line for line in draft.text.splitlines()[1:])
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "told"),
+    [
+        ("plant", "a kettle", "none of these"),
+        ("plant", "gain 2, time constant -3", "positive"),
+        ("plant", "gain 0, time constant 3", "gain"),
+        ("plant", "gain 2, time constant 3 parsecs", "unit of time"),
+        ("plant", "gain 2, time constant 180, within 95 %", "less than 90"),
+        ("plant", "log nothing.csv", "no file"),
+        ("wish", "happiness", "per cent"),
+        ("wish", "PI loop", "margin"),
+        ("wish", "PI loop with 70 degrees", "60"),
+        ("wish", "own loop with 6 dB", "Kp"),
+        ("wish", "prediction within 5 %", "which frequency"),
+        ("wish", "Bode plot within 5 % from 2 to 1", "not below"),
+        ("range", "a bit", "no range"),
+        ("range", "45 to 35", "not below"),
+        ("range", "plus/minus 0", "positive"),
+        ("time", "soon", "no time"),
+        ("time", "-1 h", "no time"),
+        ("time", "10 s", "samples"),
+        ("limits", "be careful", "none of these"),
+        ("limits", "rate -2", "positive"),
+        ("noise", "little", "resolution"),
+        ("noise", "rest nothing.csv", "no file"),
+        ("drift", "perhaps", "yes nor no"),
+        ("loop", "closed", "Kp"),
+        ("signals", "square waves", "none of these"),
+        ("converter", "16", "none of these"),
+        ("range", "", "no answer"),
+    ],
+)
+def test_bad_answers_are_told_by_their_question(key, text, told):
+    with pytest.raises(SpecError) as caught:
+        compose({**ENGINEER, key: text}, "x", Path())
+    (found,) = caught.value.diagnostics
+    assert found.code == "bad-answer"
+    assert f"({key})" in found.message
+    assert told in found.message
+    assert found.hint.startswith("allowed: ")
+
+
+def test_answers_come_from_a_file_and_from_options(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("plant: heater\ndrift: no\ntime: 1 h\n")
+    assert read_answers(file, ["time=2 h"]) == {"plant": "heater", "drift": "no", "time": "2 h"}
+    for wrong in (["tim=2 h"], ["2 h"]):
+        with pytest.raises(SpecError) as caught:
+            read_answers(file, wrong)
+        assert caught.value.diagnostics[0].code == "bad-answer"
+
+
+def test_noise_at_rest_is_white_or_not(tmp_path):
+    rng = np.random.default_rng(1)
+    e = 0.2 * rng.standard_normal(2000)
+    v = np.zeros(2000)
+    for t in range(1, 2000):
+        v[t] = 0.9 * v[t - 1] + e[t]
+    for name, y in (("white", e), ("coloured", v)):
+        (tmp_path / f"{name}.csv").write_text("y\n" + "\n".join(map(repr, (20 + y).tolist())))
+    white = compose({**ENGINEER, "noise": "rest white.csv"}, "x", tmp_path).spec().noise
+    coloured = compose({**ENGINEER, "noise": "rest coloured.csv"}, "x", tmp_path).spec().noise
+    assert white.variance == pytest.approx(0.04, rel=0.1)
+    assert white.D is None or len(np.atleast_1d(white.D)) == 1
+    assert coloured.variance == pytest.approx(0.04, rel=0.1)
+    assert coloured.D[1] == pytest.approx(-0.9, abs=0.04)
+
+
+def test_a_step_response_tells_the_plant_and_how_well(tmp_path):
+    rng, t = np.random.default_rng(2), 5.0 * np.arange(400)
+    y = 20 + 10 * 2.0 * np.where(t > 225, 1 - np.exp(-(t - 225) / 180), 0) + 0.2 * rng.standard_normal(400)
+    u = np.where(t >= 200, 50.0, 40.0)
+    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), u.tolist(), y.tolist(), strict=True)]
+    (tmp_path / "step.csv").write_text("\n".join(["time,u,y", *rows]))
+    draft = compose({**ENGINEER, "plant": "step step.csv"}, "x", tmp_path)
+    for name, content in draft.files.items():
+        (tmp_path / name).write_bytes(content)
+    plant = draft.spec().plant.continuous
+    assert plant.gain == pytest.approx(2.0, rel=0.02)
+    assert plant.time_constant == pytest.approx(180, rel=0.05)
+    assert plant.dead_time == pytest.approx(25, abs=6)
+    tasks.validate(draft.spec().with_(**{"uncertainty.scenarios": 3}))
+
+
+def test_a_system_of_python_control_comes_as_a_file(tmp_path):
+    (tmp_path / "g.json").write_text(json.dumps({"num": [2], "den": [180, 1], "delay": 25}))
+    draft = compose({**ENGINEER, "plant": "g.json"}, "x", tmp_path)
+    assert draft.spec().plant.continuous.delays == ((25.0,),)
+    assert draft.spec().sample_time == 5.0
+
+
+def test_as_many_sinusoids_as_come_near_to_every_spectrum():
+    gaps = iter([1.5, 1.05, 1.01])
+    draft = compose(ENGINEER, "x", Path())
+    seen = []
+
+    def solve(spec):
+        seen.append(spec.spectrum.lines)
+        return {"objective": {"value": next(gaps), "any_spectrum_bound": 1.0}}
+
+    found = enough_lines(draft, solve)
+    assert (seen, found.lines) == ([60, 120, 240], 240)
+    assert "within 1 %" in found.text
+
+
+def test_what_is_told_was_designed():
+    spec = compose(ENGINEER, "x", Path()).spec()
+
+    def solve(changed):
+        ratio = 0.5 * np.sqrt(720 / changed.experiment.samples)
+        return {"signal": {"worst_ratio": ratio, "samples": changed.experiment.samples}, "samples": 0}
+
+    result = {"samples": 720, "signal": {"worst_ratio": 0.5}}
+    found = verdict(spec, result, solve)
+    assert found.enough
+    assert "60 min at plus/minus 5 is enough" in found.sentences[0]
+    assert f"{lasting(5 * 199)} would do" in found.sentences[1]
+    missed = verdict(spec, {"samples": 720, "signal": {"worst_ratio": 1.5}}, solve)
+    assert "not enough" in missed.sentences[0]
+
+
+def test_every_question_has_an_example_that_is_understood():
+    for text in ("35 to 45", "plus/minus 5", "plus/minus 5 around 40"):
+        assert compose({**ENGINEER, "range": text}, "x", Path()).spec().limits.amplitude.input == 5.0
+    limited = compose({**ENGINEER, "limits": "rate 0.5, output 3"}, "x", Path()).spec().limits
+    assert (limited.rate, limited.amplitude.output) == (2.5, 3.0)
+    drifting = compose({**ENGINEER, "drift": "yes"}, "x", Path())
+    assert "drift: true" in drifting.text
+    converter = (
+        compose({**ENGINEER, "converter": "12 bits up to 100"}, "x", Path()).spec().signal.quantisation
+    )
+    assert (converter.bits, converter.range) == (12, 100.0)
+    assert parse_spec(drifting.text).noise.drift
