@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def read_spec(
-    file: Path, overrides: Sequence[str] | None, confine: Path | None, *, design: bool = True
+    file: Path, overrides: Sequence[str] | None, confine: Path | None, *, design: bool | None = True
 ) -> Spec:
     """The spec in a file; `-` is standard input, whose names of files are relative to the current folder.
 
     Args:
-        design: whether it must ask for a design, see `load_spec`.
+        design: whether it must ask for a design, None: if it states anything of one; see `load_spec`.
 
     Raises:
         SpecError: as `load_spec`.

@@ -22,21 +22,30 @@ def validate(
 ) -> None:
     """Check specs without computing a design.
 
-    A valid spec can be read and is well posed. All problems of all files are reported at once.
+    A valid spec can be read and is well posed. One that states nothing of a design (accuracy, limits,
+    spectrum, ..) is checked for what `identify` needs. All problems of all files are reported at once.
     """
     from inputdesign_cli.tasks import validate as check
 
     errors: list[IdesignError] = []
+    estimated: list[Path] = []
     for path in specs:
         try:
-            check(read_spec(path, overrides, confine))
+            spec = read_spec(path, overrides, confine, design=None)
+            check(spec)
         except IdesignError as error:
             errors.append(error)
         else:
+            estimated += [] if spec.asks_for_design else [path]
             if not quiet and not json_output:
-                typer.echo(f"{path}: valid")
+                typer.echo(
+                    f"{path}: valid" + ("" if spec.asks_for_design else " for identify; no design is asked")
+                )
     if errors:
         worst = max(errors, key=lambda error: error.exit_code)
         raise type(worst)([diagnostic for error in errors for diagnostic in error.diagnostics])
     if json_output:
-        typer.echo(json.dumps({"valid": [str(path) for path in specs]}, indent=1, ensure_ascii=False))
+        found = {"valid": [str(path) for path in specs]}
+        if estimated:
+            found["for_identify_only"] = [str(path) for path in estimated]
+        typer.echo(json.dumps(found, indent=1, ensure_ascii=False))

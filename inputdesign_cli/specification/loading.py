@@ -15,7 +15,7 @@ from inputdesign_cli.specification.durations import in_samples
 from inputdesign_cli.specification.models.experiment import Cost
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.pydantic_errors import shorten, translate
-from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
 from inputdesign_cli.specification.models.spectrum import FirSpectrum
 from inputdesign_cli.specification.named_files import keep_inside
 from inputdesign_cli.specification.yaml.files import read_text
@@ -36,7 +36,7 @@ def load_spec(
     overrides: Sequence[str] = (),
     *,
     confine: FilePath | None = None,
-    design: bool = True,
+    design: bool | None = True,
 ) -> Spec:
     """Read a spec file.
 
@@ -44,7 +44,8 @@ def load_spec(
         path: The YAML file.
         overrides: `key.path=value` texts, applied in order; the value is YAML, `null` removes the key.
         confine: The folder outside of which the spec may name no files.
-        design: Whether it must ask for a design, or for an analysis, that can be answered.
+        design: Whether it must ask for a design, or for an analysis, that can be answered; None: if it states
+            anything of one.
 
     Returns:
         The checked spec, with defaults filled in.
@@ -65,7 +66,7 @@ def parse_spec(
     *,
     folder: FilePath | None = None,
     confine: FilePath | None = None,
-    design: bool = True,
+    design: bool | None = True,
 ) -> Spec:
     """Read a spec from its text, as `load_spec` does from a file.
 
@@ -82,6 +83,7 @@ def parse_spec(
     """
     folder = folder or FilePath()
     tree = read_tree(text.removeprefix("\ufeff"), file, overrides, folder, confine)
+    design = any(key in tree.data for key in OF_DESIGNS) if design is None else design
     spec, found = _validate(tree, design=design)
     diagnostics = [*tree.diagnostics, *(one.placed(tree.places, "the spec") for one in found)]
     if diagnostics or spec is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inputdesign_cli.specification.models.spec import Spec
+from inputdesign_cli.specification.models.spec import OF_DESIGNS, Spec
 from inputdesign_cli.specification.yaml.include import KEY
 from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.version import __version__
@@ -19,7 +19,14 @@ def json_schema() -> dict[str, Plain]:
         "description": "Files whose blocks stand where the spec has none, such as model.yaml of `identify`.",
         "anyOf": [names, {"type": "array", "items": names, "minItems": 1}],
     }
-    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": [KEY]}]
+    schema.pop("required")
+    variance = {"noise": {"required": schema["$defs"]["Noise"].pop("required")}}
+    schema["anyOf"] = [
+        {"required": ["plant", "noise"], "properties": variance},
+        {"required": [KEY]},
+        # Only to be estimated from: the noise is estimated as well.
+        {"required": ["plant"], "properties": dict.fromkeys(OF_DESIGNS, False)},
+    ]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:inputdesign-cli:spec:{__version__}",

@@ -61,9 +61,9 @@ def analyse(spec: Spec) -> Results:
 
 
 def validate(spec: Spec) -> None:
-    """Read, check and set up, but compute nothing."""
+    """Read, check and set up, but compute nothing: the design, or the estimation where none is asked for."""
     with _placed(spec):
-        build_task(spec)
+        build_task(spec) if spec.asks_for_design else build_identification(spec)
 
 
 def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:

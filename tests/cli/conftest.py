@@ -24,6 +24,8 @@ def verbs(monkeypatch):
     calls = []
 
     class Stated:
+        asks_for_design = True
+
         def __init__(self, path):
             self.stem = path.stem
 

@@ -9,6 +9,8 @@ import jsonschema
 import pytest
 
 import inputdesign_cli
+from inputdesign_cli import parse_spec, validate
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.specification import json_schema
 from inputdesign_cli.specification.yaml.reader import read
 
@@ -30,7 +32,10 @@ def schema():
 def test_it_is_json_and_closed(schema):
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
-    assert schema["anyOf"] == [{"required": ["plant", "noise"]}, {"required": ["include"]}]
+    whole, included, estimated = schema["anyOf"]
+    assert whole == {"required": ["plant", "noise"], "properties": {"noise": {"required": ["variance"]}}}
+    assert included == {"required": ["include"]}
+    assert estimated["required"] == ["plant"]
     assert schema["additionalProperties"] is False
     for definition in schema["$defs"].values():
         assert definition["additionalProperties"] is False
@@ -88,3 +93,28 @@ def test_an_editor_accepts_the_shipped_specs(schema, path):
 @pytest.mark.parametrize("wrong", ["spectrum: {typ: fir}", "sweep: {set: {a: 3}}", "sweep: {}"])
 def test_an_editor_refuses_what_is_no_spec(schema, wrong):
     assert not accepts(read(GOOD + wrong, "x").data, schema)
+
+
+ESTIMATED = {
+    "plant alone": "plant: {B: [0, 1], F: [1, -0.5]}",
+    "colour": "plant: {B: [0, 1], F: [1, -0.5]}\nnoise: {C: [1, -0.2]}",
+    "in s": "plant: {continuous: {gain: 1, time_constant: 9, dead_time: 0.5}, sample: zoh}\nsample_time: 0.5",
+    "loop": "plant: {B: [0, 1], F: [1, -0.5]}\nexperiment: {controller: {pid: {Kp: 0.1}}}",
+    "levels": "plant: {B: [0, 1], F: [1, -0.5]}\nsignal: {offset: 3}",
+}
+
+
+@pytest.mark.parametrize("text", ESTIMATED.values(), ids=ESTIMATED)
+def test_a_spec_to_estimate_from_needs_no_noise_and_no_question(text, schema):
+    assert accepts(read(text, "x").data, schema)
+    validate(parse_spec(text, design=None))
+
+
+@pytest.mark.parametrize("text", ESTIMATED.values(), ids=ESTIMATED)
+@pytest.mark.parametrize(
+    "asked", ["accuracy: {criterion: D}", "limits: {input_power: 1}", "spectrum: {type: white}"]
+)
+def test_who_asks_for_a_design_needs_the_noise(text, asked, schema):
+    assert not accepts(read(f"{text}\n{asked}", "x").data, schema)
+    with pytest.raises(SpecError):
+        parse_spec(f"{text}\n{asked}", design=None)

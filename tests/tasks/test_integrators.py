@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.tasks.build.system import build_model
 
@@ -224,18 +224,23 @@ signal: {type: multisine, samples: 600, seed: 1}
     assert found["signal"]["worst_ratio"] <= 1.0 + 1e-9
 
 
-def test_drift_that_one_output_has_and_no_controller_takes_away():
-    text = """
-plant: {B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1], [1, -0.8]]]}
-noise: {drift: [true, false], variance: 0.1}
-experiment: {samples: 300, controller: {numerator: [[[0.3], [0]], [[0], [0.2]]], denominator: [1]}}
-accuracy: {standard_deviation: {"b1[1,1]": 0.01}}
+@pytest.mark.parametrize("last", [0.0, -1.0], ids=["proportional", "integrates"])
+@pytest.mark.parametrize("drift", ["[true, false]", "[false, true]"])
+def test_drift_of_one_output_reaches_the_other_through_any_controller(drift, last):
+    text = f"""
+plant:
+  {{B: [[[0, 0.3], [0, 0.1]], [[0, 0.2], [0, 0.5]]], F: [[[1, -0.5], [1, -0.5]], [[1, -0.2], [1, -0.8]]]}}
+noise: {{drift: {drift}, variance: 0.1}}
+experiment:
+  {{samples: 300, controller: {{numerator: [[[0.3], [0]], [[0], [0.2]]], denominator: [1, {last}]}}}}
+accuracy: {{standard_deviation: {{"b1[1,1]": 0.01}}}}
 """
     with pytest.raises(SpecError) as caught:
-        solve(parse_spec(text))
+        validate(parse_spec(text))
     (found,) = caught.value.diagnostics
     assert found.code == "infinite-information"
     assert "let every output drift" in found.hint
+    validate(parse_spec(text, overrides=["noise.drift=true"]))
 
 
 def test_a_criterion_of_the_loop_error_refuses_integrators():

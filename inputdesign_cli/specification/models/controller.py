@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -25,6 +25,8 @@ _DELAY = "Samples that computing takes: u(t) answers y(t - delay)."
 
 class Pid(Section):
     """Kp (1 + 1 / (Ti s) + Td s / (Tf s + 1)), times in time_unit."""
+
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {"Ki": "write Ti: Kp / Ki", "Kd": "write Td: Kd / Kp"}
 
     Kp: Number = Field(description="Gain; negative where more input means less output.", examples=[2.0])
     Ti: Time | None = Field(default=None, description="Integral time; absent: no integral action.")

@@ -12,6 +12,7 @@ from pydantic_core import core_schema
 
 from inputdesign_cli.expressions import Expression, ExpressionError, is_name
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
+from inputdesign_cli.specification.models.units import without_unit
 from inputdesign_cli.specification.models.values import depth
 from inputdesign_cli.specification.wording import nearest
 from inputdesign_cli.specification.yaml.places import Path
@@ -88,7 +89,7 @@ def check_names(parameters: Mapping[str, float]) -> Iterator[PathDiagnostic]:
             yield PathDiagnostic(
                 "bad-name",
                 f"{clip(name)} is no name of a parameter",
-                "a name is a letter, then letters, digits and _; functions, pi and lambda are taken",
+                "a name is a letter (a to z), then letters, digits, _; functions, pi and lambda are taken",
                 ("parameters", name),
                 at_key=True,
             )
@@ -123,7 +124,12 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
         expression = Expression.of(value)
     except ExpressionError as error:
         found.append(
-            PathDiagnostic("bad-expression", f"{{key}} {error.message}: {clip(value)}", error.hint, path)
+            PathDiagnostic(
+                "bad-expression",
+                f"{{key}} {error.message}: {clip(value)}",
+                without_unit(value, None, None) or error.hint,
+                path,
+            )
         )
         return 1.0
     unknown = sorted(expression.names - parameters.keys())
@@ -138,7 +144,7 @@ def worth(value: Plain, parameters: Mapping[str, float], path: Path, found: list
     number, slope = expression.at(list(parameters), np.array(list(parameters.values()), dtype=float))
     if math.isfinite(number) and np.all(np.isfinite(slope)):
         return number
-    what = "has no derivative" if math.isfinite(number) else "has no value"
+    what = "has no derivative" if math.isfinite(number) else "has no value or no derivative"
     found.append(
         PathDiagnostic(
             "undefined-expression",

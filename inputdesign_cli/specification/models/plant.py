@@ -126,6 +126,10 @@ class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials
     kind: ClassVar[Literal["polynomial"]] = "polynomial"
     sampled: ClassVar[bool] = True
     TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ("A", "B", "F")
+    ELSEWHERE: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("delay", "dead_time"),
+        "the leading zeros of B are the delay: B: [0, 0, 0, 1] is one of three samples",
+    )
 
     A: Annotated[MonicPerOutput, EXPRESSIONS] = Field(
         default=(1.0,), description="Monic; common to all outputs or a list with one per output (default 1)."

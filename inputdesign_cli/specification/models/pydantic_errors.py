@@ -180,8 +180,23 @@ def _unknown_key(path: Path, model: type[Section] | None, root: type[Section]) -
         hint = f"{key} belongs {choices(homes)}"
     elif near:
         hint = f'did you mean "{near}"?'
+    inside = _holding(model, key)
+    if inside:
+        hint = f"{key} belongs under {choices(inside)}"
+    if model is not None and key in model.ELSEWHERE:
+        hint = model.ELSEWHERE[key]
     message = f"{clip(key)} is not a key of {owner}"
     return PathDiagnostic("unknown-key", message, hint, path, at_key=True, meant=near or "")
+
+
+def _holding(model: type[Section] | None, key: str) -> list[str]:
+    """The keys beside it under which a key that was written too far out belongs."""
+    fields = model.model_fields.items() if model is not None else ()
+    return [
+        name
+        for name, field in fields
+        if any(key in part.model_fields for part in sections_in(field.annotation))
+    ]
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import ClassVar, Self
 
 from pydantic import (
@@ -54,6 +54,9 @@ class Section(BaseModel):
     def check(self) -> Iterator[PathDiagnostic]:
         """What is wrong with the section as a whole, once each of its values is valid."""
         return iter(())
+
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {}
+    """Keys that people write here -> how this section says the same."""
 
     def stated(self, *keys: str) -> tuple[str, ...]:
         """Those of the keys that have a value."""

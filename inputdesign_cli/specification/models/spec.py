@@ -42,6 +42,20 @@ class Reader(Protocol):
         """A spec of YAML with overrides."""
 
 
+OF_DESIGNS = (
+    "accuracy",
+    "campaign",
+    "cost",
+    "limits",
+    "objective",
+    "simulation",
+    "spectrum",
+    "sweep",
+    "uncertainty",
+)
+"""Keys of which a spec that is only estimated from has none."""
+
+
 class Spec(Section):
     """An experiment to be designed: everything that a spec file says, checked, with defaults filled in.
 
@@ -149,6 +163,11 @@ class Spec(Section):
     def closed_loop(self) -> bool:
         """Whether the experiment runs under a controller."""
         return self.experiment.controller is not None
+
+    @property
+    def asks_for_design(self) -> bool:
+        """Whether it was read as one that asks for a design or an analysis; else it is for `identify`."""
+        return self._design
 
     @property
     def given(self) -> Given | None:

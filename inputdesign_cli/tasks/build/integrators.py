@@ -22,8 +22,9 @@ from inputdesign_cli.tasks.build.header import build_units
 # Poles so near to zero are poles there; those of gradients are of no higher order.
 _AT_ZERO, _HIGHEST = 1e-7, 8
 # On half the distance to the next pole so many points leave the sums exact to rounding.
-_POINTS = 64
-_ROUNDING = 1e-10
+_POINTS = 128
+_NONE = slice(20, 60)
+_ABOVE, _ROUNDING = 30.0, 1e-10
 # Of the band, what is left out where nothing else says it.
 _MARGIN = 0.01
 
@@ -46,7 +47,10 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
                 f"{known}; in q^-1 it may be free as a root of A, where the noise passes through it as well"
             )
             if any(spec.noise.drifts) and not all(spec.noise.drifts):
-                hint = "let the controller integrate where outputs drift, or let every output drift"
+                hint = (
+                    "the inputs wander with the drift that they counteract: let every output drift (noise: "
+                    "{drift: true})"
+                )
             raise spec.complain(
                 "infinite-information",
                 f"the noise alone, which is integrated and fed back, tells without end of {endless}",
@@ -105,9 +109,10 @@ def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]
     radius = min(0.5 * nearest, 1.0 / max(source.memory, 1.0))
     turn = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
     around = response(radius * turn)
-    powers = turn ** np.arange(1, _HIGHEST + 1)[:, None]
-    principal: Array = np.abs(np.tensordot(powers, around, 1)).max(axis=(0, 2, 3)) / _POINTS
-    return np.asarray(principal > _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
+    powers: Array = np.abs(np.fft.ifft(around, axis=0)).max(axis=(2, 3))
+    # Poles of such high order there are none: what stands there is rounding, as in all others.
+    rounding = np.maximum(_ABOVE * powers[_NONE].max(axis=0), _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
+    return np.asarray(powers[1 : _HIGHEST + 1].max(axis=0) > rounding)
 
 
 def _lowest_line(spec: Spec, hi: float) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,12 @@ from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
 from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
 from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
-from inputdesign_cli.specification.models.plant import TruePlant
+from inputdesign_cli.specification.models.plant import (
+    ContinuousPlant,
+    PolynomialPlant,
+    StateSpacePlant,
+    TruePlant,
+)
 from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
@@ -79,6 +85,34 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, problem))
 
 
+def _not_coefficients(
+    plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, noise: Noise | SimulationNoise, key: str
+) -> Iterator[tuple[str, str, str]]:
+    """What is estimated otherwise than coefficient by coefficient: its key, in words, and how to mend it."""
+    for part, listed in (("noise", noise.known), (key, plant.known)):
+        if listed:
+            yield f"{part}.known", f"{part} has known parameters", "remove known"
+    if plant.parameters is not None:
+        hint = "remove parameters, and write numbers for the expressions in them"
+        yield f"{key}.parameters", f"{key} has named parameters", hint
+    elif plant.named_parameters and plant.kind == "continuous":
+        names = ", ".join(dict.fromkeys(one.label.split("[")[0] for one in plant.named_parameters))
+        hint = f"write {_coefficients(plant)} under continuous"
+        yield f"{key}.continuous", f"the parameters of {key} are {names}", hint
+
+
+def _coefficients(plant: ContinuousPlant) -> str:
+    """A plant in s by its numerators, denominators and dead times."""
+    s, single = plant.continuous, (plant.inputs, plant.outputs) == (1, 1)
+    matrices = (
+        [[[float(f"{c:.12g}") for c in entry] for entry in row] for row in matrix]
+        for matrix in (s.numerator_matrix, s.denominator_matrix)
+    )
+    above, below = (rows[0][0] if single else rows for rows in matrices)
+    late = s.delays[0][0] if single else [list(row) for row in s.delays]
+    return f"{{numerator: {above}, denominator: {below}, delay: {late}}}"
+
+
 def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
     """The matrix of polynomials of `plant` or of the true system `simulation.plant`."""
     if noise.variance is None:
@@ -96,15 +130,14 @@ def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: st
             key="noise.drift",
         )
     if plant.kind != "parameters" and plant.kind != "regression":
-        for part, listed in (("noise", noise.known), (key, plant.known or plant.named_parameters)):
-            if listed:
-                raise bad_spec(
-                    "not-supported",
-                    "this version designs for the closed-loop error with every coefficient of the sampled "
-                    f"plant estimated, and {part} has known or named parameters",
-                    hint="remove known, and write numbers for coefficients",
-                    key=part,
-                )
+        for part, why, hint in _not_coefficients(plant, noise, key):
+            raise bad_spec(
+                "not-supported",
+                "this version designs for the closed-loop error with every coefficient of the sampled "
+                f"plant estimated, and {why}",
+                hint=hint,
+                key=part,
+            )
     if plant.kind == "continuous" and plant.sampled:
         plant = held_plant(plant, spec.sample_time)
     if plant.kind != "polynomial":
