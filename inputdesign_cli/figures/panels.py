@@ -75,7 +75,7 @@ def draw_panels(
         else:
             axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
         if below is not None or any(row > i and column == j for row, column in places):
-            axes.tick_params(labelbottom=False)
+            axes.tick_params(which="both", labelbottom=False)
             axes.set_xlabel("")
     if title and single:
         page.suptitle(title, x=0.01, ha="left")

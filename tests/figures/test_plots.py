@@ -352,3 +352,14 @@ def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kin
     assert list(drawn) == [f"bound.{kind}"]
     assert drawn[f"bound.{kind}"].startswith(begins)
     assert draw_all(results, kind) == drawn
+
+
+def test_numbers_stand_under_the_lowest_panel_only(page):
+    narrow = BoundPanel(
+        W[120:150], G[120:150], G[120:150], 2 * G[120:150]
+    )  # within a decade, minor ticks too
+    figure = page(bound(narrow))
+    figure.canvas.draw()
+    above, below = figure.axes
+    assert not any(text.get_visible() and text.get_text() for text in above.get_xticklabels(which="both"))
+    assert any(text.get_visible() and text.get_text() for text in below.get_xticklabels(which="both"))
