@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.loop import Loop, close_loop
+from inputdesign_cli.plant.loop import BESIDE, INTEGRATES, Loop, beside_zero, close_loop
 from inputdesign_cli.plant.loop_around import LoopAround
 from inputdesign_cli.plant.model import Fraction, Listed, Parameter, Parametrised, row_parameters
 from inputdesign_cli.plant.polynomial import (
@@ -168,11 +168,27 @@ class Coloured(Parametrised):
 
     def plant_at(self, w: ArrayLike) -> ComplexArray:
         """G (n, p, r)."""
-        return self.plant.plant_at(w)
+        return self.plant.plant_at(self._beside_zero(w))
 
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
-        return self._with_own(self.plant.plant_gradient(w))
+        return self._with_own(self.plant.plant_gradient(self._beside_zero(w)))
+
+    @cached_property
+    def _nearest(self) -> float:
+        """The frequency below which all is taken to be as it is there; zero unless plant and noise integrate.
+
+        What the plant integrates, the prediction differences: their product is finite at frequency zero.
+        """
+        near = np.abs(self.plant.singularities)
+        if not self.integrates or np.all(near > INTEGRATES):
+            return 0.0
+        return BESIDE * float(
+            np.min(np.abs(self.singularities)[np.abs(self.singularities) > INTEGRATES], initial=1.0)
+        )
+
+    def _beside_zero(self, w: ArrayLike) -> Array | ComplexArray:
+        return beside_zero(w, self._nearest)
 
     def shape_at(self, w: ArrayLike) -> ComplexArray:
         """(n, p): C / (D Delta)."""
@@ -184,7 +200,8 @@ class Coloured(Parametrised):
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
-        return self._with_own(self.plant.input_gradient(w) * self._inverse_at(w)[:, None, :, None])
+        beside = self._beside_zero(w)
+        return self._with_own(self.plant.input_gradient(beside) * self._inverse_at(beside)[:, None, :, None])
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""

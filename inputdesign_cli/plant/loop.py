@@ -18,7 +18,7 @@ from inputdesign_cli.plant.transfer import TransferMatrix
 _WELL_POSED = 1e-9
 # A pole this near to z = 1 integrates. The loop is then read off this far from frequency zero, in shares of
 # the distance of its nearest pole: there all is as at zero, to the square of that share.
-_INTEGRATES, _BESIDE = 1e-7, 1e-5
+INTEGRATES, BESIDE = 1e-7, 1e-5
 _DELAY = (
     "give the plant its delay (a leading 0 in B; in s a numerator of lower order than the denominator) or "
     "the controller one (a leading 0 in its numerator)"
@@ -29,6 +29,12 @@ _SEVERAL = (
     "which output each column of the controller reads, and that entries of a row with the same poles share "
     "one denominator"
 )
+
+
+def beside_zero(w: ArrayLike, nearest: float) -> ComplexArray | Array:
+    """The frequencies `w`, those of the axis moved at least so far from zero."""
+    given = np.asarray(w)
+    return given if np.iscomplexobj(given) else np.where(np.abs(given) < nearest, nearest, given)
 
 
 @dataclass(frozen=True)
@@ -83,13 +89,13 @@ class Loop(ABC):
     def radius(self) -> float:
         """Of the farthest pole in z of what the excitation and the noise cause, integrators left out."""
         filters = self.predictor_poles
-        caused = np.concatenate([self.closed_poles, filters[np.abs(filters - 1.0) >= _INTEGRATES]])
+        caused = np.concatenate([self.closed_poles, filters[np.abs(filters - 1.0) >= INTEGRATES]])
         return float(np.abs(caused).max(initial=0.0))
 
     @property
     def integrates(self) -> bool:
         """Whether filters of the prediction are infinite at frequency zero; what the loop causes is not."""
-        return bool(np.any(np.abs(self.predictor_poles - 1.0) < _INTEGRATES))
+        return bool(np.any(np.abs(self.predictor_poles - 1.0) < INTEGRATES))
 
     @cached_property
     def _nearest(self) -> float:
@@ -97,14 +103,11 @@ class Loop(ABC):
         if not self.integrates:
             return 0.0
         near = np.abs(logarithmic_distance(self.closed_poles))
-        return _BESIDE * float(np.min(near, initial=1.0))
+        return BESIDE * float(np.min(near, initial=1.0))
 
     def _beside_zero(self, w: ArrayLike) -> ComplexArray | Array:
         """The frequencies `w`, moved off zero where the loop integrates; those off the axis stay."""
-        given = np.asarray(w)
-        if np.iscomplexobj(given):
-            return given
-        return np.where(np.abs(given) < self._nearest, self._nearest, given)
+        return beside_zero(w, self._nearest)
 
     @property
     def memory(self) -> float:

@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.tasks.build.system import build_model
 
 INTEGRATOR = """
 plant: {A: [1, -1], B: [0, 0.2]}
@@ -253,3 +254,32 @@ limits: {input_power: 1}
     with pytest.raises(SpecError) as caught:
         solve(parse_spec(text))
     assert caught.value.diagnostics[0].code == "not-supported"
+
+
+# Three ways to write k q^-1 / (1 - q^-1).
+SUMS = [
+    "{parameters: {k: 0.2}, B: [0, k], F: [1, -1]}",
+    "{parameters: {k: 0.2}, continuous: {numerator: [k], denominator: [1, 0]}, sample: zoh}",
+    "{parameters: {k: 0.2}, state_space: {A: [[1]], B: [[k]], C: [[1]], time: discrete}}",
+]
+DRIFTING = "noise: {drift: true, variance: 0.04}\nexperiment: {samples: 300}\n"
+
+
+@pytest.mark.parametrize("plant", SUMS)
+def test_an_integrator_beside_noise_that_drifts_tells_as_much_everywhere(plant):
+    """(1 - q^-1) G = k q^-1: the information in k is N power / variance, whatever the spectrum."""
+    asked = "accuracy: {standard_deviation: {k: 0.01}}\nspectrum: {type: multisine, lines: 20}\n"
+    spec = parse_spec(f"plant: {plant}\n{DRIFTING}{asked}")
+    assert solve(spec).result["cost"] == pytest.approx(0.04 / (300 * 0.01**2), rel=1e-9)
+    w = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, np.pi])
+    gradient = build_model(spec).input_gradient(w)[:, 0, 0, 0]
+    np.testing.assert_allclose(gradient, np.exp(-1j * w), atol=2e-5)
+
+
+@pytest.mark.parametrize("plant", SUMS)
+def test_outputs_that_wander_without_end_are_refused(plant):
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(f"plant: {plant}\n{DRIFTING}accuracy: {{standard_deviation: {{k: 0.01}}}}\n"))
+    (found,) = caught.value.diagnostics
+    assert found.code == "infinite-output"
+    assert "multisine" in found.hint

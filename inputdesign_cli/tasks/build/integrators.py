@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
@@ -59,7 +59,7 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
             )
     lo, hi = experiment.band
     grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
-    if not grown:
+    if not grown and not (lo == 0.0 and _wanders(experiment)):
         return experiment
     lowest = _lowest_line(spec, hi)
     if lowest is not None and lowest > 0.0:
@@ -70,17 +70,34 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     fir = spec.plant.sampled and (spec.spectrum is None or spec.spectrum.type == "fir")
     other = "spectrum: {type: free} with " if fir else ""
     raise spec.complain(
-        "infinite-information",
+        "infinite-information" if grown else "infinite-output",
         f"the plant integrates: power at frequency zero tells without end of {grown}, so that no design with "
-        "power there has a value",
+        "power there has a value"
+        if grown
+        else "the plant integrates: power at frequency zero makes the outputs wander without end, so that "
+        "they have no power",
         hint=f"leave it out, spectrum: {{type: multisine, lines: 100}} or {other}limits: {{band: "
         f"[{_MARGIN * hi / unit:.3g}, {hi / unit:.6g}]}}; or make the experiment in closed loop{loop}",
         key="spectrum" if spec.spectrum is not None else "plant",
     )
 
 
+def _wanders(experiment: Experiment) -> bool:
+    """Whether outputs grow without end towards zero, where what they tell may not: where noise drifts."""
+    model = experiment.model
+    if experiment.loop is not None or model.continuous:
+        return False
+    return bool(np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None])))
+
+
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:
-    """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero.
+    """The names of the parameters of which a gradient (n, k, ..) grows without end towards zero."""
+    grows = _grows(experiment, gradient)
+    return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
+
+
+def _grows(experiment: Experiment, response: Callable[[ArrayLike], ComplexArray]) -> NDArray[np.bool_]:
+    """(k,): which parts of a response (n, k, ..) grow without end towards zero.
 
     Its principal part there tells, however small: Cauchy's integrals over a circle in the plane of
     frequencies that holds no other pole. On the axis a weak pole would be seen from very near only.
@@ -91,12 +108,11 @@ def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArra
     # Far off the axis late signals differ too much in size.
     radius = min(0.5 * nearest, 1.0 / max(source.memory, 1.0))
     turn = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
-    around = gradient(radius * turn)
+    around = response(radius * turn)
     powers: Array = np.abs(np.fft.ifft(around, axis=0)).max(axis=(2, 3))
     # Poles of such high order there are none: what stands there is rounding, as in all others.
     rounding = np.maximum(_ABOVE * powers[_NONE].max(axis=0), _ROUNDING * np.abs(around).max(axis=(0, 2, 3)))
-    grows = powers[1 : _HIGHEST + 1].max(axis=0) > rounding
-    return ", ".join(name for name, one in zip(experiment.model.names, grows, strict=True) if one)
+    return np.asarray(powers[1 : _HIGHEST + 1].max(axis=0) > rounding)
 
 
 def _lowest_line(spec: Spec, hi: float) -> float | None:
