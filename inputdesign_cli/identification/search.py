@@ -64,7 +64,7 @@ def search(
     best = best_run(found)
     steps = int(found.steps[best] + np.broadcast_to(before, len(points))[best])
     point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])
-    if not converged and not quick and np.isfinite(point.cost) and records.dead_times.size:
+    if not converged and not quick and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
     first = point.errors[np.cumsum((0, *records.lengths[:-1]))]
@@ -76,17 +76,19 @@ def settled_at_kinks(records: Records, point: Point) -> Point | None:
     """Where a search settles that was stopped by kinks of the cost; None where that is not what stopped it.
 
     A dead time that passes a sampling instant makes a kink, and minima lie on kinks. There no step of Gauss
-    and Newton gains what its slopes promise. Dead times that block the way are held, one after the other; the
-    rest settles, and then each held one is moved to both sides, where the cost must be higher.
+    and Newton gains what its slopes promise; nor where the edge of stability mirrors a root. Parameters that
+    block the way are held, one after the other, dead times where there are some. The rest settles, and then
+    each held one is moved to both sides, where the cost must be higher.
     """
     size = point.theta.size
     held = np.zeros(size, dtype=bool)
+    blocking = records.dead_times.tolist() or range(size)
     for _ in range(_MOST_HELD_STEPS):
         step, gain = _newton(point, held)
         if gain * point.errors.size > _SETTLED * point.cost:
             trial = _moved(records, point, step)
             if trial.cost >= point.cost:
-                more = [held | _unit(size, j) for j in records.dead_times.tolist() if not held[j]]
+                more = [held | _unit(size, j) for j in blocking if not held[j]]
                 if not more:
                     return None
                 tried = [_moved(records, point, _newton(point, blocking)[0]) for blocking in more]

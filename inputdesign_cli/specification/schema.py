@@ -25,7 +25,7 @@ def json_schema() -> dict[str, Plain]:
         {"required": ["plant", "noise"], "properties": variance},
         {"required": [KEY]},
         # Only to be estimated from: the noise is estimated as well.
-        {"required": ["plant"], "properties": dict.fromkeys(OF_DESIGNS, False)},
+        {"required": ["plant"], "properties": {key: {"not": {}} for key in OF_DESIGNS}},
     ]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

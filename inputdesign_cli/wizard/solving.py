@@ -23,7 +23,7 @@ Solve = Callable[[Spec], Result]
 def enough_lines(draft: Draft, solve: Solve) -> Draft:
     """The draft with as many sinusoids as come within 2 % of every spectrum, at the plant as stated."""
     while draft.lines is not None:
-        nominal = draft.spec().with_(uncertainty=None, **{"signal.samples": 2})
+        nominal = draft.spec().with_(uncertainty=None, **{"signal.candidates": 1})
         objective = solve(nominal)["objective"]
         best = objective.get("any_spectrum_bound")
         if best is None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import InaccurateError, SpecError
+from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.runs.results import Results, Table
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
 
@@ -90,9 +90,9 @@ def test_no_result_holds_a_number_that_is_none(value):
 
 def test_a_record_too_short_to_meet_the_accuracy_says_so():
     text = f"plant: {{B: [0, 0, 0, 1], F: [1, -0.7]}}\nnoise: {{variance: 1}}\n{BOUND}\n"
-    found = solve(parse_spec(text + "experiment: {samples: 3}")).result
-    assert found["status"] == "optimal"
-    assert any("samples" in note for note in found["notes"])
+    with pytest.raises(InfeasibleError, match="no record of 3 samples") as found:
+        solve(parse_spec(text + "experiment: {samples: 3}"))
+    assert found.value.diagnostics[0].code == "record-too-short"
 
 
 def test_nothing_asked_needs_nothing():

@@ -36,7 +36,7 @@ def test_a_record_longer_than_allowed_is_noted(tmp_path):
     (tmp_path / "u.csv").write_text("u\n" + "1\n-1\n1\n" * 40)
     given = f"spectrum={{given: {{signal: {tmp_path / 'u.csv'}}}}}"
     spec = load_spec(ONE, [given, "limits={samples: 100}", "experiment.samples=100"])
-    (note,) = analyse(spec).result["notes"]
+    note, *_ = analyse(spec).result["notes"]
     assert "120 samples, more than 100" in note
 
 
