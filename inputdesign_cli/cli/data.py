@@ -125,7 +125,7 @@ def assess(
     that, after these data, meets it: its signal is ready to apply. Exits with 5, undecided, where tests of
     the residuals refute the model structure; the note says what to change.
     """
-    place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output)
+    place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output, judges=True)
     with status(f"{data[0]}: computing ...", quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.runs.origin import check_counted_once

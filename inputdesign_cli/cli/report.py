@@ -9,6 +9,7 @@ import typer
 
 from inputdesign_cli.cli.options import Quiet, path_option
 from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.errors import OutputError
 
 
 def report(
@@ -31,11 +32,14 @@ def report(
     charts. It needs no network and no script, and can be printed.
     """
     with status(f"{directory}: writing ...", quiet=quiet):
-        from inputdesign_cli.report.render import report_text
+        from inputdesign_cli.report.render import is_page, report_text
         from inputdesign_cli.runs.record import PAGE
         from inputdesign_cli.runs.run_directory import replace_text
 
         file = output or directory / PAGE
+        if file.exists() and not is_page(file):
+            hint = "choose another name, or move it away: only a page that idesign wrote is replaced"
+            raise OutputError.because("output-exists", f"{file} exists already, and is no report", hint)
         replace_text(file, report_text(directory))
     if not quiet:
         typer.echo(file)

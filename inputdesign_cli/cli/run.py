@@ -27,6 +27,7 @@ class Place:
     sources: Sequence[Path]
     overwrite: bool = False
     nowhere: bool = False  # nothing is written
+    judges: bool = False  # the run has a verdict
     asked: str = ""  # the spec as it was read
 
     def __post_init__(self) -> None:
@@ -43,7 +44,7 @@ class Place:
         """What the run is made from."""
         from inputdesign_cli.runs.origin import Origin
 
-        return Origin(self.sources, self.asked, self.overwrite)
+        return Origin(self.sources, self.asked, self.overwrite, self.judges)
 
     def checked(self, spec: Spec | None) -> Place:
         """The same for the run of a spec that was read; to be asked for before anything is computed.

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 # What a record leads to that somebody else wrote or changed: no schema says what each of its numbers must be.
 _BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
+_GENERATOR = b'<meta name="generator" content="idesign '
 
 
 def report_text(directory: Path) -> str:
@@ -38,6 +39,14 @@ def report_text(directory: Path) -> str:
     message = f"{directory} holds neither a finished run nor a sweep"
     hint = "make one with `idesign solve SPEC -o DIR` or `idesign sweep SPEC -o DIR`"
     raise DataError.because("run-missing", message, hint)
+
+
+def is_page(file: Path) -> bool:
+    """Whether a file is a page that was made here."""
+    try:
+        return _GENERATOR in read_regular(file)[:1000]
+    except OSError:
+        return False
 
 
 def _filled(

@@ -24,12 +24,13 @@ from inputdesign_cli.runs.results import Json
 class Origin:
     """What a run is made from: files, the spec first, and the spec as it was read, with overrides.
 
-    `overwrite` is whether the run of something else may be replaced.
+    `overwrite` is whether the run of something else may be replaced, `judges` whether the run has a verdict.
     """
 
     files: Sequence[Path]
     asked: str = ""
     overwrite: bool = False
+    judges: bool = False
 
     def seen_from(self, target: Path) -> list[str]:
         """The paths of a spec (`-` if it came from standard input) and of data relative to `target`."""
@@ -180,4 +181,7 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
     if known[1:] != ours[1:] or not (same or same_file or ours[:1] == [SPEC]):
         of = f" of {', '.join(map(str, known))} (as seen from there)" if known else " of something else"
         message = f"{shown} holds the run{of}, and would lose it"
+        raise OutputError.because("output-other-run", message, hint)
+    if "assessment" in result and not origin.judges:
+        message = f"{shown} holds the verdict of assess on these data, and would lose it"
         raise OutputError.because("output-other-run", message, hint)

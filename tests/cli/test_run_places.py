@@ -253,3 +253,31 @@ def test_places_that_cannot_be_are_refused_before_anything_is_computed(run, verb
     assert code == 2
     assert told in " ".join(err.split())
     assert not verbs
+
+
+def test_a_verdict_is_replaced_by_a_verdict_only(tmp_path):
+    files, spec = [tmp_path / "a.yaml", tmp_path / "d.csv"], SPEC.format("a")
+    judged = Results({"format": 1, "assessment": {"verdict": "missed"}}, spec)
+    write_run(judged, tmp_path / "run", origin=Origin(files, judges=True))
+    check_place(tmp_path / "run", Origin(files, judges=True), spec)
+    with pytest.raises(OutputError, match="would lose it") as raised:
+        check_place(tmp_path / "run", Origin(files), spec)
+    assert raised.value.diagnostics[0].code == "output-other-run"
+    check_place(tmp_path / "run", Origin(files, overwrite=True), spec)
+
+
+def test_a_report_replaces_pages_of_its_own_only(analyse, tmp_path, monkeypatch, capsys):
+    assert analyse(write(tmp_path / "a.yaml", "a")) == (0, "")
+
+    def report(name):
+        monkeypatch.setattr(sys, "argv", ["idesign", "report", "runs/a", "-o", name])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code or 0, "output-exists" in capsys.readouterr().err
+
+    (tmp_path / "data.csv").write_text("u,y\n1,2\n")
+    spec = (tmp_path / "runs" / "a" / "spec.yaml").read_text()
+    assert report("page.html") == report("page.html") == (0, False)
+    assert report("data.csv") == report("runs/a/spec.yaml") == (2, True)
+    assert (tmp_path / "data.csv").read_text() == "u,y\n1,2\n"
+    assert (tmp_path / "runs" / "a" / "spec.yaml").read_text() == spec
