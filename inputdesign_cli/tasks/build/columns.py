@@ -29,9 +29,22 @@ _WITH_UNIT = re.compile(r"(.*\S)\s*[(\[]([^)\]]*)[)\]]")
 
 
 def channel_columns(letter: str, count: int, sheet: Sheet, preparation: Preparation) -> dict[str, str]:
-    """Channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user said."""
+    """Channel -> how its column begins: u1, u2, ..; u or u1 for a single one; or what the user said.
+
+    Raises:
+        DataError: a single channel has a column of either name.
+    """
     found = {}
     for name in (f"{letter}{i + 1}" for i in range(count)):
+        either = [
+            [header for header in sheet.header if re.match(rf"{start}(?![a-z0-9])", header)]
+            for start in (letter, name)
+        ]
+        if count == 1 and name not in preparation.columns and all(either):
+            listed = f": {', '.join([*either[0], *either[1]])}" if sheet.shown else ""
+            message = f"{sheet.path.name} has several columns that may be {name}{listed}"
+            hint = f"say which one counts: --columns {name}={either[0][0] if sheet.shown else 'NAME'}"
+            raise DataError(sheet.error("data-missing-column", message, hint))
         plain = count == 1 and not any(header.startswith(name) for header in sheet.header)
         found[name] = preparation.columns.get(name, letter if plain else name)
     return found

@@ -94,3 +94,12 @@ def test_two_columns_of_times_are_a_question(tmp_path):
         read_data([tmp_path / "a.csv"], UNITS, Preparation())
     found = read_data([tmp_path / "a.csv"], UNITS, Preparation(columns={"time": "t"}))
     assert found.lengths == (20,)
+
+
+@pytest.mark.parametrize(("header", "channel"), [("u,u1,y", "u1"), ("u,y1,Y (degC)", "y1")])
+def test_two_names_of_one_channel_are_a_question(tmp_path, header, channel):
+    (tmp_path / "a.csv").write_text(header + "\n" + "\n".join(f"{i % 3},{i % 2},{i % 5}" for i in range(20)))
+    with pytest.raises(DataError, match=f"several columns that may be {channel}"):
+        read_data([tmp_path / "a.csv"], UNITS, Preparation())
+    found = read_data([tmp_path / "a.csv"], UNITS, Preparation(columns={channel: "2"}))
+    assert (found.u if channel == "u1" else found.y)[:3, 0].tolist() == [0.0, 1.0, 0.0]
