@@ -52,7 +52,9 @@ def too_tight(
             "stated), raise the limits, or loosen the accuracy"
         )
     elif needed > searched:
-        hint = f"raise the limits: about {needed:.3g} samples would be needed"
+        hint = (
+            f"raise the limits: a record of the kinds that were tried would take about {needed:.3g} samples"
+        )
     else:
         hint = f"raise the limits: no record of up to {searched} samples was found either"
     hint = "; or ".join(text for text in (hint, remedy) if text)
