@@ -48,8 +48,7 @@ def fits(model: Model, parts: Parts) -> Fits:
     kind = estimator(model, 1.0).kind
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
         records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
-        late = max(record.lateness(model.theta) for record in records)
-        errors = np.concatenate([record.begun_freely(late).at(model.theta).errors for record in records])
+        errors = np.concatenate([record.begun_freely(0).at(model.theta).errors for record in records])
     return Fits(percent(measured - simulated, varying), percent(errors, varying), simulated, errors)
 
 
@@ -96,10 +95,12 @@ def percent(errors: Array, varying: Array) -> tuple[float, ...]:
 
 
 def simulate_free(model: Model, u: Array, y: Array) -> Array:
-    """(n, p): the simulation from u (n, r), its level and start such that it is nearest to y (n, p)."""
+    """(n, p): the simulation from u (n, r), its level and start such that it is nearest to y (n, p).
+
+    Inputs from before that a dead time delays are not made up: they would explain all that it lasts.
+    """
     error_form = output_error_form(model)
     record = estimator(error_form, 1.0).kind.record(u, y)
-    record = record.remembering(record.lateness(error_form.theta))
     with np.errstate(over="ignore", invalid="ignore"):
         caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
         starts = record.free_responses(error_form.theta)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.identification.explore import explore_records, explore_structure
+from inputdesign_cli.identification.explore.fits import simulation_fit
 from inputdesign_cli.identification.explore.processes import Process, process_models
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 
@@ -62,3 +63,12 @@ def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
         orders += abs(best.orders.order - 1) <= 1
     assert delays >= 95
     assert orders >= 95
+
+
+@pytest.mark.parametrize("late", [0.5, 40.0, 120.0])
+def test_a_dead_time_explains_nothing_of_white_noise(late):
+    """Level and state at the start are two unknowns of 200 samples: less than 5 % of the rms, whatever L."""
+    model = process_models([Process((1,), 1, 1.0)], [np.array([1e-6, 5.0, late])], np.eye(1))
+    rng = np.random.default_rng(3)
+    fit = simulation_fit(model, [(rng.standard_normal((200, 1)), rng.standard_normal((200, 1)))])
+    assert fit[0] < 5.0
