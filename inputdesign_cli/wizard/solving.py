@@ -59,7 +59,7 @@ def verdict(spec: Spec, result: Result, solve: Solve) -> Verdict:
     if found is not None:
         would = f"{lasting(found * spec.sample_time)} would do"
         said.append(f"{would} (a record of {found} samples was designed, and does).")
-    loop = result.get("loop")
+    loop = next((item["loop"] for item in result.get("requirements", []) if "loop" in item), None)
     kept = spec.accuracy.loop
     if kept is not None and loop and (ratio <= 1.0):
         peak = 20.0 * np.log10(kept.peak)

@@ -184,3 +184,18 @@ def test_every_question_has_an_example_that_is_understood():
     )
     assert (converter.bits, converter.range) == (12, 100.0)
     assert parse_spec(drifting.text).noise.drift
+
+
+def test_a_margin_that_is_kept_is_said():
+    """The gain margin of a peak Ms is Ms / (Ms - 1), its phase margin 2 asin(1 / (2 Ms))."""
+    spec = parse_spec(
+        "sample_time: 5\nplant: {continuous: {gain: 2, time_constant: 180, dead_time: 25}, sample: zoh}\n"
+        "noise: {variance: 1.0e-6}\nexperiment: {samples: 240}\nlimits: {amplitude: 5}\n"
+        "accuracy: {loop: {controller: {pid: {Kp: 1.5, Ti: 180}}, max_sensitivity_db: 6}}\n"
+        "objective: best_accuracy\nspectrum: {type: multisine, lines: 30}\nsolver: {any_spectrum: false}\n"
+    )
+    result = tasks.solve(spec).result
+    said = " ".join(verdict(spec, result, lambda other: tasks.solve(other).result).sentences)
+    peak = 10.0 ** (6.0 / 20.0)
+    assert f"a gain margin of {peak / (peak - 1.0):.3g}" in said
+    assert f"and {np.degrees(2.0 * np.arcsin(0.5 / peak)):.3g} degrees" in said
