@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.earlier import Earlier
+from inputdesign_cli.identification.free_starts import FreeStarts
 from inputdesign_cli.plant.polynomial import Array
 
-# Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
-_DEPENDENT = 1e-7
-_MOST_ROUNDS = 30
 _MOST_STARTED = 3
 
 
@@ -156,24 +154,21 @@ class Records:
         found = [part.errors_and_gradient(theta) for part in self.parts]
         errors = np.concatenate([e for e, _ in found])
         psi = np.concatenate([gradient for _, gradient in found], axis=1)
-        starts = self.starts(theta)
-        if not len(starts) or not all(np.all(np.isfinite(x)) for x in (errors, psi, starts)):
-            return Linearised(errors, psi, np.zeros_like(errors), np.zeros((errors.size, 0)))
-        coefficients, root, directions = self._fitted(starts, errors)
-        begun = np.tensordot(coefficients, starts, 1)
+        at_rest = Linearised(errors, psi, np.zeros_like(errors), np.zeros((errors.size, 0)))
+        if not self.free or not all(np.all(np.isfinite(x)) for x in (errors, psi)):
+            return at_rest
+        starts = FreeStarts(self.lengths, [part.free_responses(theta) for part in self.parts])
+        if not starts.finite:
+            return at_rest
+        coefficients, root, directions = starts.eliminated(errors, self.weights)
+        begun = starts.combined(coefficients)
         for k in self.parts[0].in_starts:
-            slopes = self._placed([part.free_slopes(theta, int(k)) for part in self.parts])
-            psi[k] += np.tensordot(coefficients, slopes, 1)
+            slopes = [part.free_slopes(theta, int(k)) for part in self.parts]
+            psi[k] += FreeStarts(self.lengths, slopes).combined(coefficients)
         flat = (psi @ root.T).reshape(len(psi), -1)
         flat = flat - (flat @ directions) @ directions.T
         psi = flat.reshape(psi.shape) @ np.linalg.inv(root).T
         return Linearised(errors - begun, psi, begun, directions)
-
-    def starts(self, theta: Array) -> NDArray[np.float64]:
-        """(m, N, p): what the unknowns of all parts add to the prediction errors, each to one output."""
-        if not self.free:
-            return np.zeros((0, *self.y.shape))
-        return self._placed([part.free_responses(theta) for part in self.parts])
 
     def past_noise(self, theta: Array) -> NDArray[np.float64]:
         """(m, N, p): what noise before the records adds to errors; none beside unknown starts, its part."""
@@ -208,33 +203,6 @@ class Records:
     def stabilised(self, theta: Array) -> Array:
         """theta with a stable predictor."""
         return max(self.parts, key=lambda part: len(part.y)).stabilised(theta)
-
-    def _fitted(self, starts: NDArray[np.float64], errors: Array) -> tuple[Array, Array, Array]:
-        """The likeliest coefficients (m,) of the starts, R (p, p), and what R times the starts span."""
-        left, previous = errors, np.inf
-        for _ in range(_MOST_ROUNDS):
-            root = self._root(left)
-            flat = (starts @ root.T).reshape(len(starts), -1).T
-            scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-            U, s, V = np.linalg.svd(flat / scale, full_matrices=False)
-            kept = s > _DEPENDENT * s[0]
-            directions = U[:, kept]
-            coefficients = (V[kept].T / s[kept]) @ (directions.T @ (errors @ root.T).ravel()) / scale
-            left = errors - np.tensordot(coefficients, starts, 1)
-            size = float(np.sum((left @ root.T) ** 2))
-            if errors.shape[1] == 1 or self.weights is not None or abs(size - previous) <= 1e-14 * size:
-                break
-            previous = size
-        return coefficients, root, directions
-
-    def _root(self, errors: Array) -> Array:
-        """R (p, p) with R^T R = W, up to a factor."""
-        if self.weights is not None:
-            return np.asarray(np.linalg.cholesky(self.weights).T)
-        rms = np.sqrt(np.maximum(np.mean(errors**2, axis=0), 1e-300))
-        correlation = errors.T @ errors / len(errors) / np.outer(rms, rms)
-        lower = np.linalg.cholesky(correlation + 1e-13 * np.eye(len(rms)))
-        return np.asarray(np.linalg.inv(lower) / rms)
 
 
 def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:
