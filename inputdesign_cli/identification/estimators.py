@@ -123,6 +123,7 @@ def identify(
     rest: bool | None = None,
     earlier: Earlier | None = None,
     experiments: Lengths = None,
+    near: bool = False,
 ) -> Estimate:
     """The structure of `model` estimated from one record, or jointly from several.
 
@@ -138,6 +139,7 @@ def identify(
             estimated along. None: as the data say.
         earlier: an estimate from other data, which counts along.
         experiments: the samples of each experiment, of one or several records; None: all are of one.
+        near: whether `start` is an estimate of such data already, so that no others are made.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -153,6 +155,7 @@ def identify(
         rest=rest,
         earlier=earlier,
         experiments=experiments,
+        near=near,
     )
 
 

@@ -26,6 +26,7 @@ _TRUSTED = 0.25
 # Rounding of a sum of squares: a cost that rises by less has not risen.
 _ROUNDING = 1e-12
 _RIDGE = 1e-14
+_WATCHED = 10
 
 
 class Problem(Protocol):
@@ -59,23 +60,29 @@ class Minimum:
     steps: NDArray[np.int64]
 
 
-def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS) -> Minimum:
-    """Minimise the cost of every run from `start` (runs, k), in `most` steps at most."""
+def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS, idle: float = 0.0) -> Minimum:
+    """Minimise the cost of every run from `start` (runs, k), in `most` steps at most.
+
+    Args:
+        idle: a run has settled as well where ten steps take less than this off -2 log likelihood, or where
+            no step however short takes anything; at zero it has not.
+    """
     theta = problem.stabilised(start)
     runs = theta.shape[0]
     cost, hessian, slope = problem.at(theta)
     damping = np.full(runs, _FIRST_DAMPING)
     converged, steps = np.zeros(runs, dtype=bool), np.zeros(runs, dtype=np.int64)
     finite = np.isfinite(cost)
-    active = np.flatnonzero(finite)
+    active, earlier = np.flatnonzero(finite), cost.copy()
     going_on = problem if np.all(finite) else problem.kept(finite)
-    for _ in range(most):
+    for number in range(1, most + 1):
         newton, gain = _step(hessian[active], slope[active], np.zeros(active.size))
         settled = gain * (problem.errors / np.maximum(cost[active], 1e-300)) < _SETTLED
         settled |= cost[active] <= 0.0
         converged[active[settled]] = True
         theta[active[settled]] = problem.stabilised(theta[active[settled]] + newton[settled])
         lost = ~settled & (damping[active] > _MOST_DAMPING)
+        converged[active[lost]] = idle > 0.0
         going = ~(settled | lost)
         if not np.all(going):
             active, newton = active[going], newton[going]
@@ -100,6 +107,13 @@ def minimise(problem: Problem, start: Array, *, most: int = MOST_STEPS) -> Minim
         damping[chosen] = np.maximum(damping[chosen], np.where(kept, 0.0, _FIRST_DAMPING))
         worse = active[~better]
         damping[worse] = 10.0 * np.maximum(damping[worse], 1e-4)
+        if idle and number % _WATCHED == 0:
+            resting = cost[active] >= earlier[active] * np.exp(-idle / problem.errors)
+            converged[active[resting]] = True
+            active, going_on = active[~resting], going_on.kept(~resting)
+            earlier = cost.copy()
+            if not active.size:
+                break
     return Minimum(theta, cost, hessian, converged, steps)
 
 

@@ -100,6 +100,7 @@ def identify_records(
     earlier: Earlier | None,
     experiments: Sequence[int] | None = None,
     weights: Array | None = None,
+    near: bool = False,
 ) -> Estimate:
     """The maximum-likelihood estimate of a structure from one record, or jointly from several.
 
@@ -113,6 +114,7 @@ def identify_records(
         earlier: an estimate from other data, which counts along.
         experiments: the samples of each experiment, of one or several records; None: all are of one.
         weights: W (p, p) of the errors if the covariance of the noise is known.
+        near: whether `start` is an estimate of such data already, so that no others are made.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -128,7 +130,10 @@ def identify_records(
 
     def searched(records: Records, known: Array | None) -> Search:
         chosen = longest(parts)
-        begin = kind.starts(centred(chosen) if records.free else chosen, start)
+        if near and start is not None:
+            begin = Starts(start[None], np.zeros(1, dtype=np.int64), 1)
+        else:
+            begin = kind.starts(centred(chosen) if records.free else chosen, start)
         others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
         points = np.concatenate([begin.points, *(theta[None] for theta in others)])
         steps = np.append(begin.steps.astype(float), np.zeros(len(others)))

@@ -66,8 +66,9 @@ class PolynomialRecord:
         )
 
     def lateness(self, theta: Array) -> int:
-        """None: the delay is known, and among what the filters remember."""
-        return 0
+        """As many as B looks back further than F."""
+        entries = (entry for row in self.structure.rows for entry in row.entries)
+        return max([0, *(entry.b - entry.f for entry in entries)])
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
@@ -75,7 +76,7 @@ class PolynomialRecord:
         return np.zeros(0, dtype=np.int64)
 
     def remembering(self, late: int) -> Self:
-        """The same."""
+        """The same: the delay is known, and among what the filters remember."""
         return self
 
     @property

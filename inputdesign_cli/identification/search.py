@@ -28,6 +28,8 @@ _UNLIKELY = 0.2
 _SETTLED = 1e-8
 _ASIDE = 0.01
 _MOST_HELD_STEPS = 60
+# What ten steps of a quick search must take off -2 log likelihood.
+_IDLE = 0.1
 # Samples by which a dead time may grow while a search begun freely goes on.
 _SPARE = 2
 
@@ -58,9 +60,11 @@ def search(
     Args:
         starts: how many points were looked at.
         before: (n,) steps that have been made from each.
-        quick: only so many steps from each; kinks may stop it, and no other minima are told.
+        quick: only so many steps from each, and none where these gain nothing that matters; kinks may stop
+            it, and no other minima are told.
     """
-    found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS)
+    idle = _IDLE if quick else 0.0
+    found = minimise(RecordProblem((records,) * len(points)), points, most=quick or MOST_STEPS, idle=idle)
     best = best_run(found)
     steps = int(found.steps[best] + np.broadcast_to(before, len(points))[best])
     point, converged = evaluate(records, found.theta[best]), bool(found.converged[best])

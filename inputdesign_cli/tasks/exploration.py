@@ -137,7 +137,7 @@ def _asked(task: Identification, identified: Identified) -> Identified:
 def _reasons(found: Found) -> tuple[str, ...]:
     """Why nothing that was found deserves trust."""
     single = found.model.outputs == 1
-    unseen = len(found.validation.errors)
+    unseen = int(np.sum(found.validation.counted))
     told = []
     for i, (fit, chosen) in enumerate(zip(found.validation.simulation, found.outputs, strict=True)):
         chance = by_chance(unseen, chosen.best.orders.order + 2, len(chosen.candidates))

@@ -1,7 +1,8 @@
 """How well a model explains records: by simulation from the inputs, and one step ahead.
 
 fit = 100 (1 - |y - y_hat| / |y - mean y|), the level and the state at the start of every record estimated
-along: of a simulation so that it is best, as those of an output-error model.
+along: of a simulation so that it is best, as those of an output-error model. Samples on which inputs from
+before a record still act through a delay are not counted: unknown inputs explain them, whatever the model.
 """
 
 from __future__ import annotations
@@ -30,26 +31,29 @@ class Fits:
 
     Attributes:
         simulated, errors: the simulations (N, p) of all records, and their prediction errors.
+        counted: (N,), the samples that are counted.
     """
 
     simulation: tuple[float, ...]
     prediction: tuple[float, ...]
     simulated: Array
     errors: Array
+    counted: NDArray[np.bool_]
 
 
-def fits(model: Model, parts: Parts) -> Fits:
-    """The fits of a sampled model to records u (n, r), y (n, p).
+def fits(model: Model, parts: Parts, late: int = 0) -> Fits:
+    """The fits of a sampled model to records u (n, r), y (n, p), of each the first `late` samples left out.
 
     Raises:
         TypeError: see `output_error_form`.
     """
-    measured, varying, simulated = _simulated(model, parts)
+    simulation, simulated, counted, varying = _simulated(model, parts, late)
     kind = estimator(model, 1.0).kind
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
         records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
-        errors = np.concatenate([record.begun_freely(0).at(model.theta).errors for record in records])
-    return Fits(percent(measured - simulated, varying), percent(errors, varying), simulated, errors)
+        free = [record.begun_freely(record.lateness(model.theta)) for record in records]
+        errors = np.concatenate([record.at(model.theta).errors for record in free])
+    return Fits(simulation, percent(errors[counted], varying), simulated, errors, counted)
 
 
 def beside(found: Sequence[Fits]) -> Fits:
@@ -59,22 +63,29 @@ def beside(found: Sequence[Fits]) -> Fits:
         tuple(fit for one in found for fit in one.prediction),
         np.concatenate([one.simulated for one in found], axis=1),
         np.concatenate([one.errors for one in found], axis=1),
+        np.all([one.counted for one in found], axis=0),
     )
 
 
-def simulation_fit(model: Model, parts: Parts) -> tuple[float, ...]:
+def simulation_fit(model: Model, parts: Parts, late: int = 0) -> tuple[float, ...]:
     """The first of them alone."""
-    measured, varying, simulated = _simulated(model, parts)
-    return percent(measured - simulated, varying)
+    return _simulated(model, parts, late)[0]
 
 
-def _simulated(model: Model, parts: Parts) -> tuple[Array, Array, Array]:
-    """(N, p) each: the outputs, what of them varies in each record, and the simulations."""
-    return (
-        np.concatenate([y for _, y in parts]),
-        np.concatenate([y - y.mean(axis=0) for _, y in parts]),
-        np.concatenate([simulate_free(model, u - u.mean(axis=0), y) for u, y in parts]),
-    )
+def _simulated(
+    model: Model, parts: Parts, late: int
+) -> tuple[tuple[float, ...], Array, NDArray[np.bool_], Array]:
+    """The fits, the simulations (N, p), which samples (N,) count, and what varies in these outputs."""
+    simulated, left, counted, varying = [], [], [], []
+    for u, y in parts:
+        own, delay = simulate_free(model, u - u.mean(axis=0), y)
+        kept = np.arange(len(y)) >= max(late, delay)
+        simulated.append(own)
+        counted.append(kept)
+        left.append((y - own)[kept])
+        varying.append(y[kept] - y[kept].mean(axis=0) if np.any(kept) else y[kept])
+    spread = np.concatenate(varying)
+    return percent(np.concatenate(left), spread), np.concatenate(simulated), np.concatenate(counted), spread
 
 
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
@@ -88,25 +99,28 @@ def by_chance(samples: int, unknowns: int, tried: int) -> float:
 
 
 def percent(errors: Array, varying: Array) -> tuple[float, ...]:
-    """Of the rms of what varies (N, p) the share that errors (N, p) do not leave."""
+    """Of the rms of what varies (N, p) the share that errors (N, p) do not leave; -inf of no samples."""
+    if not len(errors):
+        return (-np.inf,) * errors.shape[1]
     with np.errstate(over="ignore"):
         left = np.linalg.norm(errors, axis=0) / np.maximum(np.linalg.norm(varying, axis=0), 1e-300)
     return tuple(float(100.0 * (1.0 - x)) if np.isfinite(x) else -np.inf for x in left)
 
 
-def simulate_free(model: Model, u: Array, y: Array) -> Array:
+def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
     """(n, p): the simulation from u (n, r), its level and start such that it is nearest to y (n, p).
 
-    Inputs from before that a dead time delays are not made up: they would explain all that it lasts.
+    With it the number of samples on which inputs from before act through a delay: these are made up.
     """
     error_form = output_error_form(model)
     record = estimator(error_form, 1.0).kind.record(u, y)
+    late = record.lateness(error_form.theta)
     with np.errstate(over="ignore", invalid="ignore"):
         caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
-        starts = record.free_responses(error_form.theta)
+        starts = record.remembering(late).free_responses(error_form.theta)
         for i, responses in enumerate(starts):
             caused[:, i] += begun(responses, y[:, i] - caused[:, i])
-    return caused
+    return caused, late
 
 
 def begun(responses: NDArray[np.float64], left: Array) -> Array:

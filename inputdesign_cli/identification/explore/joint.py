@@ -112,7 +112,14 @@ def _estimated(
         structure = joined(taken, u.shape[1], range(u.shape[1]))
         try:
             estimate = identify(
-                structure, u, y, start=structure.theta, feedback=feedback, lengths=lengths, rest=False
+                structure,
+                u,
+                y,
+                start=structure.theta,
+                feedback=feedback,
+                lengths=lengths,
+                rest=False,
+                near=True,
             )
         except SpecError as error:
             reason = error

@@ -44,9 +44,10 @@ _ARX_KEPT = 2
 _FINALISTS = 2
 # An error of simulation that is larger by less than this share, and by no more points, is as good.
 _AS_GOOD, _POINTS = 1.2, 2.0
-# Samples to a parameter, at least; steps of the search for a candidate, by whether it is physical.
+# Samples to a parameter, at least; steps of the search for a candidate, by whether it is physical, and times
+# as many for a finalist.
 _PER_PARAMETER = 5
-_STEPS = {False: 100, True: 30}
+_STEPS, _AGAIN = {False: 100, True: 30}, 4
 _CHI2 = 3.84  # 95 % for one degree of freedom
 _WIDTH = 6
 
@@ -130,13 +131,14 @@ class Chosen:
 
 @dataclass(frozen=True)
 class _Parts:
-    """What structures are estimated from and judged by."""
+    """What structures are estimated from and judged by, the first `late` samples of each record left out."""
 
     first: Parts
     second: Parts
     feedback: bool
     quick: dict[int, SharedDenominator]
     resting: Mapping[int, Parts]
+    late: int
 
     @property
     def samples(self) -> int:
@@ -169,7 +171,9 @@ class _Parts:
         records = Records(tuple(kind.record(*part) for part in parts))
         if free:
             records = records.begun_freely(max(records.lateness(theta) for theta in points))
-        found = search(records, points, starts=len(points), quick=_STEPS[orders.physical])
+        found = search(
+            records, points, starts=len(points), quick=_STEPS[orders.physical] * (_AGAIN if free else 1)
+        )
         noise = noise_of(found.point, kind.own())
         factor = factor_at(kind.names, records, found.point, noise)
         deviations = np.linalg.norm(
@@ -178,7 +182,7 @@ class _Parts:
         echoes = kind.echoes(found.point.theta, records.lengths)
         tests = score_tests(records, found.point, recent=kind.recent, feedback=self.feedback, echoes=echoes)
         fitted = structure.at(found.point.theta, noise)
-        on_first, on_second = fits(fitted, self.first), fits(fitted, self.second)
+        on_first, on_second = (fits(fitted, part, self.late) for part in (self.first, self.second))
         return Candidate(
             orders.at(found.point.theta),
             fitted,
@@ -217,7 +221,8 @@ def explore_structure(
     penalty = np.log(samples) / samples
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
-    parts = _Parts(first, second, feedback, quick, resting)
+    late = max(max(found.delays) for found in quick.values())
+    parts = _Parts(first, second, feedback, quick, resting, late)
 
     def judged(tried: Iterable[Shape]) -> list[Candidate]:
         small = (shape for shape in dict.fromkeys(tried) if _PER_PARAMETER * shape.size <= samples)
@@ -226,7 +231,7 @@ def explore_structure(
     tried: list[Shape] = []
     for n in sorted({*range(1, min(highest, _ALWAYS) + 1), near}):
         tried += plant_order(n, quick[n].delays)
-    tried += _best_arx(first, second, quick[near].delays, r, samples)
+    tried += _best_arx(first, second, quick[near].delays, r, samples, late)
     if physical:
         tried += [process for n, found in quick.items() for process in processes(n, found.delays, step)]
     found = judged(tried)
@@ -259,7 +264,9 @@ def _leading(found: Sequence[Candidate]) -> list[Candidate]:
     return kept
 
 
-def _best_arx(first: Parts, second: Parts, delays: tuple[int, ...], r: int, samples: int) -> Iterator[Orders]:
+def _best_arx(
+    first: Parts, second: Parts, delays: tuple[int, ...], r: int, samples: int, late: int
+) -> Iterator[Orders]:
     """The ARX models that simulate the second part best."""
     highest = max(min(_HIGHEST_ARX, samples // (6 * (r + 1))), 1)
     ranked = []
@@ -268,7 +275,7 @@ def _best_arx(first: Parts, second: Parts, delays: tuple[int, ...], r: int, samp
         if np.all(np.isfinite(theta)) and orders.size == theta.size:
             model = orders.model().at(theta)
             if all(model.stable_outputs):
-                ranked.append((simulation_fit(model, second)[0], orders))
+                ranked.append((simulation_fit(model, second, late)[0], orders))
     ranked.sort(key=lambda pair: -pair[0])
     return (orders for _, orders in ranked[:_ARX_KEPT])
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.identification.explore import explore_records, explore_structure
-from inputdesign_cli.identification.explore.fits import simulation_fit
+from inputdesign_cli.identification.explore.fits import fits, simulation_fit
+from inputdesign_cli.identification.explore.orders import Orders
 from inputdesign_cli.identification.explore.processes import Process, process_models
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 
@@ -67,9 +68,31 @@ def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
 
 
 @pytest.mark.parametrize("late", [0.5, 40.0, 120.0])
-def test_a_dead_time_explains_nothing_of_white_noise(late):
-    """Level and state at the start are two unknowns of 200 samples: less than 5 % of the rms, whatever L."""
-    model = process_models([Process((1,), 1, 1.0)], [np.array([1e-6, 5.0, late])], np.eye(1))
+@pytest.mark.parametrize("in_s", [True, False])
+def test_a_dead_time_explains_nothing_of_white_noise(late, in_s):
+    """Level and state at the start are two unknowns of 80 samples: less than 5 % of the rms, whatever L."""
+    if in_s:
+        model = process_models([Process((1,), 1, 1.0)], [np.array([1e-6, 5.0, late])], np.eye(1))
+    else:
+        model = Orders("OE", (int(late) + 1,), 2, f=1).model().at(np.array([1e-6, 1e-6, -0.8]))
     rng = np.random.default_rng(3)
     fit = simulation_fit(model, [(rng.standard_normal((200, 1)), rng.standard_normal((200, 1)))])
     assert fit[0] < 5.0
+
+
+@pytest.mark.parametrize("in_s", [True, False])
+def test_a_true_model_is_judged_alike_in_s_and_in_q(in_s):
+    """A record that begins while 14 unknown inputs are still on their way: only its noise is left."""
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.choice([-1.0, 1.0], 80), 5)[:, None]
+    truth = first_order(2.0, 6.0, 7.0)
+    x, _ = truth.simulate(u, np.zeros(u.shape), 1.0)
+    y = x + 0.1 * np.std(x) * rng.standard_normal(x.shape)
+    pole = np.exp(-STEP / 6.0)
+    polynomial = Orders("OE", (15,), 1, f=1).model().at(np.array([2.0 * (1.0 - pole), -pole]))
+    found = fits(truth if in_s else polynomial, [(u[100:], y[100:])])
+    assert np.sum(~found.counted) == 14
+    left = (y - x)[114:]
+    expected = 100.0 * (1.0 - np.linalg.norm(left - left.mean()) / (np.std(y[114:]) * np.sqrt(left.size)))
+    assert found.simulation[0] == pytest.approx(expected, abs=0.2)
+    assert found.prediction[0] == pytest.approx(expected, abs=0.2)
