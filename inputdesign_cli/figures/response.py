@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, legend_above
+from inputdesign_cli.figures.style import BLACK, BLUE, frequency_axis, legend_above, log_axes
 from inputdesign_cli.runs.curves import ResponseCurves, ResponsePanel
 
 
@@ -20,16 +20,15 @@ def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
     (panel,) = curves.panels
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     legend_above(above, _magnitude(above, panel))
-    above.set_xscale("log")
     above.set_ylabel("magnitude")
     _phase(below, panel)
     below.set_ylabel("phase (degrees)")
-    below.set_xlabel(f"frequency ω (rad/{time_unit})")
+    frequency_axis(below, panel.frequency, time_unit)
 
 
 def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
     w, size, modelled = panel.frequency, np.abs(panel.G), np.abs(panel.model)
-    axes.set_yscale("log")
+    log_axes(axes, "y")
     handles: list[Artist] = []
     handles += axes.plot(w, size, ".", color=BLUE, markersize=4, label="|G|, data alone")
     handles += axes.plot(w, modelled, color=BLACK, linewidth=1.2, label="|G|, model")

@@ -26,8 +26,11 @@ from inputdesign_cli.runs.curves import (
     MomentsCurves,
     NyquistCurves,
     OptimalityCurves,
+    OrderCurves,
     PredictedPanel,
     ResidualCurves,
+    ResponseCurves,
+    ResponsePanel,
     SignalCurves,
     SpectrumCurves,
 )
@@ -64,6 +67,8 @@ def correlations(p, r):
 T = np.arange(500.0)
 FIT = FitPanel(np.sin(T), np.sin(T) + 0.1, np.sin(T) - 0.1, 83.2)
 BANDS = ErrorBandPanel(W, {0.05: 0.1 * G, 0.5: 0.2 * G, 0.95: 0.4 * G}, 0.5 * G, 0.6 * G)
+
+SEEN = ResponsePanel(W, 1.1 / (1 + 1j * W), 0.01 * W, 1 / (1 + 1j * W))
 
 CURVES = {
     "bound": bound(BoundPanel(W, 0.008 * G, G, 0.01 * G, 0.01 * G, np.array([0.5, np.pi]))),
@@ -123,6 +128,9 @@ CURVES = {
     "error without a target": ErrorCurves(W, 0.2 + 0 * W, 1 / W, 0.5 + 2 / W, (1.0, 1.2)),
     "moments": MomentsCurves(np.eye(3), 1),
     "many moments": MomentsCurves(np.eye(12), 4, np.array([0.0, 2.8]), np.array([1.0, 0.3])),
+    "response without a model": ResponseCurves((SEEN,)),
+    "responses of entries": ResponseCurves((replace(SEEN, entry=(0, 0)), replace(SEEN, entry=(1, 0)))),
+    "structures": OrderCurves({"ARX": (T[2:8], 10 * T[2:8]), "OE": (T[2:4], 11 * T[2:4])}, (3.0, 33.0), 1),
     "constant signal": SignalCurves(np.arange(5.0), {"r1": np.ones(5)}),
 }
 
