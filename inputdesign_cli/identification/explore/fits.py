@@ -23,6 +23,8 @@ from inputdesign_cli.plant.polynomial import Array
 Parts = Sequence[tuple[Array, Array]]
 _BY_CHANCE = 0.05
 _DEPENDENT = 1e-9
+# A mode that loses less than this over the whole record cannot be told from one on the stability limit.
+_LEAST_DECAY = 0.01
 
 
 @dataclass(frozen=True)
@@ -41,18 +43,23 @@ class Fits:
     counted: NDArray[np.bool_]
 
 
-def fits(model: Model, parts: Parts, late: int = 0) -> Fits:
-    """The fits of a sampled model to records u (n, r), y (n, p), of each the first `late` samples left out.
+def fits(model: Model, parts: Parts, late: int | None = None) -> Fits:
+    """The fits of a sampled model to records u (n, r), y (n, p).
+
+    Args:
+        late: of each record so many samples are left out. What delays of the model hold back beyond that
+            counts as not explained, so that models can be compared. None: what its own delays hold back.
 
     Raises:
         TypeError: see `output_error_form`.
     """
-    simulation, simulated, counted, varying = _simulated(model, parts, late)
+    simulation, simulated, counted, varying, unexplained = _simulated(model, parts, late)
     kind = estimator(model, 1.0).kind
     with np.errstate(over="ignore", invalid="ignore"):  # of unstable models
         records = [Records((kind.record(u - u.mean(axis=0), y - y.mean(axis=0)),)) for u, y in parts]
         free = [record.begun_freely(record.lateness(model.theta)) for record in records]
         errors = np.concatenate([record.at(model.theta).errors for record in free])
+        errors[unexplained] = varying[unexplained[counted]]
     return Fits(simulation, percent(errors[counted], varying), simulated, errors, counted)
 
 
@@ -67,25 +74,30 @@ def beside(found: Sequence[Fits]) -> Fits:
     )
 
 
-def simulation_fit(model: Model, parts: Parts, late: int = 0) -> tuple[float, ...]:
+def simulation_fit(model: Model, parts: Parts, late: int | None = None) -> tuple[float, ...]:
     """The first of them alone."""
     return _simulated(model, parts, late)[0]
 
 
 def _simulated(
-    model: Model, parts: Parts, late: int
-) -> tuple[tuple[float, ...], Array, NDArray[np.bool_], Array]:
-    """The fits, the simulations (N, p), which samples (N,) count, and what varies in these outputs."""
-    simulated, left, counted, varying = [], [], [], []
+    model: Model, parts: Parts, late: int | None
+) -> tuple[tuple[float, ...], Array, NDArray[np.bool_], Array, NDArray[np.bool_]]:
+    """The fits, the simulations (N, p), samples (N,) that count, what varies there, and what delays miss."""
+    simulated, left, counted, varying, unexplained = [], [], [], [], []
     for u, y in parts:
         own, delay = simulate_free(model, u - u.mean(axis=0), y)
-        kept = np.arange(len(y)) >= max(late, delay)
+        samples = np.arange(len(y))
+        kept = samples >= (delay if late is None else late)
+        missing = kept & (samples < delay)
+        own[missing] = y[kept].mean(axis=0) if np.any(kept) else 0.0
         simulated.append(own)
         counted.append(kept)
+        unexplained.append(missing)
         left.append((y - own)[kept])
         varying.append(y[kept] - y[kept].mean(axis=0) if np.any(kept) else y[kept])
     spread = np.concatenate(varying)
-    return percent(np.concatenate(left), spread), np.concatenate(simulated), np.concatenate(counted), spread
+    fit = percent(np.concatenate(left), spread)
+    return fit, np.concatenate(simulated), np.concatenate(counted), spread, np.concatenate(unexplained)
 
 
 def by_chance(samples: int, unknowns: int, tried: int) -> float:
@@ -129,6 +141,11 @@ def begun(responses: NDArray[np.float64], left: Array) -> Array:
         return np.full(left.shape, np.inf)
     columns = responses.T / np.maximum(np.linalg.norm(responses, axis=1), 1e-300)
     return np.asarray(columns @ np.linalg.lstsq(columns, left, rcond=_DEPENDENT)[0])
+
+
+def is_steady(model: Model, samples: int) -> bool:
+    """Whether a plant is stable, and its slowest mode tells so in a record of so many samples."""
+    return output_error_form(model).radius < 1.0 - _LEAST_DECAY / samples
 
 
 @singledispatch

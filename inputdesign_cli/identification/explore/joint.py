@@ -11,7 +11,7 @@ from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.estimators import identify
-from inputdesign_cli.identification.explore.fits import Fits, Parts, beside, fits, output_error_form
+from inputdesign_cli.identification.explore.fits import Fits, Parts, beside, fits, is_steady
 from inputdesign_cli.identification.explore.processes import process_models
 from inputdesign_cli.identification.explore.search import Candidate, Chosen, busiest, explore_structure
 from inputdesign_cli.plant import Model, PolynomialModel
@@ -23,6 +23,8 @@ _BLOCKS = 10
 _STILL = 0.02
 _FEWEST = 30
 _MOST_SAMPLES = 20_000
+# So many structures, the best first, are tried for all outputs together where those that were chosen fail.
+_MOST_TRIED = 4
 
 
 @dataclass(frozen=True)
@@ -119,13 +121,13 @@ def _estimated(
                 feedback=feedback,
                 lengths=lengths,
                 rest=False,
-                near=True,
+                near=taken[0].orders.physical,  # other starts cost more than the search
             )
         except SpecError as error:
             reason = error
             continue
         model = structure.at(estimate.theta, estimate.noise)
-        if output_error_form(model).radius < 1.0:
+        if is_steady(model, len(y)):
             return taken, estimate, model
     raise reason or bad_spec(
         "no-structure",
@@ -138,17 +140,20 @@ def _estimated(
 def _combinations(found: Sequence[Chosen]) -> Iterator[tuple[Candidate, ...]]:
     """What may be taken for all outputs together: all in s by their names, or all polynomials in q^-1.
 
-    The kind that is best for the first output where both will do; then simpler structures.
+    The kind that is best for the first output where both will do; then those that judge next best, and at
+    last the simplest.
     """
     kinds = (found[0].best.orders.physical, not found[0].best.orders.physical)
     for choices in ([chosen.best_of(physical=kind) for chosen in found] for kind in kinds):
         taken = tuple(choice for choice in choices if choice is not None)
         if len(taken) == len(found):
             yield taken
-    plain = [[c for c in chosen.candidates if not c.orders.physical] for chosen in found]
+    plain = [
+        [c for c in chosen.ranked if not c.orders.physical and np.isfinite(c.validation)] for chosen in found
+    ]
     if all(plain):
-        yield tuple(own[0] for own in plain)
-        yield tuple(own[min(1, len(own) - 1)] for own in plain)
+        for rank in range(_MOST_TRIED):
+            yield tuple(own[min(rank, len(own) - 1)] for own in plain)
         yield tuple(min(own, key=lambda c: c.orders.size) for own in plain)
 
 

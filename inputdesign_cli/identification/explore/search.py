@@ -19,7 +19,13 @@ from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
 from inputdesign_cli.identification.estimators import estimator
-from inputdesign_cli.identification.explore.fits import Parts, fits, output_error_form, simulation_fit
+from inputdesign_cli.identification.explore.fits import (
+    Parts,
+    fits,
+    is_steady,
+    output_error_form,
+    simulation_fit,
+)
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order
 from inputdesign_cli.identification.explore.processes import Process, processes
 from inputdesign_cli.identification.explore.regression import (
@@ -65,6 +71,7 @@ class Candidate:
         prediction: per cent one step ahead, on the second part.
         criterion: log of the variance + k log(N) / N (BIC), on the first part.
         failed: tests of the residuals that refute it.
+        steady: whether its plant is stable, as far as the record tells.
         ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
     """
 
@@ -76,6 +83,7 @@ class Candidate:
     criterion: float
     failed: tuple[str, ...]
     converged: bool
+    steady: bool
     ranges: tuple[tuple[int, int], ...]
 
     @property
@@ -123,6 +131,12 @@ class Chosen:
     def best(self) -> Candidate:
         """The one to take."""
         return self.candidates[0]
+
+    @property
+    def ranked(self) -> list[Candidate]:
+        """Those that may be taken, then the others, the best first; those on the edge of stability last."""
+        others = [c for c in self.candidates if all(c is not one for one in self.finalists)]
+        return sorted((*self.finalists, *others), key=lambda c: not c.steady)
 
     def best_of(self, *, physical: bool) -> Candidate | None:
         """The best with parameters of that kind among those that are about as good as any."""
@@ -192,6 +206,7 @@ class _Parts:
             float(np.log(max(noise[0, 0], 1e-300)) + orders.size * np.log(self.samples) / self.samples),
             tuple(test.name for test in failed(tests)),
             found.converged,
+            is_steady(fitted, self.samples),
             orders.ranges(found.point.theta, deviations),
         )
 
@@ -221,7 +236,7 @@ def explore_structure(
     penalty = np.log(samples) / samples
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
-    late = max(max(found.delays) for found in quick.values())
+    late = max(quick[near].delays)
     parts = _Parts(first, second, feedback, quick, resting, late)
 
     def judged(tried: Iterable[Shape]) -> list[Candidate]:
@@ -246,7 +261,16 @@ def explore_structure(
         return None
     least = min(100.0 - c.validation for c in usable)
     good = [c for c in usable if 100.0 - c.validation <= min(_AS_GOOD * least, least + _POINTS)]
-    good.sort(key=lambda c: (not c.settled, c.biased, c.unknowns, not c.orders.physical, -c.validation))
+    good.sort(
+        key=lambda c: (
+            not c.settled,
+            c.biased,
+            not c.steady,
+            c.unknowns,
+            not c.orders.physical,
+            -c.validation,
+        )
+    )
     best = good[0]
     rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
     order = min(max(best.orders.order, 1), highest)

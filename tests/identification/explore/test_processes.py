@@ -48,7 +48,6 @@ def test_gain_time_constant_and_dead_time_are_found():
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="91 of 100 delays within a sample, where 95 are asked", strict=False)
 def test_delays_and_orders_of_a_hundred_plants_at_ten_decibels():
     """Dead times to 15 samples, time constants of 4 to 25; delays within one sample in 95, orders in 95."""
     delays = orders = 0
