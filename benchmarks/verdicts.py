@@ -188,12 +188,13 @@ def judged(made: Trial, rng: np.random.Generator) -> Judged:
     else:
         admissible = made.relative * size
     _, true = scipy.signal.freqz(*made.true, w)
-    moves = [np.abs(one.moves(model, w[asked])[:, 0, 0]) / admissible for one in found.directed]
+    moves = [np.max(np.abs(one.moves(model, w[asked])[:, 0, 0]) / admissible) for one in found.directed]
+    among = sum(ratio > 1.0 for ratio in moves)
     return Judged(
         found,
         bool(np.all(alpha * np.sqrt(spread[asked]) <= admissible * (1.0 + 1e-9))),
         bool(np.any(np.abs(G - true)[asked] > admissible)),
-        any(one.matters(float(np.max(ratio))) for one, ratio in zip(found.directed, moves, strict=True)),
+        any(one.matters(float(ratio), among) for one, ratio in zip(found.directed, moves, strict=True)),
     )
 
 

@@ -21,7 +21,8 @@ from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
-# A parameter that would move G by more than is admitted counts as missing with a probability below this.
+# A parameter that would move G by more than is admitted counts as missing with a probability below this,
+# shared among all that would (Bonferroni).
 BEYOND_CHANCE = 0.05
 # A score of a larger probability is the last word.
 _OPEN = 0.3
@@ -64,9 +65,13 @@ class Directed:
         own = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
         return np.asarray(own + extension.model.plant_gradient(w)[:, extension.index])
 
-    def matters(self, moves: float) -> bool:
-        """Whether it speaks against a verdict that G `moves` by so many times what is admitted."""
-        return moves > 1.0 and self.test.probability < BEYOND_CHANCE
+    def matters(self, moves: float, among: int) -> bool:
+        """Whether it speaks against a verdict that G `moves` by so many times what is admitted.
+
+        Args:
+            among: how many parameters would move it by more than is admitted.
+        """
+        return moves > 1.0 and self.test.probability * among < BEYOND_CHANCE
 
 
 @dataclass(frozen=True)

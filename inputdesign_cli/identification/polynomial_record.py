@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import errors_and_gradient
 from inputdesign_cli.identification.problem import PredictionErrors
-from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
@@ -51,7 +50,8 @@ class PolynomialRecord:
 
         (D/C)(A y - sum_j (B_j/F_j) u_j) is off by impulses through 1/C where y, u and the noise before the
         record are missing, by impulses through D/(C F_j) where the state of an entry is, and by a step
-        through it where F_j integrates the level of its input.
+        through it where the level of its input is: of a stable F_j the others make that up, of one that
+        integrates or nearly does they cannot.
         """
         return tuple(
             _responses(row, theta[place], len(self.y))
@@ -118,9 +118,9 @@ def _responses(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.floa
     impulses = np.eye(max([older + row.d, *(entry.f for entry in row.entries)], default=0), samples)
     through = [(p.D[0], p.C[0], np.ones((1, samples))), (np.ones(1), p.C[0], impulses[: older + row.d])]
     for entry, F in zip(row.entries, p.F, strict=True):
-        integrates = without_integrators(F[0]).size < F[0].size
-        entering = [impulses[: entry.f], np.ones((int(integrates), samples))]
-        through.append((p.D[0], np.convolve(p.C[0], F[0]), np.concatenate(entering)))
+        if entry.f:
+            entering = np.concatenate([impulses[: entry.f], np.ones((1, samples))])
+            through.append((p.D[0], np.convolve(p.C[0], F[0]), entering))
     return np.concatenate([filtered(b, a, x) for b, a, x in through if len(x)])
 
 

@@ -137,16 +137,9 @@ def _unit(size: int, index: int) -> NDArray[np.bool_]:
 def _noise_before(records: Records, point: Point) -> bool:
     """Whether noise before the records matters to residuals from rest."""
     found = records.past_noise(point.theta)
-    power = np.concatenate(
-        [
-            np.sum(part**2, axis=(0, 2)) * (np.arange(length) > 0.1 * length)
-            for part, length in zip(
-                np.split(found, np.cumsum(records.lengths)[:-1], axis=1), records.lengths, strict=True
-            )
-        ]
-    )
-    late = float(np.sum(power)) > _REMEMBERED * float(np.sum(found**2))
-    return late or by_chance(point, found) < _SILENT
+    power = np.sum(found**2, axis=(0, 2))
+    later = np.concatenate([np.arange(length) > 0.1 * length for length in records.lengths])
+    return bool(np.sum(power[later]) > _REMEMBERED * np.sum(power)) or by_chance(point, found) < _SILENT
 
 
 def from_rest_or_free(
@@ -172,10 +165,10 @@ def from_rest_or_free(
 
     def begun_free(known: Array | None, late: int) -> Search:
         found = searched(deviations.begun_freely(late), known)
-        longer = deviations.lateness(found.point.theta)
-        # The dead time may come out longer than was thought when the unknown inputs were counted.
-        if longer > late:
-            found = searched(deviations.begun_freely(longer + _SPARE), found.point.theta)
+        now = later(found.point.theta)
+        # The dead time may come out another than was thought when the unknown inputs were counted.
+        if abs(now - late) > _SPARE:
+            found = searched(deviations.begun_freely(now), found.point.theta)
         errors = records.at(found.point.theta).errors
         return replace(found, first=errors[np.cumsum((0, *records.lengths[:-1]))])
 

@@ -24,8 +24,8 @@ from inputdesign_cli.plant.polynomial import Array
 # Poles of the predictor may be on the unit circle, as integrators are, and beyond it by rounding.
 _MARGIN = 1e-9
 _STEP = 1e-6
-# A pole this near to one integrates.
-_INTEGRATES = 1e-6
+# A pole this near to one integrates, or nearly does: a level of the input is not made up for by states.
+_INTEGRATES = 1e-2
 
 
 @dataclass(frozen=True)

@@ -68,29 +68,29 @@ class TransferRecord:
     def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """Of each output (m, N): a level, and what the states of its entries do without an input.
 
-        A level of the input, of which an integrator makes a ramp, is unknown as well. Inputs before the
-        record that come late by a dead time move the states, sample by sample, as if from anywhere.
+        A level of the input is unknown as well: level and states make it up where poles are stable, not the
+        ramp that an integrator makes of it, nor nearly. Inputs before the record that come late by a dead
+        time move the states, sample by sample, as if from anywhere.
         """
         model = self.structure.at(theta)
         found = [[np.ones((1, self.samples))] for _ in range(model.outputs)]
         for i, j in model.active:
-            found[i].append(self._begun(model, i, j, ramp=self._ramps(model, i, j)))
+            found[i].append(self._begun(model, i, j))
         return tuple(np.concatenate(parts) for parts in found)
 
-    def _begun(self, model: ContinuousModel, i: int, j: int, *, ramp: bool) -> NDArray[np.float64]:
-        """(m, N): those of one entry."""
+    def _entering(self, order: int) -> NDArray[np.float64]:
+        """(m, N): what an entry of so many poles may have been moved by."""
+        impulses = np.eye(min(order + self.late, self.samples), self.samples)
+        return np.concatenate([impulses, np.ones((int(order > 0), self.samples))])
+
+    def _begun(self, model: ContinuousModel, i: int, j: int) -> NDArray[np.float64]:
+        """(m, N): what that adds to the output."""
         entry = self._entry(model, i, j)
-        entering = np.eye(min(entry.order + self.late, self.samples), self.samples)
-        if ramp:
-            entering = np.concatenate([entering, np.ones((1, self.samples))])
+        entering = self._entering(entry.order)
         if not len(entering):
             return entering
         poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
         return filtered([1.0], poles, entering)
-
-    def _ramps(self, model: ContinuousModel, i: int, j: int) -> bool:
-        """Whether an entry makes a ramp of a level."""
-        return bool(integrators(model.denominator[i][j]))
 
     def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
         """None: the noise is white."""
@@ -122,17 +122,14 @@ class TransferRecord:
         slowest = 1.0 / (self.samples * self.intersample.sample_time)
         size = _STEP * max(abs(theta[index]), slowest ** (order - parameter.power))
         step = size * np.eye(self.size)[index]
-        here = self.structure.at(theta)
         ends = self.structure.at(theta + step), self.structure.at(theta - step)
         found = [[np.zeros((1, self.samples))] for _ in range(self.structure.outputs)]
         for place in self.structure.active:
-            ramp = self._ramps(here, *place)
             if place in parameter.places:
-                above, below = (self._begun(end, *place, ramp=ramp) for end in ends)
+                above, below = (self._begun(end, *place) for end in ends)
                 found[place[0]].append((above - below) / (2.0 * size))
             else:
-                unmoved = min(self._order(*place) + self.late, self.samples) + ramp
-                found[place[0]].append(np.zeros((unmoved, self.samples)))
+                found[place[0]].append(np.zeros_like(self._entering(self._order(*place))))
         return tuple(np.concatenate(parts) for parts in found)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:

@@ -71,12 +71,13 @@ def _largest(model: Model, directed: Directed, error: OnModelError) -> Neglected
 
 def objections(units: Units, found: Sequence[Neglected]) -> list[str]:
     """What to say of those that matter."""
+    among = sum(one.moves > 1.0 for one in found)
     return [
         f"one more {one.directed.extensions[0].what} ({one.directed.test.name}) would move G by "
         f"{one.moves:.3g} times the admissible error about {units.named(one.frequency)} (probability "
         f"{chance(one.directed.test.probability)}): estimate it along"
         for one in found
-        if one.directed.matters(one.moves)
+        if one.directed.matters(one.moves, among)
     ]
 
 
