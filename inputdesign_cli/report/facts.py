@@ -28,9 +28,9 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     powers = ", ".join(f"{name} {listed(power[name])}" for name in power)
     if powers:
         yield "power", powers, ""
-    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
-    if binding:
-        yield "limits", f"{', '.join(dict.fromkeys(binding))} exhausted", ""
+    limits = "; ".join(_limits(result))
+    if limits:
+        yield "limits", limits, ""
     error = result.get("model_error", {})
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
@@ -71,6 +71,18 @@ def _kept(told: Mapping[str, Json]) -> str:
     if runs:
         return f"{share} of {told['runs']} simulated experiments meet it"
     return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
+
+
+def _limits(result: Result) -> Iterator[str]:
+    """Which limits the design exhausts, and how far single samples of the record use theirs."""
+    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
+    shares = result.get("signal", {}).get("of_limits", {})
+    if binding:
+        by = " by the spectrum" if shares else ""
+        yield f"{', '.join(dict.fromkeys(binding))} exhausted{by}"
+    if shares:
+        taken = sorted(shares, key=lambda name: -shares[name])
+        yield f"single samples take {', '.join(f'{100 * shares[k]:.3g} % of {spoken(k)}' for k in taken)}"
 
 
 def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:

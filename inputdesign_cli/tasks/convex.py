@@ -142,7 +142,8 @@ class ConvexTask:
             tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
-            notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
+            taken = result.get("signal", {}).get("of_limits", {})
+            notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record, taken)]
             known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)

@@ -188,7 +188,7 @@ class GivenTask:
             files = other_files(self.record, units, record)
         signal = result.get("signal", {})
         notes = broken_limits(self.limits, experiment.samples, excitation.power, signal)
-        notes += record_notes(self.record, experiment.samples, record) if record is None else []
+        notes += record_notes(self.record, experiment.samples, record, {}) if record is None else []
         if record is not None and np.isfinite(record.worst_ratio):
             notes += start_notes(experiment, record.samples, self.record.step, requirements)
         if record is not None and self.foresight is not None:

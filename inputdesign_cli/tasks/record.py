@@ -281,8 +281,15 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
     return ratio
 
 
-def record_notes(request: RecordRequest, experiment: int, record: Record | None) -> list[str]:
-    """What a user should know before applying the record; the experiment has so many samples."""
+def record_notes(
+    request: RecordRequest, experiment: int, record: Record | None, of_limits: Mapping[str, float]
+) -> list[str]:
+    """What a user should know before applying the record.
+
+    Args:
+        experiment: its samples.
+        of_limits: the share of each limit on single samples that the record takes.
+    """
     if record is None:
         too_long = request.length(experiment) > request.longest
         return [_NO_RECORD.format(request.length(experiment), request.longest)] if too_long else []
@@ -306,9 +313,11 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
         )
     asked = request.samples or experiment
     if record.method != "given" and len(record.samples) > asked + request.settings.block:
+        nearest = max(of_limits, key=lambda name: of_limits[name], default=None)
+        share = f"; the record takes {100 * of_limits[nearest]:.3g} % of limits.{nearest}" if nearest else ""
         notes.append(
             f"within the limits on single samples {len(record.samples)} samples are the shortest record that "
-            f"was found, by trying, to one per cent; the spectrum alone would take {asked}"
+            f"was found, by trying, to one per cent; the spectrum alone would take {asked}{share}"
         )
     return notes
 

@@ -10,6 +10,7 @@ import scipy.io.wavfile
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.report.facts import facts
 from inputdesign_cli.runs.run_directory import write_run
 
 BASE = """
@@ -201,3 +202,20 @@ def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(off
     u = np.array(found.tables["signal"].columns["u1"])
     np.testing.assert_allclose(u / 0.25, np.rint(u / 0.25), atol=1e-9)
     assert np.abs(u - offset).max() <= 0.75 + 1e-12
+
+
+def test_the_share_of_each_limit_that_single_samples_take():
+    """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
+    limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"
+    outcome = solve(parse_spec(BASE + "objective: shortest_experiment\n" + limits))
+    u, shares = outcome.tables["signal"].columns["u1"], outcome.result["signal"]["of_limits"]
+    moves = np.abs(np.diff(np.concatenate([[0.0], u])))
+    assert shares == pytest.approx({"amplitude.input": np.abs(u).max() / 1.6, "rate": moves.max() / 1.6})
+    assert shares["rate"] == pytest.approx(2.0 * shares["amplitude.input"])
+    assert 0.98 < shares["rate"] <= 1.0 + 1e-9
+    (note,) = [note for note in outcome.result["notes"] if "shortest record" in note]
+    rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
+    assert note.endswith(f"the record takes {rate} of limits.rate")
+    (said,) = [value for name, value, _ in facts(outcome.result, "s") if name == "limits"]
+    assert said.endswith(f"single samples take {rate} of rate, {values} of amplitude.input")
+    assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))
