@@ -41,11 +41,9 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
         told = error["confidence"]
-        low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
         yield (
             "confidence",
-            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} estimates drawn by asymptotic "
-            "theory meet it",
+            _kept(told),
             f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
             f"not {error['alpha']:.4g}",
         )
@@ -63,6 +61,16 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "improvement" in result.get("simulation", {}):
         measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def _kept(told: Mapping[str, Json]) -> str:
+    """How many estimates meet the bounds: of simulated experiments, or drawn by asymptotic theory."""
+    runs = "runs" in told
+    low, high = (f"{100 * share:.1f}" for share in told["kept_limits" if runs else "exact_limits"])
+    share = f"{100 * told['kept' if runs else 'exact']:.1f} % ({low} to {high})"
+    if runs:
+        return f"{share} of {told['runs']} simulated experiments meet it"
+    return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
 
 
 def _limits(result: Result) -> Iterator[str]:
@@ -195,7 +203,9 @@ def _signal(result: Result) -> Iterator[str]:
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
         yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples"
     if "confidence" in signal:
-        yield f"kept by {100 * signal['confidence']['exact']:.1f} % of the estimates"
+        told = signal["confidence"]
+        kept, of = ("kept", "simulated experiments") if "runs" in told else ("exact", "estimates")
+        yield f"kept by {100 * told[kept]:.1f} % of the {of}"
     if "criterion" in signal:
         yield f"criterion {signal['criterion']:.6g} with these samples"
     yield from _beside_the_design(result.get("objective", {}), signal)

@@ -14,6 +14,7 @@ from inputdesign_cli.design.convex.cost import Weight, weights_of
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
+from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
@@ -218,13 +219,21 @@ def _power_share(
     return max(used, default=0.0)
 
 
-def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGenerator:
-    """What generates other records of the designed spectrum, as long, phases of sinusoids uniformly."""
-    settings = request.settings
+def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
+    """Samples of records as long as the experiment, in whole periods; None where none are computed."""
+    whole = replace(request, samples=None)
+    inputs, samples = experiment.inputs, experiment.samples
+    return whole.length(samples) if whole.feasible(samples, least_period(inputs)) else None
+
+
+def redrawn(request: RecordRequest, design: Design, inputs: int, samples: int) -> Redrawn:
+    """Other records of the designed spectrum, of so many samples, phases of sinusoids uniformly."""
+    settings, found = request.settings, design.result
     if settings.phases != "random":
         settings = replace(settings, phases="orthogonal")
-    samples, inputs = record.samples.shape
-    return SignalGenerator(designed_spectrum(request, design, inputs), settings, samples, request.band)
+    spectrum = designed_spectrum(request, design, inputs)
+    generator = SignalGenerator(spectrum, settings, samples, request.band)
+    return Redrawn("design", generator, found.basis, found.x)
 
 
 def given_record(

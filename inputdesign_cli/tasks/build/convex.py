@@ -21,7 +21,7 @@ from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked, stated_bounds
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
-from inputdesign_cli.tasks.build.simulation import build_simulation
+from inputdesign_cli.tasks.build.simulation import build_simulation, build_simulator
 from inputdesign_cli.tasks.build.spectra import build_basis
 from inputdesign_cli.tasks.build.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.tasks.build.uncertainty import build_plants
@@ -71,7 +71,9 @@ def build_convex(spec: Spec) -> ConvexTask:
         experiment=experiment,
         cost=cost,
         alpha=alpha,
-        exact=None if calibration is None else ExactConfidence(calibration, alpha, question),
+        exact=None
+        if calibration is None
+        else ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment)),
         tolerance=spec.solver.tolerance,
         any_spectrum_tolerance=spec.solver.any_spectrum_tolerance if spec.solver.any_spectrum else None,
         most_samples=spec.limits.samples,
