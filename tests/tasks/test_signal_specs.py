@@ -33,6 +33,7 @@ CASES = [
     ("signal: {quantisation: {bits: 8, range: 4}, offset: 1}", {}),
     ("limits: {amplitude: 1.2}", {"peak": 1.2}),
     ("limits: {rate: 0.5}", {"input_move": 0.5 + 1e-12}),
+    ("limits: {rate: 0.5, amplitude: 1}\nsignal: {type: slewed}", {"input_move": 0.5 + 1e-12, "peak": 1}),
     (
         "limits: {amplitude: {input: 1.4, output: 13}}\nsignal: {candidates: 3}",
         {"input_peak": 1.4, "output_peak": 13},
@@ -79,6 +80,30 @@ def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
     assert found["signal"]["worst_ratio"] <= 1 + 1e-9
     assert found["signal"]["peak"][0] <= 0.65
     assert any("no record of noise" in note for note in found["notes"])
+
+
+SLOW = """
+plant: {B: [0, 0.1], F: [1, -0.9]}
+noise: {variance: 0.05}
+experiment: {samples: 220}
+accuracy: {model_error: {relative: 0.1, band: [0.005, 0.4]}}
+spectrum: {type: fir, order: 30}
+limits: {amplitude: 1, rate: 0.1}
+solver: {any_spectrum: false}
+"""
+
+
+def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not_fit():
+    outcome = solve(parse_spec(SLOW))
+    signal = outcome.result["signal"]
+    assert signal["type"] == "slewed"
+    assert signal["worst_ratio"] <= 1 + 1e-9
+    moves = np.abs(np.diff(outcome.tables["signal"].columns["u1"], prepend=0.0))
+    assert np.isclose(moves, 0.1).mean() > 0.5
+    assert moves.max() <= 0.1
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(SLOW + "signal: {type: filtered_noise}\n"))
+    assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
 
 
 def test_a_converter_of_too_small_a_range_is_named():
@@ -150,6 +175,8 @@ BAD = [
     ("signal: {offset: 9, quantisation: {bits: 4, range: 5}}", "coarse-converter", "signal.offset"),
     ("sample_time: 0.3\nsignal: {also: [wav]}", "no-sample-rate", "signal.also"),
     ("signal: {order: 3}", "not-supported", "signal.order"),
+    ("signal: {type: slewed}", "unsuitable-key", "signal.type"),
+    ("limits: {rate: 1}\nsignal: {type: slewed, ramp: 9}", "unsuitable-key", "signal.ramp"),
 ]
 BAD_WORDS = [
     ("signal: {lines: even}", "unknown-word"),

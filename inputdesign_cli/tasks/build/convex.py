@@ -8,6 +8,7 @@ from dataclasses import replace
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.runs.results import Result
+from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
@@ -153,7 +154,7 @@ def check_pairs(spec: Spec, known: Sequence[str]) -> None:
 def _check_interpolated(spec: Spec) -> None:
     """In continuous time samples are interpolated within their band: between them there are no levels."""
     signal = spec.signal
-    levels = signal.type in ("binary", "ternary", "prbs")
+    levels = signal.type in FROM_LEVELS
     if levels or signal.hold is not None or signal.bits is not None:
         key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
         raise spec.complain(
