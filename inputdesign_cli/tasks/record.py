@@ -276,7 +276,7 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
         eigenvalues = np.linalg.eigvalsh(information)
         if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
             raise np.linalg.LinAlgError
-        return max((v.ratio for r in requirements for v in r.violations(information)), default=0.0)
+        return max((r.worst(information).ratio for r in requirements), default=0.0)
 
     return ratio
 
