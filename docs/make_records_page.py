@@ -2,23 +2,18 @@
 
     python docs/make_records_page.py [DIR]
 
-The commands are real, and so is what they say and draw; the helpers are those of the tutorial.
+The commands are real, and so is what they say and draw.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import shutil
-import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
-DOCS = Path(__file__).parent
-PAGE = "records.md"
+from pages import DOCS, Terminal, filled, write
+
 EXPLORED = ("estimate", "fit", "validated", "residuals", "note        y", "note        no trust", "verdict")
-JUDGED = ("validated",)
 
 TEXT = """\
 # A raw log to a judged model: the converter
@@ -46,62 +41,28 @@ tell that level's.
 """
 
 
-class Step(NamedTuple):
-    """A command of the page: its words, the lines that are shown, its exit code."""
-
-    words: Sequence[str]
-    kept: tuple[str, ...]
-    code: int = 0
-
-
 FILES = ("buck_converter/buck_id.csv", "buck_converter/buck_valid.csv")
-STEPS = {
-    "converter_explore": Step(
-        ("explore", "buck_id.csv", "--columns", "u1=input,y1=y", "-o", "converter"), EXPLORED
-    ),
-    "converter_judge": Step(
-        (
-            *("explore", "buck_valid.csv", "--columns", "u1=input,y1=y"),
-            *("--validate", "converter/model.yaml", "-o", "converter_judged"),
-        ),
-        JUDGED,
-    ),
-}
-FIGURES = {"converter_judged": {"fit": "converter_fit"}}
+COLUMNS = ("--columns", "u1=input,y1=y")
 
 
-def tutorial():
-    """The script of the tutorial, for its terminal."""
-    found = importlib.util.spec_from_file_location("make_tutorial", DOCS / "make_tutorial.py")
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
-
-
-def page(folder: Path, images: Path) -> str:
+def records(folder: Path, images: Path) -> str:
     """The page; its runs go into `folder`, its figures into `images`."""
     for file in FILES:
         shutil.copy(DOCS / "data" / file, folder)
-    terminal, text = tutorial().Terminal(folder), TEXT
-    for name, step in STEPS.items():
-        block, said = terminal.run(*step.words, kept=step.kept, code=step.code)
-        text = text.replace(f"{{{name}}}", block)
-        if name == "converter_judge":
-            (fit,) = re.findall(r"validated +simulation explains ([\d.]+) %", said)
-            text = text.replace("{converter_left}", f"{100.0 - float(fit):.0f} %")
-    for run, figures in FIGURES.items():
-        for figure, target in figures.items():
-            shutil.copy(folder / run / f"{figure}.png", images / f"records_{target}.png")
-    return text
-
-
-def main() -> None:
-    """The page and its figures in docs, its runs in DIR (default runs/records)."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS.parent / "runs" / "records"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    (DOCS / PAGE).write_text(page(folder, DOCS / "images"), encoding="utf-8")
+    terminal, found = Terminal(folder), {}
+    found["converter_explore"], _ = terminal.run(
+        *("explore", "buck_id.csv", *COLUMNS, "-o", "converter"), kept=EXPLORED
+    )
+    found["converter_judge"], said = terminal.run(
+        *("explore", "buck_valid.csv", *COLUMNS, "--validate", "converter/model.yaml"),
+        *("-o", "converter_judged"),
+        kept=("validated",),
+    )
+    (fit,) = re.findall(r"validated +simulation explains ([\d.]+) %", said)
+    found["converter_left"] = f"{100.0 - float(fit):.0f} %"
+    shutil.copy(folder / "converter_judged" / "fit.png", images / "records_converter_fit.png")
+    return filled(TEXT, found)
 
 
 if __name__ == "__main__":
-    main()
+    write("records", records)

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +19,9 @@ import scipy.signal
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text, read_csv
+from pages import DOCS, Terminal, filled, write
 
-DOCS = Path(__file__).parent
 LOG = DOCS / "data" / "tclab" / "two_heaters.txt"
-PAGE = "tutorial.md"
-WIDTH = 112
 # The noise of the log, as `explore` finds it, and the sensor's last digit.
 NOISE_C, NOISE_A, VARIANCE, DIGIT = [1.0, -1.123, 0.471], [1.0, -1.799, 0.8026], 0.0044, 0.03
 # Heat capacity (J/K), area (m^2) and emissivity of a heater; Stefan and Boltzmann's constant.
@@ -159,43 +155,6 @@ def experiment(signal: Path, record: Path, seed: int) -> None:
     record.write_text(csv_text(Table({"time_s": time, "u1": u, "y1": y})), encoding="utf-8")
 
 
-class Terminal:
-    """Runs commands in a folder and shows them as a page does, the lines that begin with `kept` words."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def run(self, *words: str, kept: tuple[str, ...], code: int = 0) -> tuple[str, str]:
-        """The block of a page, and the whole output; the exit code must be as expected."""
-        done = subprocess.run(
-            [sys.executable, "-m", "inputdesign_cli", *words],
-            cwd=self.folder,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if done.returncode != code:
-            raise SystemExit(f"idesign {' '.join(words)}: exit code {done.returncode}\n{done.stderr}")
-        lines, keeps = [], False
-        for line in done.stdout.splitlines():
-            keeps = line.startswith(kept) if not line.startswith(" ") else keeps
-            if keeps:
-                lines.append(line if len(line) <= WIDTH else line[: WIDTH - 3].rsplit(" ", 1)[0] + " ..")
-        return f"```\n$ {command(words)}\n" + "\n".join(lines) + "\n```", done.stdout
-
-
-def command(words: tuple[str, ...]) -> str:
-    """A command as one types it, an option with its value to a line where it is long."""
-    typed = [f'"{word}"' if re.search(r"[\s{}=,]", word) else word for word in words]
-    text = " ".join(["idesign", *typed])
-    if len(text) <= WIDTH - 2:
-        return text
-    head = typed[: next(n for n, word in enumerate(typed) if word.startswith("-"))]
-    pairs = typed[len(head) :]
-    rest = [f"    {option} {value}" for option, value in zip(pairs[::2], pairs[1::2], strict=True)]
-    return " \\\n".join([" ".join(["idesign", *head]), *rest])
-
-
 def keep(run: Path, images: Path, **figures: str) -> None:
     """Copy figures of a run beside the page."""
     for name, target in figures.items():
@@ -234,19 +193,8 @@ def tutorial(folder: Path, images: Path) -> str:
     keep(folder / "design", images, signal="design_signal", bound="design_bound")
     keep(folder / "first_assessed", images, data_bound="first_data_bound")
     keep(folder / "second_assessed", images, bound="second_bound", fit="second_fit")
-    page = TEXT
-    for name, text in found.items():
-        page = page.replace(f"{{{name}}}", text)
-    return page
-
-
-def main() -> None:
-    """The page and its figures in docs, its runs in DIR (default runs/tutorial)."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS.parent / "runs" / "tutorial"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    (DOCS / PAGE).write_text(tutorial(folder, DOCS / "images"), encoding="utf-8")
+    return filled(TEXT, found)
 
 
 if __name__ == "__main__":
-    main()
+    write("tutorial", tutorial)

@@ -113,6 +113,15 @@ class OverFrequency(Requirement):
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """Local maxima of the ratio over the band, polished between the grid points."""
+        turn, on_grid = self._on_grid(information)
+        return self._polished(turn, on_grid, above)
+
+    def _on_grid(self, information: Array) -> tuple[Array, Array]:
+        """K^T with K^T K = M^-1, and the ratio on the grid.
+
+        Raises:
+            InaccurateError: `ratio-not-finite`.
+        """
         turn = inverse_factor(information).T
         on_grid = self.measure(self._grid_rows @ turn, self.grid)
         if not np.all(np.isfinite(on_grid)):
@@ -123,6 +132,9 @@ class OverFrequency(Requirement):
                 hint="restrict the band of the requirement, and rescale signals of extreme units",
                 key="accuracy",
             )
+        return turn, on_grid
+
+    def _polished(self, turn: Array, on_grid: Array, above: float) -> list[Violation]:
         w, ratio = local_maxima(
             lambda w: self.measure(self.rows(w) @ turn, w), self.grid, on_grid, above=above
         )
@@ -136,7 +148,9 @@ class OverFrequency(Requirement):
 
     def worst(self, information: Array) -> Violation:
         """The largest of the violations; one beside frequency zero is told to be there."""
-        found = worst(self.violations(information))
+        turn, on_grid = self._on_grid(information)
+        # A peak that ends below the highest point of the grid is not the largest.
+        found = worst(self._polished(turn, on_grid, float(on_grid.max()) * (1.0 - _ROUNDING)))
         lo, hi = self.band
         if found.frequency is None or lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
             return found

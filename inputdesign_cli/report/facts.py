@@ -28,9 +28,9 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     powers = ", ".join(f"{name} {listed(power[name])}" for name in power)
     if powers:
         yield "power", powers, ""
-    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
-    if binding:
-        yield "limits", f"{', '.join(dict.fromkeys(binding))} exhausted", ""
+    limits = "; ".join(_limits(result))
+    if limits:
+        yield "limits", limits, ""
     error = result.get("model_error", {})
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
@@ -41,11 +41,9 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
         told = error["confidence"]
-        low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
         yield (
             "confidence",
-            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} estimates drawn by asymptotic "
-            "theory meet it",
+            _kept(told),
             f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
             f"not {error['alpha']:.4g}",
         )
@@ -63,6 +61,28 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "improvement" in result.get("simulation", {}):
         measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def _kept(told: Mapping[str, Json]) -> str:
+    """How many estimates meet the bounds: of simulated experiments, or drawn by asymptotic theory."""
+    runs = "runs" in told
+    low, high = (f"{100 * share:.1f}" for share in told["kept_limits" if runs else "exact_limits"])
+    share = f"{100 * told['kept' if runs else 'exact']:.1f} % ({low} to {high})"
+    if runs:
+        return f"{share} of {told['runs']} simulated experiments meet it"
+    return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
+
+
+def _limits(result: Result) -> Iterator[str]:
+    """Which limits the design exhausts, and how far single samples of the record use theirs."""
+    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
+    shares = result.get("signal", {}).get("of_limits", {})
+    if binding:
+        by = " by the spectrum" if shares else ""
+        yield f"{', '.join(dict.fromkeys(binding))} exhausted{by}"
+    if shares:
+        taken = sorted(shares, key=lambda name: -shares[name])
+        yield f"single samples take {', '.join(f'{100 * shares[k]:.3g} % of {spoken(k)}' for k in taken)}"
 
 
 def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
@@ -183,7 +203,9 @@ def _signal(result: Result) -> Iterator[str]:
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
         yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples"
     if "confidence" in signal:
-        yield f"kept by {100 * signal['confidence']['exact']:.1f} % of the estimates"
+        told = signal["confidence"]
+        kept, of = ("kept", "simulated experiments") if "runs" in told else ("exact", "estimates")
+        yield f"kept by {100 * told[kept]:.1f} % of the {of}"
     if "criterion" in signal:
         yield f"criterion {signal['criterion']:.6g} with these samples"
     yield from _beside_the_design(result.get("objective", {}), signal)

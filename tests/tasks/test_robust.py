@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli.compute.time_limit import stoppable
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.figures.plots import draw_all
@@ -15,6 +16,7 @@ from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.robust import Batch, tried_on
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
 
@@ -210,3 +212,30 @@ def test_limits_on_powers_bind_the_record_at_every_plant():
     assert max(found)[0] < 4.0
     assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
     assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
+
+
+def test_fresh_plants_are_tried_as_long_as_there_is_time():
+    """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
+    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
+    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    batches = list(done.plants.afresh())
+    shares = [
+        kept.share for batch in batches for kept in tried_on(done.design, done.experiment.samples, batch)
+    ]
+    whole = robust_result(done, done.plants)
+    assert whole.entry["fresh"]["draws"] == len(shares) == 120
+    assert whole.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares) > 0
+    assert whole.entry["fresh"]["largest"] == pytest.approx(max(shares), rel=1e-12)
+    assert whole.notes == ()
+    with stoppable() as stop:
+
+        def ends_after_the_first():
+            yield batches[0]
+            stop()
+            yield batches[1]
+
+        cut = robust_result(done, replace(done.plants, afresh=ends_after_the_first))
+    first = len(batches[0].plants)
+    assert cut.entry["fresh"]["draws"] == first
+    assert cut.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares[:first])
+    assert f"after {first} of 120" in cut.notes[0]

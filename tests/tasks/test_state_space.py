@@ -107,6 +107,11 @@ STATES = "A: [[a]], B: [[1]], C: [[1]]"
             "plant.state_space.delay",
         ),
         (
+            f"{{parameters: {{a: 0.5, L: 0}}, state_space: {{{STATES}, time: discrete, delay: L}}}}",
+            "unsuitable-key",
+            "plant.state_space.delay",
+        ),
+        (
             "{parameters: {a: -1}, state_space: {A: [[a, 0]], B: [[1]], C: [[1]]}, sample: zoh}",
             "wrong-shape",
             "plant.state_space.A",
