@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError, what_ended
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
@@ -128,6 +129,7 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch]) -> dict[str,
             tried += tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
         except OutOfTimeError:
             break
+        tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
     if not tried:
