@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _REFINEMENT = 6
-# Points and steps that narrow a bracket about ten thousandfold: steps cost most with few peaks, points with many.
+# Points and steps that narrow a bracket ten thousandfold: few peaks cost their steps, many their points.
 _ZOOM_FEW, _ZOOM_MANY, _FEW = (40, 3), (8, 6), 64
 SLACK = 0.05
 """A peak between two grid points may stand this much higher than both, as a share of itself."""

@@ -27,6 +27,7 @@ from inputdesign_cli.signal import (
     Target,
     best_record,
     limited_responses,
+    peak_share,
 )
 from inputdesign_cli.signal.evaluation import MET
 
@@ -178,7 +179,7 @@ def make_record(
         left = [n for n in range(len(plants)) if n not in numbers]
         others = {n: FiniteRecord(plants[n], samples, request.step) for n in left}
         ratios = {n: _ratio_at(others[n], scores[n], record) for n in left}
-        shares = {n: _power_share(others[n], upper, record) for n in left}
+        shares = {n: _share(others[n], bounds, record) for n in left}
         missed = [n for n in left if ratios[n] > least]
         beyond = [n for n in left if shares[n] > MET]
         if not (missed or beyond):
@@ -202,21 +203,19 @@ def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Reco
         return np.inf
 
 
-def _power_share(
-    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
-) -> float:
-    """The largest share of a limit on powers that a record uses at one plant, where the plant takes part."""
+def _share(plant: FiniteRecord, bounds: Bounds, record: Record) -> float:
+    """The largest share of a limit that a record uses at one plant, where the plant takes part."""
     powers = {
         kind: plant.mean_squares(kind, record.samples)
-        for kind, _, _ in limits
+        for kind, _, _ in bounds.powers
         if plant.experiment.depends_on_plant(kind)
     }
     used = (
         float(powers[kind].sum() if channel is None else powers[kind][channel]) / most
-        for kind, channel, most in limits
+        for kind, channel, most in bounds.powers
         if kind in powers
     )
-    return max(used, default=0.0)
+    return max([peak_share(plant, bounds, record.samples), *used])
 
 
 def as_long(request: RecordRequest, experiment: Experiment) -> int | None:

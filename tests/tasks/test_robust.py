@@ -214,6 +214,25 @@ def test_limits_on_powers_bind_the_record_at_every_plant():
     assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
 
 
+@pytest.mark.parametrize("loop", [False, True])
+def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
+    """Of the output, and in a loop of the input: plain filters of plant and controller simulate both."""
+    controller = "experiment={samples: 500, controller: {numerator: [0.1], denominator: [1]}}"
+    plants, gain = [(3.6, -0.7), (3.6, -0.9), (5.0, -0.8)], 0.1 if loop else 0.0
+    scenarios = "uncertainty={scenarios: [{f1: -0.9}, {b1: 5.0, f1: -0.8}]}"
+    limits = "limits={amplitude: {input: 0.5, output: 9}}"
+    asked = ("objective=best_accuracy", limits, scenarios, *([controller] if loop else []))
+    result = solve(parse_spec(FIRST, overrides=asked))
+    record = result.tables["signal"].columns["r1" if loop else "u1"]
+    peaks = []
+    for b, f in plants:  # y = b q^-1 u / (1 + f q^-1), u = r - gain y
+        y = lfilter([0, b], [1, f + gain * b], record)
+        peaks.append((np.abs(y).max() / 9.0, np.abs(record - gain * y).max() / 0.5))
+    assert np.max(peaks) <= 1.0 + 1e-9
+    assert np.max(peaks[1:]) > 0.99  # the limit holds the record back at another plant than that of the spec
+    assert result.result["signal"]["of_limits"].keys() == {"amplitude.input", "amplitude.output"}
+
+
 def test_fresh_plants_are_tried_as_long_as_there_is_time():
     """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
     asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
