@@ -186,8 +186,8 @@ class Experiment(Coordinates):
             total = np.zeros((self.size, self.size))
             for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
                 part = slice(start, start + _NODES_AT_ONCE)
-                products = _real_products(self.noise_gradient(rule.nodes[part]))
-                total += np.tensordot(rule.weights[part], products, axes=1)
+                rows = _rows(self.noise_gradient(rule.nodes[part]), rule.weights[part])
+                total += rows.T @ rows
             return total
 
         return self.samples * integrate(moments, self.singularities)
