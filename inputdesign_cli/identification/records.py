@@ -215,7 +215,8 @@ class Records:
         for _ in range(_MOST_ROUNDS):
             root = self._root(left)
             flat = (starts @ root.T).reshape(len(starts), -1).T
-            scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+            norm = np.linalg.norm(flat, axis=0)
+            scale = np.where(norm > 0.0, norm, np.inf)  # a start that no output shows is left at zero
             U, s, V = np.linalg.svd(flat / scale, full_matrices=False)
             kept = s > _DEPENDENT * s[0]
             directions = U[:, kept]
