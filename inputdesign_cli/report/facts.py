@@ -8,6 +8,9 @@ from inputdesign_cli.report.numbers import Fact, listed, precise, shown, spoken
 from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Json, Result
 
+# Gaps below this are told as such.
+_CLOSED = 1e-6
+
 # What is said of an excitation that was given, by the status of the result.
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
 
@@ -160,6 +163,13 @@ def white(result: Result) -> str:
     return f"white excitation: {_clean(value, kind)}" + (f", {ratio:.3g} times as much" if multiple else "")
 
 
+def _gap(relative: float) -> str:
+    """How near the proof comes: what a solver leaves below a millionth changes from machine to machine."""
+    return (
+        f", gap {relative:.1e}" if relative >= _CLOSED else f", gap below {_CLOSED:.0e}".replace("e-0", "e-")
+    )
+
+
 def proofs(result: Result) -> Iterator[str]:
     """What is proved of other experiments."""
     found = result.get("objective", {})
@@ -170,7 +180,7 @@ def proofs(result: Result) -> Iterator[str]:
         family = f"no {result['moments']['structure']} moments get"
     for key, side in (("lower_bound", "below"), ("upper_bound", "above")):
         if key in found and found.get("relative_gap") != 1.0:  # or else nothing is proved yet
-            gap = f", gap {found['relative_gap']:.1e}" if "relative_gap" in found else ""
+            gap = _gap(found["relative_gap"]) if "relative_gap" in found else ""
             yield f"{family} {side} {shown(found[key])}{gap}"
     side = "above" if objective(found.get("kind")).maximised else "below"
     for what in ("spectrum", "structure"):

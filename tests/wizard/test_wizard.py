@@ -171,6 +171,22 @@ def test_numbers_that_are_none_make_no_system(text, tmp_path):
     assert (caught.value.diagnostics[0].code, caught.value.diagnostics[0].key) == ("bad-answer", "plant")
 
 
+def test_a_log_is_explored(tmp_path):
+    """The static gain of 0.5 q^-2/(1 - 0.8 q^-1) is 2.5."""
+    rng = np.random.default_rng(3)
+    u, y = np.repeat(rng.choice([-1.0, 1.0], 50), 6), np.zeros(300)
+    for t in range(2, 300):
+        y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 2]
+    rows = np.c_[5.0 * np.arange(300), u, y + 0.05 * rng.standard_normal(300)]
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time,u,y", comments="")
+    wish = "prediction within 5 % up to 0.1"
+    draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
+    draft.validate()
+    spec = draft.spec()
+    assert spec.sample_time == 5.0
+    assert sum(spec.plant.B) / sum(spec.plant.F) == pytest.approx(2.5, rel=0.01)
+
+
 def test_a_system_of_python_control_comes_as_a_file(tmp_path):
     (tmp_path / "g.json").write_text(json.dumps({"num": [2], "den": [180, 1], "delay": 25}))
     draft = compose({**ENGINEER, "plant": "g.json"}, "x", tmp_path)
