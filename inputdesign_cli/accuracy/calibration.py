@@ -23,11 +23,16 @@ _POINTS, _AT_ONCE = 800, 256
 
 @dataclass(frozen=True)
 class Coverage:
-    """How many fresh draws stay below r_adm in the whole band: by the exact G, and to first order."""
+    """How many fresh draws stay below r_adm in the whole band: by the exact G, and to first order.
+
+    `kept` of `runs` estimates of simulated records do so, where there are any.
+    """
 
     draws: int
     exact: int
     linear: int
+    runs: int = 0
+    kept: int = 0
 
 
 @dataclass(frozen=True)
@@ -36,41 +41,75 @@ class Calibration:
 
     The same `draws` serve every information matrix, so that alpha is a smooth function of it; as many
     fresh ones tell the coverage.
+
+    Attributes:
+        excess: the quantile of the estimates of such records over that of the draws, which are asymptotic.
     """
 
     probability: float
     draws: int
     seed: int = 0
+    excess: float = 1.0
 
     def alpha(self, errors: Sequence[ModelError], information: Array) -> float:
         """The calibrated alpha of an experiment with this information (k, k), in the errors' coordinates."""
-        largest = self._largest(errors, self._steps(errors, information, fresh=False))
-        reached = float(np.quantile(largest, self.probability, method="higher"))
+        reached = self.excess * self._drawn(errors, information)
         return errors[0].alpha * reached / max(error.worst(information).ratio for error in errors)
+
+    def corrected(self, errors: Sequence[ModelError], information: Array, estimates: Array) -> Calibration:
+        """The same for records of which these are estimates.
+
+        Args:
+            information: (k, k) of the records, in the coordinates of the errors.
+            estimates: (n, k) in raw parameters, NaN where there is none.
+        """
+        found = self._quantile(largest_error(errors, estimates))
+        return replace(self, excess=found / self._drawn(errors, information))
 
     def coverage(self, errors: Sequence[ModelError], information: Array, within: float = 1.0) -> Coverage:
         """What fresh draws say of r_adm times `within`, what the best accuracy reaches in its place."""
-        steps = self._steps(errors, information, fresh=True)
-        exact, linear = self._largest(errors, steps), _to_first_order(errors, steps)
+        steps = self._steps(information, fresh=True)
+        exact, linear = largest_error(errors, _raw(errors, steps)), _to_first_order(errors, steps)
         return Coverage(self.draws, int(np.sum(exact <= within)), int(np.sum(linear <= within)))
 
-    def _steps(self, errors: Sequence[ModelError], information: Array, *, fresh: bool) -> Array:
+    def _steps(self, information: Array, *, fresh: bool) -> Array:
         """(draws, k): theta minus its nominal value, of covariance M^-1."""
         normal = np.random.default_rng([self.seed, fresh]).standard_normal((self.draws, len(information)))
         return np.asarray(normal @ inverse_factor(information))
 
-    def _largest(self, errors: Sequence[ModelError], steps: Array) -> Array:
-        """(draws,): the largest |G(theta) - G| / r_adm over frequencies and errors."""
-        experiment, w = errors[0].experiment, _frequencies(errors)
-        bounds = [_admissible(error, w) for error in errors]
-        nominal = experiment.model.plant_at(w)
-        largest = np.zeros(self.draws)
-        for i, theta in enumerate(experiment.model.theta + experiment.raw_steps(steps)):
-            off = experiment.model.at(theta).plant_at(w) - nominal
-            for error, r_adm in zip(errors, bounds, strict=True):
-                ratio = np.linalg.norm(error.concerned(off), axis=1) / r_adm
-                largest[i] = max(largest[i], ratio.max() if np.all(np.isfinite(ratio)) else np.inf)
-        return largest
+    def _drawn(self, errors: Sequence[ModelError], information: Array) -> float:
+        """The quantile of the draws."""
+        return self._quantile(largest_error(errors, _raw(errors, self._steps(information, fresh=False))))
+
+    def _quantile(self, largest: Array) -> float:
+        return float(np.quantile(largest, self.probability, method="higher"))
+
+
+def largest_error(errors: Sequence[ModelError], estimates: Array) -> Array:
+    """(n,): the largest |G(theta) - G| / r_adm over frequencies and errors; infinite where it has no value.
+
+    Args:
+        estimates: (n, k) in raw parameters.
+    """
+    model, w = errors[0].experiment.model, _frequencies(errors)
+    bounds = [_admissible(error, w) for error in errors]
+    nominal = model.plant_at(w)
+    largest = np.full(len(estimates), np.inf)
+    for i in np.flatnonzero(np.isfinite(estimates).all(axis=1)).tolist():
+        off = model.at(estimates[i]).plant_at(w) - nominal
+        ratios = [
+            np.linalg.norm(error.concerned(off), axis=1) / r_adm
+            for error, r_adm in zip(errors, bounds, strict=True)
+        ]
+        if np.all(np.isfinite(ratios)):
+            largest[i] = np.max(ratios)
+    return largest
+
+
+def _raw(errors: Sequence[ModelError], steps: Array) -> Array:
+    """(n, k): the parameters at steps in the coordinates of the errors."""
+    experiment = errors[0].experiment
+    return np.asarray(experiment.model.theta + experiment.raw_steps(steps))
 
 
 def _to_first_order(errors: Sequence[ModelError], steps: Array) -> Array:

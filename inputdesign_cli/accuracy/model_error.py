@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.accuracy.admissible import AdmissibleError
 from inputdesign_cli.accuracy.cuts import MatrixCut
-from inputdesign_cli.accuracy.over_frequency import OverFrequency, largest_singular
+from inputdesign_cli.accuracy.over_frequency import OverFrequency, largest_singular, turned
 from inputdesign_cli.accuracy.requirement import Requirement, inverse_factor
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant import local_maxima
@@ -50,7 +50,7 @@ class OnModelError(OverFrequency):
 
     def error_bound(self, information: Array, w: ArrayLike) -> Array:
         """r_u (n,) at frequencies `w`, inside or outside the band, to first order."""
-        return self.alpha * largest_singular(self.plant_rows(w) @ inverse_factor(information).T)
+        return self.alpha * largest_singular(turned(self.plant_rows(w), inverse_factor(information).T))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -109,12 +109,21 @@ class OverFrequency(Requirement):
 
     def ratios(self, information: Array, frequencies: Array) -> Array:
         """The ratio (n,) at given frequencies."""
-        return self.measure(self.rows(frequencies) @ inverse_factor(information).T, frequencies)
+        return self.measure(turned(self.rows(frequencies), inverse_factor(information).T), frequencies)
 
     def violations(self, information: Array, *, above: float = -np.inf) -> list[Violation]:
         """Local maxima of the ratio over the band, polished between the grid points."""
+        turn, on_grid = self._on_grid(information)
+        return self._polished(turn, on_grid, above)
+
+    def _on_grid(self, information: Array) -> tuple[Array, Array]:
+        """K^T with K^T K = M^-1, and the ratio on the grid.
+
+        Raises:
+            InaccurateError: `ratio-not-finite`.
+        """
         turn = inverse_factor(information).T
-        on_grid = self.measure(self._grid_rows @ turn, self.grid)
+        on_grid = self.measure(turned(self._grid_rows, turn), self.grid)
         if not np.all(np.isfinite(on_grid)):
             raise InaccurateError.because(
                 "ratio-not-finite",
@@ -123,25 +132,35 @@ class OverFrequency(Requirement):
                 hint="restrict the band of the requirement, and rescale signals of extreme units",
                 key="accuracy",
             )
+        return turn, on_grid
+
+    def _polished(self, turn: Array, on_grid: Array, above: float) -> list[Violation]:
         w, ratio = local_maxima(
-            lambda w: self.measure(self.rows(w) @ turn, w), self.grid, on_grid, above=above
+            lambda w: self.measure(turned(self.rows(w), turn), w), self.grid, on_grid, above=above
         )
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
 
     def most(self, information: Array) -> float:
         """From the points of the grid: a peak between them stands no higher than `local_maxima` admits."""
-        on_grid = self.measure(self._grid_rows @ inverse_factor(information).T, self.grid)
+        on_grid = self.measure(turned(self._grid_rows, inverse_factor(information).T), self.grid)
         top = float(on_grid.max())
         return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
 
     def worst(self, information: Array) -> Violation:
         """The largest of the violations; one beside frequency zero is told to be there."""
-        found = worst(self.violations(information))
+        turn, on_grid = self._on_grid(information)
+        # A peak that ends below the highest point of the grid is not the largest.
+        found = worst(self._polished(turn, on_grid, float(on_grid.max()) * (1.0 - _ROUNDING)))
         lo, hi = self.band
         if found.frequency is None or lo > 0.0 or found.frequency > _BESIDE_ZERO * hi:
             return found
         at_zero = float(self.ratios(information, np.zeros(1))[0])
         return Violation(found.ratio, 0.0) if at_zero >= found.ratio * (1.0 - _ROUNDING) else found
+
+
+def turned(rows: NDArray[np.float64], turn: Array) -> NDArray[np.float64]:
+    """(n, q, k) rows @ turn as one product: stacks of small matrices are multiplied one by one."""
+    return np.asarray((rows.reshape(-1, rows.shape[2]) @ turn).reshape(*rows.shape[:2], turn.shape[1]))
 
 
 def real_rows(gradient: ComplexArray) -> NDArray[np.float64]:

@@ -158,10 +158,12 @@ def levels(text: str) -> dict[str, float]:
     Raises:
         typer.BadParameter: The text is something else.
     """
+    from inputdesign_cli.specification.yaml.scalars import plain_number
+
     found = {}
     for name, value in named(text, "--operating-point", "u1=40,y1=52.3").items():
         try:
-            found[name] = float(value)
+            found[name] = plain_number(value)
         except ValueError:
             message = f"{value!r} is not a number, as in u1=40,y1=52.3"
             raise typer.BadParameter(message, param_hint="--operating-point") from None

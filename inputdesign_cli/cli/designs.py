@@ -33,7 +33,7 @@ from inputdesign_cli.errors import STANDARD_INPUT
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
-    from inputdesign_cli.compute.watching import Round
+    from inputdesign_cli.compute.watching import Counted, Round
     from inputdesign_cli.runs.results import Results
     from inputdesign_cli.sweep.verbs import Verb
 
@@ -153,7 +153,7 @@ def _results(
 
         started = time.monotonic()
 
-        def told(done: Round) -> None:
+        def told(done: Round | Counted) -> None:
             if time.monotonic() - started > _PATIENCE:
                 show(f"{file}: {done} ...")
 

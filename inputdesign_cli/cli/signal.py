@@ -143,9 +143,11 @@ def _pair(text: str, option: str) -> tuple[float, float]:
     Raises:
         typer.BadParameter: The text is something else.
     """
+    from inputdesign_cli.specification.yaml.scalars import plain_number
+
     low, colon, high = text.partition(":")
     try:
-        found = float(low), float(high)
+        found = plain_number(low), plain_number(high)
     except ValueError:
         found = (math.nan, math.nan)
     negative = option != "--range" and found[0] < 0.0

@@ -10,12 +10,13 @@ import typer
 
 from inputdesign_cli.cli.options import Overwrite, Quiet
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.cli.terminal import colourful, status
 from inputdesign_cli.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
     from inputdesign_cli.runs.results import Result
     from inputdesign_cli.specification import Spec
+    from inputdesign_cli.wizard.composing import Draft
 
 
 def wizard(
@@ -52,28 +53,25 @@ def wizard(
     At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
     They are asked in the terminal where no option answers them. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import read_answers
+    from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
 
     if output.exists() and not overwrite:
         hint = "choose another name with -o, or overwrite it with --overwrite"
         raise OutputError.because("output-exists", f"{output} exists already", hint)
     known = read_answers(answers, given or [])
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
-    asked = answers is None and not given
-    if asked and terminal:
-        known = _asked(known)
-    elif asked:
-        _refuse()
+    unanswered = [one.key for one in QUESTIONS if one.default is None and one.key not in known]
+    if unanswered and not known and not terminal:
+        _refuse(unanswered)
+    draft = _asked(known, output, quiet) if unanswered and terminal else None
     with status("thinking ...", quiet=quiet):
-        from inputdesign_cli import tasks
-        from inputdesign_cli.runs.run_directory import write_bytes, write_text
+        from inputdesign_cli.runs.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
         from inputdesign_cli.wizard.solving import enough_lines
 
-        draft = compose(known, output.stem, output.parent)
-        for name, content in draft.files.items():
-            write_bytes(output.parent / name, content)
-        tasks.validate(draft.spec())
+        if draft is None:
+            draft = compose(known, output.stem, output.parent)
+            draft.validate()
         draft = enough_lines(draft, _result)
         write_text(output, draft.text)
     if not quiet:
@@ -98,7 +96,7 @@ def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
             found = verdict(spec, results.result, _result)
         if not quiet:
             typer.echo(
-                "\n".join(["", *found.sentences, *to_log(spec, "", str(file)), f"files: {place.directory}"])
+                "\n".join(["", *found.sentences, *to_log(spec, str(file)), f"files: {place.directory}"])
             )
     if trade:
         from inputdesign_cli.cli.trade import WORDS, tell_trade
@@ -113,30 +111,33 @@ def _result(spec: Spec) -> Result:
     return tasks.solve(spec).result
 
 
-def _asked(known: dict[str, str]) -> dict[str, str]:
-    """The answers of somebody at the terminal; asked again where one cannot be understood."""
+def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
+    """The draft of somebody at the terminal, who is asked again where an answer cannot be used."""
     import questionary
 
-    from inputdesign_cli.wizard.questions import QUESTIONS
+    from inputdesign_cli.diagnostics import render
 
-    found = dict(known)
-    for one in QUESTIONS:
-        if one.key in found:
-            continue
+    with status("thinking ...", quiet=quiet):
+        from inputdesign_cli.wizard.conversation import Conversation
+    talk = Conversation(known, output.stem, output.parent)
+    while (one := talk.question) is not None:
         typer.echo(f"  {one.allowed}", err=True)
-        text = questionary.text(one.asks, default=one.default or "").ask()
-        if text is None:  # Ctrl-C
-            raise KeyboardInterrupt
-        found[one.key] = text
-    return found
+        try:
+            text = questionary.text(one.asks, default=one.default or "").unsafe_ask()
+        except EOFError:  # Ctrl-D
+            raise KeyboardInterrupt from None
+        with status("thinking ...", quiet=quiet):
+            wrong = talk.answer(text)
+        if wrong is not None:
+            typer.echo(render(wrong, color=colourful(sys.stderr)).rstrip("\n"), err=True)
+    assert talk.draft is not None
+    return talk.draft
 
 
-def _refuse() -> None:
-    from inputdesign_cli.wizard.questions import QUESTIONS
-
-    needed = ", ".join(one.key for one in QUESTIONS if one.default is None)
+def _refuse(unanswered: list[str]) -> None:
     raise SpecError.because(
         "no-terminal",
         "there is no terminal to ask in, and no answers are given",
-        f"write them into a file (--answers answers.yaml) or behind --answer KEY=TEXT; needed are {needed}",
+        "write them into a file (--answers answers.yaml) or behind --answer KEY=TEXT; needed are "
+        f"{', '.join(unanswered)}",
     )

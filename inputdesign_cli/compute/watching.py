@@ -22,13 +22,25 @@ class Round:
         return f"round {self.number}: {self.objective:.6g}, proved to {gap:.1e}, {self.cuts} cuts"
 
 
-Watcher = Callable[[Round], None]
+@dataclass(frozen=True)
+class Counted:
+    """How many of the things that are done one after the other are done."""
+
+    what: str
+    done: int
+    of: int
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.done} of {self.of}"
+
+
+Watcher = Callable[[Round | Counted], None]
 _watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
 
 
 @contextmanager
 def watching(watcher: Watcher) -> Iterator[None]:
-    """What is computed inside tells its rounds."""
+    """What is computed inside tells how far it is."""
     token = _watcher.set(watcher)
     try:
         yield
@@ -36,7 +48,7 @@ def watching(watcher: Watcher) -> Iterator[None]:
         _watcher.reset(token)
 
 
-def tell(done: Round) -> None:
+def tell(done: Round | Counted) -> None:
     """Tell whoever watches, if anybody does."""
     watcher = _watcher.get()
     if watcher is not None:

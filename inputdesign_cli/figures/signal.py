@@ -43,6 +43,8 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
         limits = curves.limits.get(name, ())
         for bound, axes in ((bound, axes) for bound in limits for axes in (record, histogram)):
             handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
+        if name in curves.moves:
+            record.set_title("largest move {:.4g}, limit {:.4g}".format(*curves.moves[name]), loc="left")
         _frame(record, values, *limits)
         histogram.set_ylim(record.get_ylim())
     for panel, (below, beside) in zip(predicted, grid[len(channels) :], strict=True):

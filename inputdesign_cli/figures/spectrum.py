@@ -121,7 +121,6 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     below.set_ylabel("eigenvalues")
     legend_above(below, handles)
     frequency_axis(below, w, time_unit)
-    above.set_xscale(below.get_xscale())
 
 
 def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Array]]:

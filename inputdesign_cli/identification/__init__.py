@@ -22,6 +22,7 @@ from inputdesign_cli.identification.residual_tests import (
     whiteness as whiteness,
 )
 from inputdesign_cli.identification.rivals import Rival as Rival
+from inputdesign_cli.identification.spikes import Spikes as Spikes, spikes as spikes
 from inputdesign_cli.identification.unknown_start import (
     information_begun_anywhere as information_begun_anywhere,
 )

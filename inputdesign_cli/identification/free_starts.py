@@ -113,7 +113,8 @@ class FreeStarts:
 
 def _orthonormal(rows: slice, output: int, responses: NDArray[np.float64]) -> _Basis:
     """The directions of responses (m, n), those that are the same as others left out."""
-    scale = np.maximum(np.linalg.norm(responses, axis=1), 1e-300)
+    norm = np.linalg.norm(responses, axis=1)
+    scale = np.where(norm > 0.0, norm, np.inf)  # a start that no output shows is left at zero
     U, s, V = np.linalg.svd(responses.T / scale, full_matrices=False)
     kept = s > _DEPENDENT * s[0]
     return _Basis(rows, output, U[:, kept], (V[kept].T / s[kept]) / scale[:, None])

@@ -26,6 +26,8 @@ PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
 """The powers that results tell; that of the moves of u from sample to sample is only limited."""
 _NODES_AT_ONCE = 256
+# What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
+_NOTHING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -135,8 +137,7 @@ class Experiment(Coordinates):
             density = self.power_density("input", w, channel)
             return density * moving.reshape(-1, *(1,) * (density.ndim - 1))
         if self.depends_on_plant(kind):
-            G = self.response(kind, w)
-            rows = G if channel is None else G[:, channel : channel + 1]
+            rows = _channel(self.response(kind, w), channel)
             return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
         return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
@@ -149,8 +150,7 @@ class Experiment(Coordinates):
             if caused is None or not self.depends_on_plant(kind):
                 total = total + weight * self.power_density(kind, w, channel)
                 continue
-            G = caused[0 if kind == "output" else 1]
-            rows = G if channel is None else G[:, channel : channel + 1]
+            rows = _channel(caused[0 if kind == "output" else 1], channel)
             total = total + weight * self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         return np.asarray(total)
 
@@ -186,8 +186,8 @@ class Experiment(Coordinates):
             total = np.zeros((self.size, self.size))
             for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
                 part = slice(start, start + _NODES_AT_ONCE)
-                products = _real_products(self.noise_gradient(rule.nodes[part]))
-                total += np.tensordot(rule.weights[part], products, axes=1)
+                rows = _rows(self.noise_gradient(rule.nodes[part]), rule.weights[part])
+                total += rows.T @ rows
             return total
 
         return self.samples * integrate(moments, self.singularities)
@@ -242,3 +242,11 @@ def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
     flat = np.moveaxis(F, 1, -1) * np.sqrt(weights)[:, None, None, None]
     flat = flat.reshape(-1, F.shape[1])
     return np.concatenate([flat.real, flat.imag])
+
+
+def _channel(response: ComplexArray, channel: int | None) -> ComplexArray:
+    """(n, 1, r): what x causes at one channel, without what rounding leaves of nothing; all for None."""
+    if channel is None:
+        return response
+    row = response[:, channel : channel + 1]
+    return np.where(np.abs(row) > _NOTHING * np.abs(response).max(initial=0.0), row, 0.0)

@@ -69,9 +69,15 @@ class FiniteRecord:
         """(channels,): the powers of these signals."""
         return np.mean(self.signals(of, record) ** 2, axis=0)
 
+    @property
+    def each(self) -> list[FiniteRecord]:
+        """One for every plant."""
+        return [self]
+
     def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
-        """(plants, channels): the same at every plant."""
-        return self.mean_squares(of, record)[None]
+        """(plants, channels): the powers at every plant, or once where they are those of the record."""
+        plants = self.each[:1] if self._is_record(of) else self.each
+        return np.array([plant.mean_squares(of, record) for plant in plants])
 
     def adjoint(self, of: PowerKind, weights: Array) -> Array:
         """(n, r): the transpose of `signals`, applied to weights (n, channels)."""
@@ -96,21 +102,17 @@ class FiniteRecords(FiniteRecord):
 
     others: tuple[Experiment, ...] = ()
 
-    def mean_squares_of_each(self, of: PowerKind, record: Array) -> NDArray[np.float64]:
-        """(1 + others, channels): the powers at every plant, or once where they are those of the record."""
-        plants = self._each[:1] if self._is_record(of) else self._each
-        return np.array([plant.mean_squares(of, record) for plant in plants])
-
     def information(self, record: Array) -> NDArray[np.float64]:
         """(1 + others, k, k): each as in `FiniteRecord`."""
-        return np.array([plant.information(record) for plant in self._each])
+        return np.array([plant.information(record) for plant in self.each])
 
     @cached_property
     def known(self) -> NDArray[np.float64]:
         """(1 + others, k, k): each as in `FiniteRecord`."""
-        return np.array([plant.known for plant in self._each])
+        return np.array([plant.known for plant in self.each])
 
     @cached_property
-    def _each(self) -> list[FiniteRecord]:
+    def each(self) -> list[FiniteRecord]:
+        """One for every plant, the first of them that of `experiment`."""
         plants = (self.experiment, *self.others)
         return [FiniteRecord(plant, self.samples, self.step) for plant in plants]

@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from inputdesign_cli.compute.executor import Executor, InProcess, WorkerLostError
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
 
 Job = TypeVar("Job")
@@ -53,6 +54,7 @@ def run_batches(
         IdesignError: `worker-lost`; otherwise what `function` and the executor raise.
     """
     answers: dict[int, Answer] = {}
+    told = 0
     batches = _batches(function, job, runs=runs, size=size, seed=seed)
     for done in (executor or InProcess()).run(_compute, batches):
         if isinstance(done.error, WorkerLostError):
@@ -63,6 +65,8 @@ def run_batches(
             raise done.error
         assert done.answer is not None  # there is an answer or an error
         answers[done.job.index] = done.answer
+        told += done.job.runs
+        tell(Counted("simulated runs", told, runs))
     return [answers[index] for index in range(len(answers))]
 
 

@@ -95,6 +95,28 @@ class Redrawn:
 
 
 @dataclass(frozen=True)
+class Reapplied:
+    """Each record of an excitation applied in `times` runs: some kinds of signals take long to make."""
+
+    excitation: Excitation
+    times: int
+
+    @property
+    def name(self) -> str:
+        """That of the excitation."""
+        return self.excitation.name
+
+    def draw(self, runs: int, samples: int, rng: np.random.Generator) -> Array:
+        """Its records, one after the other so many times."""
+        records = self.excitation.draw(-(-runs // self.times), samples, rng)
+        return np.repeat(records, self.times, axis=0)[:runs]
+
+    def information(self, experiment: Experiment) -> Array:
+        """That of the excitation."""
+        return self.excitation.information(experiment)
+
+
+@dataclass(frozen=True)
 class InPhase:
     """Sinusoids of `amplitudes` (L, r) at `frequencies` (L,) in rad per step, in phase over the channels.
 

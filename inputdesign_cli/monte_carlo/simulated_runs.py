@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import BatchEstimate, fit_batch, identify
 from inputdesign_cli.information import Experiment, PowerKind
@@ -74,7 +75,9 @@ def _again_where_lost(job: TrialJob, u: Array, y: Array, found: BatchEstimate) -
     theta, noise, information = found.theta.copy(), found.noise.copy(), found.information.copy()
     converged, steps = found.converged.copy(), found.steps.copy()
     feedback = job.true.loop is not None
-    for run in np.flatnonzero(~converged):
+    lost = np.flatnonzero(~converged).tolist()
+    for done, run in enumerate(lost):
+        tell(Counted(f"simulated runs: {len(u)}; searched from several starts", done, len(lost)))
         try:
             other = identify(
                 job.model, u[run], y[run], job.step, start=job.model.theta, feedback=feedback, rest=True

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 _REFINEMENT = 6
-_ZOOM_POINTS = 8
-_ZOOM_STEPS = 6
+# Points and steps that narrow a bracket ten thousandfold: few peaks cost their steps, many their points.
+_ZOOM_FEW, _ZOOM_MANY, _FEW = (40, 3), (8, 6), 64
 SLACK = 0.05
 """A peak between two grid points may stand this much higher than both, as a share of itself."""
 # Values that differ by less are those of a function that is flat there.
@@ -101,15 +101,16 @@ def local_maxima(
     index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
-    steps, rows = _fractions(_ZOOM_POINTS), np.arange(index.size)
-    for _ in range(_ZOOM_STEPS):
+    points, repeats = _ZOOM_FEW if index.size <= _FEW else _ZOOM_MANY
+    steps, rows = _fractions(points), np.arange(index.size)
+    for _ in range(repeats):
         samples = left[:, None] + (right - left)[:, None] * steps
         found = function(samples.ravel()).reshape(samples.shape)
         top = np.argmax(found, axis=1)
         better = found[rows, top] > best_value
         best = np.where(better, samples[rows, top], best)
         best_value = np.where(better, found[rows, top], best_value)
-        width = (right - left) / (_ZOOM_POINTS + 1)
+        width = (right - left) / (points + 1)
         left, right = np.maximum(left, best - width), np.minimum(right, best + width)
     for end, inner in ((0, 1), (-1, -2)):
         level = float(values[end])

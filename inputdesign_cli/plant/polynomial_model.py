@@ -215,15 +215,20 @@ class PolynomialModel(Parametrised):
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
-        G = self.plant_at(w)
+        G = self.plant_at(w) if self._outputs_count else np.zeros((np.size(w), self.outputs, self.inputs))
         u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (G.shape[0], self.inputs, self.inputs))
         return self.prediction_gradient(w, G, u, np.zeros_like(G))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""
-        H = self.noise_at(w)
+        H = self.noise_at(w) if self._outputs_count else np.zeros((np.size(w), self.outputs, self.outputs))
         e = np.broadcast_to(np.eye(self.outputs, dtype=complex), H.shape)
         return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)
+
+    @property
+    def _outputs_count(self) -> bool:
+        """Whether the gradient of the prediction depends on past outputs: by coefficients of A alone."""
+        return any(parameter.letter == "a" for parameter in self.parameters)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
         """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j).

@@ -8,6 +8,9 @@ from inputdesign_cli.report.numbers import Fact, listed, precise, shown, spoken
 from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Json, Result
 
+# Gaps below this are told as such.
+_CLOSED = 1e-6
+
 # What is said of an excitation that was given, by the status of the result.
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
 
@@ -28,9 +31,9 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     powers = ", ".join(f"{name} {listed(power[name])}" for name in power)
     if powers:
         yield "power", powers, ""
-    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
-    if binding:
-        yield "limits", f"{', '.join(dict.fromkeys(binding))} exhausted", ""
+    limits = "; ".join(_limits(result))
+    if limits:
+        yield "limits", limits, ""
     error = result.get("model_error", {})
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
@@ -41,11 +44,9 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         yield _lines(result["frequency_response"], time_unit)
     if "confidence" in error:
         told = error["confidence"]
-        low, high = (f"{100 * share:.1f}" for share in told["exact_limits"])
         yield (
             "confidence",
-            f"{100 * told['exact']:.1f} % ({low} to {high}) of {told['draws']} estimates drawn by asymptotic "
-            "theory meet it",
+            _kept(told),
             f"asked {100 * told['asked']:g} %; chi-squared would take alpha {told['chi_squared_alpha']:.4g}, "
             f"not {error['alpha']:.4g}",
         )
@@ -63,6 +64,28 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if "improvement" in result.get("simulation", {}):
         measured, theory = (100 * result["simulation"]["improvement"][key] for key in ("measured", "theory"))
         yield "improvement", f"{measured:.1f} % better than white (theory {theory:.1f} %)", ""
+
+
+def _kept(told: Mapping[str, Json]) -> str:
+    """How many estimates meet the bounds: of simulated experiments, or drawn by asymptotic theory."""
+    runs = "runs" in told
+    low, high = (f"{100 * share:.1f}" for share in told["kept_limits" if runs else "exact_limits"])
+    share = f"{100 * told['kept' if runs else 'exact']:.1f} % ({low} to {high})"
+    if runs:
+        return f"{share} of {told['runs']} simulated experiments meet it"
+    return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
+
+
+def _limits(result: Result) -> Iterator[str]:
+    """Which limits the design exhausts, and how far single samples of the record use theirs."""
+    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
+    shares = result.get("signal", {}).get("of_limits", {})
+    if binding:
+        by = " by the spectrum" if shares else ""
+        yield f"{', '.join(dict.fromkeys(binding))} exhausted{by}"
+    if shares:
+        taken = sorted(shares, key=lambda name: -shares[name])
+        yield f"single samples take {', '.join(f'{100 * shares[k]:.3g} % of {spoken(k)}' for k in taken)}"
 
 
 def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
@@ -140,6 +163,13 @@ def white(result: Result) -> str:
     return f"white excitation: {_clean(value, kind)}" + (f", {ratio:.3g} times as much" if multiple else "")
 
 
+def _gap(relative: float) -> str:
+    """How near the proof comes: what a solver leaves below a millionth changes from machine to machine."""
+    return (
+        f", gap {relative:.1e}" if relative >= _CLOSED else f", gap below {_CLOSED:.0e}".replace("e-0", "e-")
+    )
+
+
 def proofs(result: Result) -> Iterator[str]:
     """What is proved of other experiments."""
     found = result.get("objective", {})
@@ -150,7 +180,7 @@ def proofs(result: Result) -> Iterator[str]:
         family = f"no {result['moments']['structure']} moments get"
     for key, side in (("lower_bound", "below"), ("upper_bound", "above")):
         if key in found and found.get("relative_gap") != 1.0:  # or else nothing is proved yet
-            gap = f", gap {found['relative_gap']:.1e}" if "relative_gap" in found else ""
+            gap = _gap(found["relative_gap"]) if "relative_gap" in found else ""
             yield f"{family} {side} {shown(found[key])}{gap}"
     side = "above" if objective(found.get("kind")).maximised else "below"
     for what in ("spectrum", "structure"):
@@ -183,7 +213,9 @@ def _signal(result: Result) -> Iterator[str]:
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
         yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples"
     if "confidence" in signal:
-        yield f"kept by {100 * signal['confidence']['exact']:.1f} % of the estimates"
+        told = signal["confidence"]
+        kept, of = ("kept", "simulated experiments") if "runs" in told else ("exact", "estimates")
+        yield f"kept by {100 * told[kept]:.1f} % of the {of}"
     if "criterion" in signal:
         yield f"criterion {signal['criterion']:.6g} with these samples"
     yield from _beside_the_design(result.get("objective", {}), signal)

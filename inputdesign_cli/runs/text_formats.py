@@ -62,9 +62,17 @@ def csv_text(table: Table) -> str:
     if len({len(values) for values in columns.values()}) > 1:
         lengths = ", ".join(f"{name}: {len(values)}" for name, values in columns.items())
         raise ValueError(f"the columns of a table differ in length ({lengths})")
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(repr(v).removesuffix(".0") for v in row) for row in rows)]
-    return "\n".join(lines) + "\n"
+    rows = zip(*(_shortest(values) for values in columns.values()), strict=True)
+    return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"
+
+
+def _shortest(values: Array) -> list[str]:
+    """The shortest text of each of (n,) numbers, a whole one without its point."""
+    if not np.all(np.isfinite(values)):
+        return [repr(value).removesuffix(".0") for value in values.tolist()]
+    # The encoder of JSON writes the same digits, all at once.
+    text = json.dumps(values.tolist(), separators=(",", ","))[1:-1]
+    return f"{text},".replace(".0,", ",").split(",")[:-1] if values.size else []
 
 
 def read_csv(path: Path) -> dict[str, Array]:

@@ -1,6 +1,10 @@
 """Signals: from a spectrum to samples, and the best of several by what those samples achieve."""
 
-from inputdesign_cli.signal.bounds import Bounds as Bounds, limited_responses as limited_responses
+from inputdesign_cli.signal.bounds import (
+    Bounds as Bounds,
+    limited_responses as limited_responses,
+    peak_share as peak_share,
+)
 from inputdesign_cli.signal.constraints import largest_move as largest_move
 from inputdesign_cli.signal.crest import crest_factor as crest_factor, optimise_phases as optimise_phases
 from inputdesign_cli.signal.designed import DesignedSpectrum as DesignedSpectrum

@@ -8,7 +8,7 @@ import numpy as np
 
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.constraints import SignalConstraint
+from inputdesign_cli.signal.constraints import SignalConstraint, peak_ratio
 from inputdesign_cli.signal.input_limits import InputLimits
 from inputdesign_cli.signal.limiter import Limiter
 from inputdesign_cli.signal.phases import LimitedResponse
@@ -76,18 +76,27 @@ def limited_responses(
 
 
 def _constraints(plant: FiniteRecord, hold: int, bounds: Bounds) -> tuple[SignalConstraint, ...]:
-    """Limits that clipping the record cannot meet: on outputs, in closed loop on u.
+    """Limits that clipping the record cannot meet: at every plant on outputs, in closed loop on u.
 
     Beside a limit on outputs those on u are stated as well, which meeting it might spoil.
     """
-    if bounds.output is None and plant.experiment.loop is None:
+    open_loop = plant.experiment.loop is None
+    if bounds.output is None and open_loop:
         return ()
-    found = [] if bounds.output is None else [_signals(plant, "output", hold, bounds.output)]
-    if bounds.amplitude is not None:
-        found.append(_signals(plant, "input", hold, bounds.amplitude))
-    if bounds.rate is not None:
-        found.append(_moves(_signals(plant, "input", hold, bounds.rate)))
+    found = (
+        [] if bounds.output is None else [_signals(one, "output", hold, bounds.output) for one in plant.each]
+    )
+    for one in plant.each[:1] if open_loop else plant.each:
+        if bounds.amplitude is not None:
+            found.append(_signals(one, "input", hold, bounds.amplitude))
+        if bounds.rate is not None:
+            found.append(_moves(_signals(one, "input", hold, bounds.rate)))
     return tuple(found)
+
+
+def peak_share(plant: FiniteRecord, bounds: Bounds, samples: Array) -> float:
+    """The largest share of a limit on single samples that what a record (n, r) causes uses."""
+    return peak_ratio(samples, _constraints(plant, 1, bounds))
 
 
 def _signals(plant: FiniteRecord, of: PowerKind, hold: int, bound: Array) -> SignalConstraint:

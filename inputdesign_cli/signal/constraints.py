@@ -52,6 +52,18 @@ def slow_moves(values: Array, rate: float) -> Array:
     return np.clip(0.5 * (above + below), -reach, reach)
 
 
+def ramped(values: Array, rate: float) -> Array:
+    """The record that follows `values` (n,) from rest as fast as moves of at most `rate` allow.
+
+    Two levels become two levels with ramps of full speed between them.
+    """
+    record, reached = np.empty_like(values), 0.0
+    for t, value in enumerate(values.tolist()):
+        reached = min(max(value, reached - rate), reached + rate)
+        record[t] = reached
+    return record
+
+
 def largest_move(values: Array) -> float:
     """The largest change from one value to the next, the first from rest."""
     return float(np.abs(np.diff(values, prepend=0.0)).max())

@@ -74,7 +74,7 @@ class SignalGenerator:
         settings, blocks = self.settings, 1
         if self.method == "multisine":
             blocks = blocks_of(self.settings.vectors, self.spectrum.inputs)
-        elif self.method in ("binary", "ternary"):
+        elif self.method in ("binary", "slewed", "ternary"):
             blocks = self.spectrum.inputs
         block = self.period // blocks
         lines = self.spectrum.lines(block, settings.hold)
@@ -100,8 +100,10 @@ class SignalGenerator:
             return multisine_record(
                 lines, length, rng, self.settings.vectors, angles=self._phases(lines, rng)
             )
-        if method == "binary" or method == "ternary":
-            return few_levels(lines, length, rng, method)
+        if method == "binary" or method == "slewed":  # the ramps come with the limits
+            return few_levels(lines, length, rng, "binary")
+        if method == "ternary":
+            return few_levels(lines, length, rng, "ternary")
         if method == "filtered_noise":
             return gaussian_record(lines, rng)
         if method == "white":

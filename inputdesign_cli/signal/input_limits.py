@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.signal.constraints import largest_move, slow_moves
+from inputdesign_cli.signal.constraints import largest_move, ramped, slow_moves
 from inputdesign_cli.signal.settings import Quantiser
 
 _INSIDE = 1.0 - 1e-12
@@ -40,6 +40,12 @@ class InputLimits:
         if self.reach is not None:
             values = np.clip(values, -self._most, self._most)
         return values if self.rate is None else slow_moves(values, self._fastest)
+
+    def slewed(self, values: Array) -> Array:
+        """(m,): the values clipped, then followed as fast as the moves allow."""
+        if self.reach is not None:
+            values = np.clip(values, -self._most, self._most)
+        return values if self.rate is None else ramped(values, self._fastest)
 
     def converted(self, values: Array) -> Array:
         """(m,): the nearest values of the converter."""

@@ -41,9 +41,10 @@ class Limiter:
             return self._held(goal)
         if self.settings.method in LEVELLED:
             return self._held(self._levelled(goal))
+        fit = InputLimits.slewed if self.settings.method == "slewed" else InputLimits.limited
         shrink, record = 1.0, goal
         for _ in range(_TRIES):
-            limited = self._each(goal, InputLimits.limited)
+            limited = self._each(goal, fit)
             if self.constraints:
                 limited = restrained(limited, tuple(c.tightened(shrink) for c in self.constraints))
             record = self._each(limited, InputLimits.converted)

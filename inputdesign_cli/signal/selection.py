@@ -15,12 +15,15 @@ from inputdesign_cli.signal.evaluation import MET, Evaluator, Target
 from inputdesign_cli.signal.generator import SignalGenerator
 from inputdesign_cli.signal.level_search import first_level, last_level, level_of_power
 from inputdesign_cli.signal.limiter import Limiter
-from inputdesign_cli.signal.settings import LEVELLED, Method
+from inputdesign_cli.signal.settings import FROM_LEVELS, LEVELLED, Method
+from inputdesign_cli.signal.switching import better_switching
 
 # Times the level that fits as it is: how much is clipped of the records that are tried.
 _CLIPPED = (1.0, 1.4, 2.0, 3.0)
 # Times the level that would do without limits: there they all bite.
 _FAR = 40.0
+# So often at most the times of switching of ramps between two levels are changed.
+_SWITCHINGS = 600
 # A record that costs more than the design by this share is worth more candidates.
 _LITTLE = 0.05
 
@@ -102,7 +105,10 @@ class _Candidates:
         """One candidate at its level."""
         seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
-        samples, met = self._levelled(values * np.sqrt(power / _power(values)))
+        values = values * np.sqrt(power / _power(values))
+        if self.generator.method == "slewed":
+            values = self._switched(values, rng)
+        samples, met = self._levelled(values)
         factor, evaluator = self.generator.factor, self.evaluator
         return Record(
             samples,
@@ -113,12 +119,26 @@ class _Candidates:
             met,
         )
 
+    def _switched(self, values: Array, rng: np.random.Generator) -> Array:
+        """The values (m, r) of two levels, switched at better times; what repeats stays so."""
+        limiter, evaluator, settings = self.limiter, self.evaluator, self.limiter.settings
+        # At the level that is stated, or the highest; where there is none, at that of the design.
+        level = 1.0 if any(limits.reach is None for limits in limiter.inputs) else _FAR
+        if settings.level is not None:
+            values, level = _of_peaks(values, settings.level), 1.0
+
+        def figure(period: Array) -> float:
+            return evaluator.figure(limiter.record(np.tile(period, (settings.periods, 1)), level))
+
+        period = values[: len(values) // settings.periods]
+        enough = 1.0 if evaluator.target.meets else None
+        return np.tile(better_switching(period, figure, rng, _SWITCHINGS, enough), (settings.periods, 1))
+
     def _levelled(self, values: Array) -> tuple[Array, bool]:
         """The record at its level, and whether it does what is asked."""
         limiter, settings, evaluator = self.limiter, self.limiter.settings, self.evaluator
         if settings.level is not None:
-            peaks = np.abs(values).max(axis=0)
-            samples = limiter.record(values * (settings.level / np.where(peaks > 0.0, peaks, 1.0)), 1.0)
+            samples = limiter.record(_of_peaks(values, settings.level), 1.0)
             return samples, evaluator.figure(samples) <= 1.0
         if not evaluator.target.meets:
             return (self._affordable(values, 1.0) if limiter.plain else self._best_within(values)), True
@@ -145,7 +165,7 @@ class _Candidates:
         What is clipped until it has that power may have lost its weaker lines: steps of two levels have one.
         """
         strongest = self._of_designed_power(values)
-        if self.limiter.settings.method in LEVELLED:
+        if self.limiter.settings.method in FROM_LEVELS:
             return strongest
         fit = self._fitting(values)
         tried = [strongest, *(self._affordable(values, share * fit) for share in _CLIPPED)]
@@ -173,7 +193,7 @@ class _Candidates:
     def _lowered(self, values: Array, level: float) -> Array:
         """The values with their peak lowered towards what the limits leave, if that keeps their kind."""
         settings, reach = self.limiter.settings, self.limiter.inputs[0].reach
-        fixed = settings.method in LEVELLED or settings.phases == "optimised" or settings.ramp
+        fixed = settings.method in FROM_LEVELS or settings.phases == "optimised" or settings.ramp
         # Phases of several inputs that give way one by one would spoil the cross-spectra.
         if reach is None or fixed or values.shape[1] > 1:
             return values
@@ -189,6 +209,12 @@ class _Candidates:
         if self.limiter.plain:
             return record(values, level * np.sqrt(share))
         return record(values, last_level(lambda a: share_of(record(values, a)) >= 1.0, level))
+
+
+def _of_peaks(values: Array, peaks: Array) -> Array:
+    """The values (m, r), each input scaled to its peak (r,); one that is silent stays so."""
+    largest = np.abs(values).max(axis=0)
+    return values * (peaks / np.where(largest > 0.0, largest, 1.0))
 
 
 def _power(samples: Array) -> float:

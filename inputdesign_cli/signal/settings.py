@@ -10,10 +10,11 @@ import numpy as np
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.signal.sinusoids import Selection
 
-Method = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white", "given"]
+Method = Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white", "given"]
 Phases = Literal["orthogonal", "random", "schroeder", "optimised"]
 LineVectors = Literal["orthogonal", "random"]
 LEVELLED = ("binary", "ternary", "prbs")
+FROM_LEVELS = (*LEVELLED, "slewed")  # ramps between them too
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,8 @@ def _bad_parameter(message: str) -> SpecError:
 def _entries(system: control.TransferFunction | control.StateSpace) -> list[list[Entry]]:
     """Rows of columns of numerators and denominators, descending."""
     if hasattr(system, "A"):
-        return transfer_functions(system)
+        discrete = system.isdtime(strict=True)
+        return transfer_functions(system.A, system.B, system.C, system.D, discrete=discrete)
     return [
         [
             (np.atleast_1d(system.num[i][j]).tolist(), np.atleast_1d(system.den[i][j]).tolist())

@@ -7,14 +7,10 @@ is zero and what cancels cancels, whatever the unit of time and the coordinates 
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inputdesign_cli.errors import SpecError, bad_spec
-
-if TYPE_CHECKING:
-    import control
 
 Exact = list[Fraction]
 Entry = tuple[list[float], list[float]]
@@ -28,17 +24,21 @@ _ROUNDING = 1e-12
 _PRIME = 2**61 - 1
 
 
-def transfer_functions(system: control.StateSpace) -> list[list[Entry]]:
+def transfer_functions(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, *, discrete: bool
+) -> list[list[Entry]]:
     """Rows of columns of numerators and denominators, without what they have in common.
+
+    Args:
+        A, B, C, D: (n, n), (n, r), (p, n) and (p, r).
 
     Raises:
         SpecError: `not-finite`; `inaccurate-conversion` where polynomials of floats cannot say what the
             states say, which a comparison of both over frequency shows.
     """
-    matrices = [np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D)]
+    matrices = [np.asarray(part, dtype=float) for part in (A, B, C, D)]
     if not all(np.isfinite(part).all() for part in matrices):
         raise bad_spec("not-finite", "the matrices of the system must be finite", key="plant")
-    discrete = system.isdtime(strict=True)
     tops, bottom = _fractions(*matrices)
     return [
         [
@@ -179,7 +179,7 @@ def _leads_of_rounding(top: list[float], excess: int, states: tuple[np.ndarray, 
 
 def _inaccurate() -> SpecError:
     message = "the transfer functions of this system in state space cannot be told in floating point"
-    hint = "name the entries to be estimated: parameters={'k': ('B', 1, 0)}; or use a longer unit of time"
+    hint = "name the entries of the states that are estimated, or use a longer unit of time"
     return bad_spec("inaccurate-conversion", message, hint=hint, key="plant")
 
 

@@ -45,6 +45,7 @@ from inputdesign_cli.tasks.result.refutations import (
 )
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors, rival_notes
+from inputdesign_cli.tasks.result.spikes import spike_notes
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -128,6 +129,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     causes = {
         "unsettled": unsettled(found.estimate),
         "contradicted": [
+            *spike_notes(task.header.units, found.estimate, found.data),
             *differences(found.estimate, [name for name, _ in found.data.files]),
             *repetitions(found.estimate, found.data.files),
             *refutations(found.model, found.estimate),

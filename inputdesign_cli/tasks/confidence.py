@@ -13,6 +13,7 @@ from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates
 
 SETTLED = 1e-3
 _MOST_ROUNDS = 15
@@ -22,11 +23,11 @@ _SMALLER = 0.02
 
 @dataclass(frozen=True)
 class Confidence:
-    """alpha of r_u; where it was calibrated, the chi-squared one (`usual`) and what fresh draws say."""
+    """alpha of r_u; where it was calibrated, how, the chi-squared one (`usual`) and what is kept."""
 
     alpha: float
     usual: float
-    probability: float | None = None
+    calibration: Calibration | None = None
     coverage: Coverage | None = None
 
     @classmethod
@@ -36,32 +37,49 @@ class Confidence:
         requirements: Sequence[Requirement],
         information: Array,
         usual: float,
+        simulated: SimulatedEstimates | None = None,
     ) -> Confidence:
-        """The alpha of an experiment of this information (k, k), in the coordinates of the requirements."""
+        """The alpha of an experiment of this information (k, k), in the coordinates of the requirements.
+
+        Args:
+            simulated: estimates of such experiments; None for asymptotic theory alone.
+
+        Raises:
+            InaccurateError: see `SimulatedEstimates.corrected`.
+        """
         errors = bounded_errors(requirements)
         if calibration is None or not errors:
             return cls(usual, usual)
-        alpha = calibration.alpha(errors, information)
-        return cls(alpha, usual, calibration.probability, calibration.coverage(errors, information))
+        if simulated is not None:
+            calibration = simulated.corrected(calibration, errors, information)
+        alpha, coverage = calibration.alpha(errors, information), calibration.coverage(errors, information)
+        if simulated is not None:
+            coverage = simulated.checked(coverage, errors, 1.0)
+        return cls(alpha, usual, calibration, coverage)
 
     @property
     def entry(self) -> dict[str, Json]:
         """`model_error.confidence` of the result; empty where nothing was calibrated."""
-        told = self.coverage
-        if told is None:
+        told, by = self.coverage, self.calibration
+        if told is None or by is None:
             return {}
-        return {"confidence": {"asked": self.probability, "chi_squared_alpha": self.usual, **covered(told)}}
+        entry = {"asked": by.probability, "chi_squared_alpha": self.usual, **covered(told)}
+        return {"confidence": entry | ({"excess": by.excess} if told.runs else {})}
 
 
 def covered(coverage: Coverage) -> dict[str, Json]:
-    """The shares of simulated estimates within r_adm, that by the exact G with its 95 % limits."""
-    draws = coverage.draws
-    return {
+    """The shares of estimates within r_adm with their 95 % limits: of draws by the exact G, and of runs."""
+    draws, runs = coverage.draws, coverage.runs
+    entry: dict[str, Json] = {
         "draws": draws,
         "exact": coverage.exact / draws,
         "exact_limits": list(binomial_limits(coverage.exact, draws)),
         "linear": coverage.linear / draws,
     }
+    if runs:
+        limits = list(binomial_limits(coverage.kept, runs))
+        entry |= {"runs": runs, "kept": coverage.kept / runs, "kept_limits": limits}
+    return entry
 
 
 def bounded_errors(requirements: Sequence[Requirement]) -> list[ModelError]:

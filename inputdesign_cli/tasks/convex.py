@@ -19,7 +19,6 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InaccurateError, InfeasibleError
 from inputdesign_cli.information import Experiment, FiniteRecord, PowerKind
-from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.objectives import white_labels
@@ -136,6 +135,7 @@ class ConvexTask:
             robust = robust_result(done, done.plants)
             result["robust"] = robust.entry
             tables, curves = tables | robust.tables, curves | robust.curves
+            notes += robust.notes
         files: dict[str, bytes] = {}
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record)
@@ -143,7 +143,8 @@ class ConvexTask:
             tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
-            notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record)]
+            taken = result.get("signal", {}).get("of_limits", {})
+            notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record, taken)]
             known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
@@ -163,9 +164,8 @@ class ConvexTask:
         results = Results(result, self.header.resolved_spec, units.time_unit, tables, curves, files)
         if record is None:
             return Delivered(results, None, None, done.confidence.alpha)
-        found = made.design.result
-        generator = redrawn(made.request, made.design, record)
-        renewed = Redrawn("design", generator, found.basis, found.x)
+        samples, inputs = record.samples.shape
+        renewed = redrawn(made.request, made.design, inputs, samples)
         seen, asked = self.foresight, done.problem.requirements
         tried = None if seen is None else partial(seen.tried, record.samples, asked)
         return Delivered(results, record.samples, renewed, done.confidence.alpha, tried)
@@ -178,7 +178,7 @@ class ConvexTask:
         """
         if self.exact is None:
             return self._designed(self.question, Confidence(self.alpha, self.alpha))
-        return self.exact.designed(self._designed)
+        return self.exact.designed(self._designed, self.record)
 
     def _designed(self, question: Question, confidence: Confidence) -> tuple[Designed, dict[str, Json]]:
         kept = list(range(len(question.others)))
@@ -293,7 +293,7 @@ class ConvexTask:
         )
         known = self._known(done, record)
         if self.exact is not None and known is not None:
-            entry["confidence"] = covered(self.exact.coverage(done.problem.requirements, known))
+            entry["confidence"] = covered(self.exact.of_record(done, record, known))
         return entry | made.entry
 
     def _illustrations(

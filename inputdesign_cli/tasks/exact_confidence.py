@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inputdesign_cli.accuracy import ModelError, Requirement
+from inputdesign_cli.accuracy import ModelError
 from inputdesign_cli.accuracy.calibration import Calibration, Coverage, with_alpha
 from inputdesign_cli.design.convex.coordinates import white_power, whitened_problem
 from inputdesign_cli.design.convex.question import Question
@@ -17,12 +17,15 @@ from inputdesign_cli.runs.results import Json
 from inputdesign_cli.signal import Record
 from inputdesign_cli.spectrum import flat_basis
 from inputdesign_cli.tasks.confidence import SETTLED, Confidence, bounded_errors, settled_alpha
-from inputdesign_cli.tasks.record import Made, RecordRequest, worst_ratio
+from inputdesign_cli.tasks.record import Made, RecordRequest, as_long, redrawn, worst_ratio
 from inputdesign_cli.tasks.record_search import fitting_record
 from inputdesign_cli.tasks.result.design import Designed
+from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates, Simulator
 
 # A record that needs a larger alpha is made anew, this often at the most.
 _RECORDS = 4
+# Simulated experiments correct the design this often at the most, until they change alpha by this share.
+_CORRECTIONS, _CORRECTED = 4, 0.01
 
 MakeDesign = Callable[[Question, Confidence], tuple[Designed, dict[str, Json]]]
 Known = Callable[[Record | None], Array | None]
@@ -30,33 +33,58 @@ Known = Callable[[Record | None], Array | None]
 
 @dataclass(frozen=True)
 class ExactConfidence:
-    """The confidence that is asked of the answer to a question; `usual` is the chi-squared alpha."""
+    """The confidence that is asked of the answer to a question; `usual` is the chi-squared alpha.
+
+    Without a `simulator` asymptotic theory tells how estimates scatter.
+    """
 
     calibration: Calibration
     usual: float
     question: Question
+    simulator: Simulator | None
 
-    def designed(self, design: MakeDesign) -> tuple[Designed, dict[str, Json]]:
+    def designed(self, design: MakeDesign, request: RecordRequest) -> tuple[Designed, dict[str, Json]]:
         """The design that needs just the alpha that it is for, and what the solver did.
 
         Raises:
-            InfeasibleError, InaccurateError: see `settled_alpha`.
+            InfeasibleError, InaccurateError: see `settled_alpha`, `SimulatedEstimates.corrected`.
         """
+        calibration, designs = self.calibration, 0
+        alpha, simulated = self._first_alpha(), None
+        for _ in range(_CORRECTIONS):
+            done, how = self._settled(design, calibration, alpha)
+            designs += how["designs"]
+            alpha, simulated = done.confidence.alpha, self._simulated(done, request)
+            if simulated is None:
+                break
+            errors, before = bounded_errors(done.problem.requirements), calibration.excess
+            corrected = simulated.corrected(calibration, errors, done.information)
+            if abs(corrected.excess / before - 1.0) <= _CORRECTED:
+                break
+            calibration = corrected
+            alpha *= corrected.excess / before
+        coverage = self._coverage(done, done.information, simulated)
+        confidence = Confidence(done.confidence.alpha, self.usual, done.confidence.calibration, coverage)
+        return replace(done, confidence=confidence), {**how, "designs": designs}
+
+    def _settled(
+        self, design: MakeDesign, calibration: Calibration, start: float
+    ) -> tuple[Designed, dict[str, Json]]:
+        """The design that needs just the alpha that it is for by this calibration."""
         found = dict[float, tuple[Designed, dict[str, Json]]]()
 
         def needed(alpha: float) -> float | None:
             try:
-                found[alpha] = design(self.question.at_alpha(alpha), Confidence(alpha, self.usual))
+                found[alpha] = design(
+                    self.question.at_alpha(alpha), Confidence(alpha, self.usual, calibration)
+                )
             except InfeasibleError:  # a smaller alpha may do
                 return None
             done = found[alpha][0]
-            return self.calibration.alpha(bounded_errors(done.problem.requirements), done.information)
+            return calibration.alpha(bounded_errors(done.problem.requirements), done.information)
 
-        alpha = settled_alpha(needed, self._first_alpha())
-        done, how = found[alpha]
-        coverage = self.coverage(done.problem.requirements, done.information)
-        confidence = Confidence(alpha, self.usual, self.calibration.probability, coverage)
-        return replace(done, confidence=confidence), {**how, "designs": len(found)}
+        done, how = found[settled_alpha(needed, start)]
+        return done, {**how, "designs": len(found)}
 
     def recorded(self, done: Designed, made: Made, request: RecordRequest, known: Known) -> Made:
         """The record `made`, or one that keeps the confidence by its own samples.
@@ -71,7 +99,11 @@ class ExactConfidence:
             information = known(made.record)
             if information is None or not (made.record and made.record.met):
                 return made
-            needed = self.calibration.alpha(bounded_errors(done.problem.requirements), information)
+            errors, calibration = bounded_errors(done.problem.requirements), self.calibration
+            simulated = self._of_samples(made.record)
+            if simulated is not None:
+                calibration = simulated.corrected(calibration, errors, information)
+            needed = calibration.alpha(errors, information)
             if needed <= alpha * (1.0 + SETTLED):
                 break
             alpha = needed
@@ -84,10 +116,27 @@ class ExactConfidence:
         ratio = worst_ratio(done.problem.requirements)(information)
         return replace(made, record=replace(made.record, worst_ratio=ratio))
 
-    def coverage(self, requirements: Sequence[Requirement], information: Array) -> Coverage:
-        """How many of fresh simulated estimates keep the bounds at this information (k, k)."""
-        errors = bounded_errors(requirements)
-        return self.calibration.coverage(errors, information, self._reached(errors, information))
+    def of_record(self, done: Designed, record: Record, information: Array) -> Coverage:
+        """How many of fresh estimates keep the bounds with these samples, which tell this much (k, k)."""
+        return self._coverage(done, information, self._of_samples(record))
+
+    def _coverage(self, done: Designed, information: Array, simulated: SimulatedEstimates | None) -> Coverage:
+        errors = bounded_errors(done.problem.requirements)
+        within = self._reached(errors, done.information)
+        coverage = self.calibration.coverage(errors, information, within)
+        return coverage if simulated is None else simulated.checked(coverage, errors, within)
+
+    def _simulated(self, done: Designed, request: RecordRequest) -> SimulatedEstimates | None:
+        """Estimates of records of the designed spectrum; None where they are not asked for, or not made."""
+        samples = as_long(request, done.experiment)
+        if self.simulator is None or samples is None or not done.design.result.x.any():
+            return None
+        return self.simulator.of(redrawn(request, done.design, done.experiment.inputs, samples), samples)
+
+    def _of_samples(self, record: Record) -> SimulatedEstimates | None:
+        if self.simulator is None:
+            return None
+        return self.simulator.of_record(record.samples)
 
     def _reached(self, errors: Sequence[ModelError], information: Array) -> float:
         """What r_adm is multiplied by: where the best accuracy is sought, the ratio that was reached."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, OnModelError, Requirement, model_errors
 from inputdesign_cli.compute.time_limit import OutOfTimeError, seconds_left, what_ended
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Earlier, Estimate
 from inputdesign_cli.information import Experiment, FiniteRecord
@@ -90,7 +91,8 @@ class Foresight:
     def tried(self, record: Array, requirements: Sequence[Requirement], runs: int) -> dict[str, int]:
         """Of some records how many end `elsewhere`, and how many leave such `rivals`; empty if untold."""
         counts = {"runs": runs, "elsewhere": 0, "rivals": 0}
-        for rng in np.random.default_rng(_SEED).spawn(runs):
+        for done, rng in enumerate(np.random.default_rng(_SEED).spawn(runs)):
+            tell(Counted("records searched from several starts", done, runs))
             try:
                 estimate, at_home = self._searched(record, rng)
                 found = self._beyond(record, estimate, requirements)

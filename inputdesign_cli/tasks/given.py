@@ -26,7 +26,14 @@ from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.foresight import Foresight
-from inputdesign_cli.tasks.record import RecordRequest, given_record, least_period, record_notes, worst_ratio
+from inputdesign_cli.tasks.record import (
+    RecordRequest,
+    as_long,
+    given_record,
+    least_period,
+    record_notes,
+    worst_ratio,
+)
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
@@ -34,6 +41,7 @@ from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limit
 from inputdesign_cli.tasks.result.nyquist import nyquist_curves
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
+from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates, Simulator
 from inputdesign_cli.tasks.simulation import Delivered, Simulation, simulate
 from inputdesign_cli.tasks.unknown_start import start_notes
 
@@ -106,6 +114,7 @@ class GivenTask:
     cost: dict[PowerKind, Weight]
     alpha: float
     calibration: Calibration | None
+    simulator: Simulator | None
     limits: StatedLimits
     record: RecordRequest
     ellipses: Pairs | None
@@ -137,7 +146,8 @@ class GivenTask:
         information = excitation.information(experiment)
         _check_excites(experiment, information)
         requirements = [make(experiment) for make in self.requirements]
-        confidence = Confidence.of(self.calibration, requirements, information, self.alpha)
+        simulated = self._simulated(experiment)
+        confidence = Confidence.of(self.calibration, requirements, information, self.alpha, simulated)
         requirements = with_alpha(requirements, confidence.alpha)
         cost = weighted_sum(self.cost, excitation.power)
         level = cost / weighted_sum(self.cost, GivenExcitation.even(raw, 1.0).power)
@@ -178,7 +188,7 @@ class GivenTask:
             files = other_files(self.record, units, record)
         signal = result.get("signal", {})
         notes = broken_limits(self.limits, experiment.samples, excitation.power, signal)
-        notes += record_notes(self.record, experiment.samples, record) if record is None else []
+        notes += record_notes(self.record, experiment.samples, record, {}) if record is None else []
         if record is not None and np.isfinite(record.worst_ratio):
             notes += start_notes(experiment, record.samples, self.record.step, requirements)
         if record is not None and self.foresight is not None:
@@ -240,6 +250,16 @@ class GivenTask:
             return self._in_phase(*excitation.sinusoids, experiment, ratio)
         spectrum = DesignedSpectrum.of(basis, x, inputs=experiment.inputs, step=request.step)
         return given_record(request, experiment, spectrum, ratio)
+
+    def _simulated(self, experiment: Experiment) -> SimulatedEstimates | None:
+        """Estimates of such experiments, for an exact confidence."""
+        if self.simulator is None:
+            return None
+        if self.excitation.samples is not None:
+            return self.simulator.of_record(self.excitation.samples)
+        samples = as_long(self.record, experiment)
+        renewed = None if samples is None else self._renewed(samples)
+        return None if samples is None or renewed is None else self.simulator.of(renewed, samples)
 
     def _renewed(self, samples: int) -> Excitation | None:
         """What realises the spectrum anew; None for a record that was given."""

@@ -29,6 +29,7 @@ from inputdesign_cli.tasks.result.estimates import (
 )
 from inputdesign_cli.tasks.result.refutations import differences, repetitions
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_notes
+from inputdesign_cli.tasks.result.spikes import spike_notes
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,8 @@ def identification_results(task: Identification, found: Identified, started: flo
     elif found.preparation.levels:
         result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
-    notes = identification_notes(found.data.notes, found.model, estimate)
+    notes = spike_notes(header.units, estimate, found.data)
+    notes += identification_notes(found.data.notes, found.model, estimate)
     notes += differences(estimate, [name for name, _ in found.data.files])
     notes += repetitions(estimate, found.data.files)
     notes += prior_notes(estimate, stated=task.has_prior)

@@ -110,6 +110,14 @@ def _check_simulated(nominal: LoopErrorProblem, true: LoopErrorProblem) -> None:
             hint="run idesign solve, which computes what theory expects",
             key=f"{KEY}.control.minimum_variance",
         )
+    if nominal.estimated is not None:
+        raise bad_spec(
+            "not-supported",
+            "this version identifies by least squares, which estimates every coefficient of a plant in q^-1: "
+            "neither named parameters nor those of a plant in s, and none is known",
+            hint="run idesign solve, which computes what theory expects; or write A and B as numbers",
+            key="plant",
+        )
     if not is_arx(true.plant):
         raise bad_spec(
             "not-supported",

@@ -14,6 +14,7 @@ from inputdesign_cli.design.convex.cost import Weight, weights_of
 from inputdesign_cli.design.convex.demands import FEW
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.information import Experiment, FiniteRecord, FiniteRecords, PowerKind
+from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
@@ -26,6 +27,7 @@ from inputdesign_cli.signal import (
     Target,
     best_record,
     limited_responses,
+    peak_share,
 )
 from inputdesign_cli.signal.evaluation import MET
 
@@ -177,7 +179,7 @@ def make_record(
         left = [n for n in range(len(plants)) if n not in numbers]
         others = {n: FiniteRecord(plants[n], samples, request.step) for n in left}
         ratios = {n: _ratio_at(others[n], scores[n], record) for n in left}
-        shares = {n: _power_share(others[n], upper, record) for n in left}
+        shares = {n: _share(others[n], bounds, record) for n in left}
         missed = [n for n in left if ratios[n] > least]
         beyond = [n for n in left if shares[n] > MET]
         if not (missed or beyond):
@@ -201,30 +203,36 @@ def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Reco
         return np.inf
 
 
-def _power_share(
-    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
-) -> float:
-    """The largest share of a limit on powers that a record uses at one plant, where the plant takes part."""
+def _share(plant: FiniteRecord, bounds: Bounds, record: Record) -> float:
+    """The largest share of a limit that a record uses at one plant, where the plant takes part."""
     powers = {
         kind: plant.mean_squares(kind, record.samples)
-        for kind, _, _ in limits
+        for kind, _, _ in bounds.powers
         if plant.experiment.depends_on_plant(kind)
     }
     used = (
         float(powers[kind].sum() if channel is None else powers[kind][channel]) / most
-        for kind, channel, most in limits
+        for kind, channel, most in bounds.powers
         if kind in powers
     )
-    return max(used, default=0.0)
+    return max([peak_share(plant, bounds, record.samples), *used])
 
 
-def redrawn(request: RecordRequest, design: Design, record: Record) -> SignalGenerator:
-    """What generates other records of the designed spectrum, as long, phases of sinusoids uniformly."""
-    settings = request.settings
+def as_long(request: RecordRequest, experiment: Experiment) -> int | None:
+    """Samples of records as long as the experiment, in whole periods; None where none are computed."""
+    whole = replace(request, samples=None)
+    inputs, samples = experiment.inputs, experiment.samples
+    return whole.length(samples) if whole.feasible(samples, least_period(inputs)) else None
+
+
+def redrawn(request: RecordRequest, design: Design, inputs: int, samples: int) -> Redrawn:
+    """Other records of the designed spectrum, of so many samples, phases of sinusoids uniformly."""
+    settings, found = request.settings, design.result
     if settings.phases != "random":
         settings = replace(settings, phases="orthogonal")
-    samples, inputs = record.samples.shape
-    return SignalGenerator(designed_spectrum(request, design, inputs), settings, samples, request.band)
+    spectrum = designed_spectrum(request, design, inputs)
+    generator = SignalGenerator(spectrum, settings, samples, request.band)
+    return Redrawn("design", generator, found.basis, found.x)
 
 
 def given_record(
@@ -267,13 +275,20 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
         eigenvalues = np.linalg.eigvalsh(information)
         if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
             raise np.linalg.LinAlgError
-        return max((v.ratio for r in requirements for v in r.violations(information)), default=0.0)
+        return max((r.worst(information).ratio for r in requirements), default=0.0)
 
     return ratio
 
 
-def record_notes(request: RecordRequest, experiment: int, record: Record | None) -> list[str]:
-    """What a user should know before applying the record; the experiment has so many samples."""
+def record_notes(
+    request: RecordRequest, experiment: int, record: Record | None, of_limits: Mapping[str, float]
+) -> list[str]:
+    """What a user should know before applying the record.
+
+    Args:
+        experiment: its samples.
+        of_limits: the share of each limit on single samples that the record takes.
+    """
     if record is None:
         too_long = request.length(experiment) > request.longest
         return [_NO_RECORD.format(request.length(experiment), request.longest)] if too_long else []
@@ -297,9 +312,11 @@ def record_notes(request: RecordRequest, experiment: int, record: Record | None)
         )
     asked = request.samples or experiment
     if record.method != "given" and len(record.samples) > asked + request.settings.block:
+        nearest = max(of_limits, key=lambda name: of_limits[name], default=None)
+        share = f"; the record takes {100 * of_limits[nearest]:.3g} % of limits.{nearest}" if nearest else ""
         notes.append(
             f"within the limits on single samples {len(record.samples)} samples are the shortest record that "
-            f"was found, by trying, to one per cent; the spectrum alone would take {asked}"
+            f"was found, by trying, to one per cent; the spectrum alone would take {asked}{share}"
         )
     return notes
 

@@ -31,7 +31,12 @@ _TOLERANCE = 1e-5
 _LENGTHS, _LONGER, _TRIED, _ROUGH, _ANY = 3, 1.03, 20_000, 1e-4, 0.5
 # Spectra are compared on so many frequencies, by the share of their power that lies elsewhere.
 _LINES, _SAME_SHAPE = 256, 0.01
-_WORDS = {"filtered_noise": "noise", "multisine": "a multisine", "binary": "a binary signal"}
+_WORDS = {
+    "filtered_noise": "noise",
+    "multisine": "a multisine",
+    "binary": "a binary signal",
+    "slewed": "a signal of ramps between two levels",
+}
 
 
 def fitting_record(request: RecordRequest, question: Question, design: Design, samples: int) -> Made:

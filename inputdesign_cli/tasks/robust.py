@@ -5,7 +5,7 @@ All that is said of plants that were not drawn is said under the distribution of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,7 +84,8 @@ class Plants:
         r_adm: as the spec has it.
         paid: see `Problem`.
         discard: how many of the plants the design may leave out.
-        afresh: draws others from the same distribution; None where the plants were listed one by one.
+        afresh: draws others from the same distribution, a few at a time; None where plants were listed.
+        fresh: how many of these were asked for.
         unknowns: of the program, None where they have no number.
         region: where the design is to serve the worst plant that is found, too; `searched` what was found.
     """
@@ -95,7 +96,8 @@ class Plants:
     r_adm: str
     paid: Paid
     discard: int = 0
-    afresh: Callable[[], Batch] | None = None
+    afresh: Callable[[], Iterator[Batch]] | None = None
+    fresh: int = 0
     unknowns: int | None = None
     region: Region | None = None
     searched: Searched | None = None
@@ -161,14 +163,20 @@ def _admitted(problem: Problem, design: Design, *, side: bool) -> float:
     return float(np.sqrt(design.result.objective)) if problem.goal == "factor" and not side else 1.0
 
 
-def tried_on(design: Design, samples: int, batch: Batch) -> list[Kept]:
-    """The same for plants that the design was not made for."""
+def tried_on(design: Design, samples: int, batch: Batch, *, above: float = 0.0) -> list[Kept]:
+    """The same for plants that the design was not made for.
+
+    Args:
+        above: a share up to this one is told as 0, since no peak as low is searched to the last digit.
+    """
     at = design.problem.on(design.result.basis)
     power = max(at.power("excitation").at(design.result.x), np.finfo(float).tiny)
-    return [_tried(design, at.basis, power, samples, plant) for plant in batch.plants]
+    return [_tried(design, at.basis, power, samples, plant, above) for plant in batch.plants]
 
 
-def _tried(design: Design, basis: Basis, power: float, samples: int, plant: Alternative) -> Kept:
+def _tried(
+    design: Design, basis: Basis, power: float, samples: int, plant: Alternative, above: float
+) -> Kept:
     seconds_left()
     try:
         of_length = replace(plant.experiment, samples=samples)
@@ -187,7 +195,7 @@ def _tried(design: Design, basis: Basis, power: float, samples: int, plant: Alte
         worst = Kept(0.0)
         for side in (False, True):
             admitted = _admitted(design.problem, design, side=side)
-            for _, violation in alone.demands.violations(informations, side=side):
+            for _, violation in alone.demands.violations(informations, above=above * admitted, side=side):
                 if violation.ratio / admitted > worst.share:
                     worst = Kept(violation.ratio / admitted, violation.frequency)
         if design.problem.paid == "worst" and design.problem.goal == "cost":

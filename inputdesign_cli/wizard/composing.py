@@ -8,7 +8,7 @@ from pathlib import Path
 
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
-from inputdesign_cli.wizard.phrases import seconds, short
+from inputdesign_cli.wizard.phrases import seconds, short, without_huge_numbers
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import bad_answer, complete
 from inputdesign_cli.wizard.wishes import wished
@@ -57,21 +57,35 @@ class Draft:
         """
         return parse_spec(self.text, "<wizard>", folder=self.folder)
 
+    def validate(self) -> None:
+        """Write the files that stand beside the spec, and try whether it is well posed.
 
-def compose(answers: Mapping[str, str], stem: str, folder: Path) -> Draft:
+        Raises:
+            IdesignError: as `tasks.validate` does, or a file cannot be written.
+        """
+        from inputdesign_cli import tasks
+        from inputdesign_cli.runs.run_directory import write_bytes
+
+        for name, content in self.files.items():
+            write_bytes(self.folder / name, content)
+        tasks.validate(self.spec())
+
+
+def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAnswer | None = None) -> Draft:
     """The spec of the answers.
 
     Args:
         stem: of the name of the spec.
         folder: where it is to stand, and what names of files are relative to.
+        plant: what is known of it, where that was understood before.
 
     Raises:
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    said = complete(answers)
+    said = {key: without_huge_numbers(text, key) for key, text in complete(answers).items()}
     span, there = input_range(said["range"]), seconds(said["time"], "time")
-    plant = understand_plant(said["plant"], stem, folder)
+    plant = plant or understand_plant(said["plant"], stem, folder)
     step = plant.sample_time
     if there < _LEAST * step:
         raise bad_answer("time", f"{short(there)} s are less than {_LEAST} samples of {short(step)} s")

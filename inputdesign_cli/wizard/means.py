@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.wizard.phrases import after, needed, short
+from inputdesign_cli.wizard.phrases import NUMBER, after, needed, number, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 from inputdesign_cli.wizard.wishes import pid
 
-_PLAIN = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
 _WHITE = 3.0  # correlations above so many deviations of chance colour the noise
 
@@ -32,18 +31,16 @@ def input_range(text: str) -> Range:
     Raises:
         SpecError: `bad-answer`.
     """
-    ends = re.fullmatch(rf"(?:from\s*)?({_PLAIN})\s*(?:to|\.\.)\s*({_PLAIN})\s*\S{{0,3}}", text.strip(), re.I)
+    ends = re.fullmatch(rf"(?:from\s*)?{NUMBER}\s*(?:to|\.\.)\s*{NUMBER}\s*\S{{0,3}}", text.strip(), re.I)
     if ends is not None:
         low, high = float(ends.group(1)), float(ends.group(2))
         if not low < high:
             raise bad_answer("range", f"{low:g} is not below {high:g}")
         return Range(0.5 * (high - low), 0.5 * (low + high))
-    sides = re.search(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*({_PLAIN})", text, re.I)
-    if sides is None:
+    side = number(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*{NUMBER}", text)
+    if side is None:
         raise bad_answer("range", f'"{text}" is no range')
-    return Range(
-        needed(float(sides.group(1)), "range", "the amplitude"), after(text, "around|about|at") or 0.0
-    )
+    return Range(needed(side, "range", "the amplitude"), after(text, "around|about|at") or 0.0)
 
 
 def limit_lines(span: Range, text: str, duration: float, step: float) -> list[str]:

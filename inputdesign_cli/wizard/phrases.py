@@ -6,20 +6,38 @@ import re
 
 from inputdesign_cli.wizard.questions import bad_answer
 
-_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_LARGEST = 1e100
+NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _SECONDS = {"ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
             "hour": 3600.0, "hours": 3600.0, "d": 86400.0}  # fmt: skip
 
 
+def without_huge_numbers(text: str, key: str) -> str:
+    """The text; what nobody means would overflow where it is squared.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    for found in re.findall(rf"(?<![\w.]){NUMBER}", text):
+        if abs(float(found)) > _LARGEST:
+            raise bad_answer(key, f"{found} is beyond {_LARGEST:g}")
+    return text
+
+
+def number(pattern: str, text: str) -> float | None:
+    """What the first group of a pattern holds; None without a match."""
+    found = re.search(pattern, text, re.I)
+    return None if found is None else float(found.group(1))
+
+
 def after(text: str, words: str) -> float | None:
     """The number behind the words (a pattern), a few others such as "of" or "about" in between."""
-    found = re.search(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is|ca\.?|up to)\s*)?{_NUMBER}", text, re.I)
-    return None if found is None else float(found.group(1))
+    return number(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is|ca\.?|up to)\s*)?{NUMBER}", text)
 
 
 def seconds_after(text: str, words: str, key: str) -> float | None:
     """The time behind the words in seconds, which are its unit where it has none."""
-    found = re.search(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is)\s*)?{_NUMBER}\s*([a-z]*)", text, re.I)
+    found = re.search(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is)\s*)?{NUMBER}\s*([a-z]*)", text, re.I)
     return None if found is None else float(found.group(1)) * _unit(found.group(2), key)
 
 
@@ -29,7 +47,7 @@ def seconds(text: str, key: str) -> float:
     Raises:
         SpecError: `bad-answer`.
     """
-    found = re.fullmatch(rf"(?:about\s*)?{_NUMBER}\s*([a-z]*)", text.strip(), re.I)
+    found = re.fullmatch(rf"(?:about\s*)?{NUMBER}\s*([a-z]*)", text.strip(), re.I)
     if found is None or float(found.group(1)) <= 0.0:
         raise bad_answer(key, f'"{text}" is no time')
     return float(found.group(1)) * _unit(found.group(2), key)
@@ -37,8 +55,8 @@ def seconds(text: str, key: str) -> float:
 
 def share(text: str) -> float | None:
     """The per cent of "within 30 %" as a fraction."""
-    found = re.search(rf"{_NUMBER}\s*(?:%|per ?cent)", text, re.I)
-    return None if found is None else float(found.group(1)) / 100.0
+    found = number(rf"{NUMBER}\s*(?:%|per ?cent)", text)
+    return None if found is None else found / 100.0
 
 
 def needed(value: float | None, key: str, what: str) -> float:

@@ -17,6 +17,7 @@ from inputdesign_cli.wizard.phrases import after, needed, seconds_after, share, 
 from inputdesign_cli.wizard.questions import bad_answer
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
+_LEAST_ROWS = 10  # of a step response
 
 
 @dataclass(frozen=True)
@@ -165,13 +166,21 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
 
     found = read_columns(path, {"time": "time", "u": "u", "y": "y"}, key="plant")
     t, u, y = found["time"], found["u"], found["y"]
+    if t.size < _LEAST_ROWS or not np.all(np.diff(t) > 0.0):
+        raise bad_answer("plant", f"{path.name} needs {_LEAST_ROWS} rows at least, at times that grow")
     step, moved = float(np.median(np.diff(t))), u - u[0]
     begun = int(np.argmax(np.abs(moved) > 0.5 * np.max(np.abs(moved))))
     if not np.any(moved) or begun + 5 >= t.size:
         raise bad_answer("plant", f"the input in {path.name} does not step")
-    rise = (y - y[0]) / (np.mean(y[-max(t.size // 20, 1) :]) - y[0])
+    last = slice(-max(t.size // 20, 1), None)
+    moves, answers = float(np.mean(moved[last])), float(np.mean(y[last]) - y[0])
+    if abs(moves) < 0.5 * np.max(np.abs(moved)):
+        raise bad_answer("plant", f"the input in {path.name} does not stay where it has stepped to")
+    if not answers:
+        raise bad_answer("plant", f"the output in {path.name} does not answer the step")
+    rise = (y - y[0]) / answers
     slow = max(float(t[int(np.argmax(rise > 0.632))] - t[begun]), step)
-    gain = float((np.mean(y[-max(t.size // 20, 1) :]) - y[0]) / moved[-1])
+    gain = answers / moves
     late = max(float(t[int(np.argmax(rise > 0.05))] - t[begun]), step)
     structure = parse_spec(
         f"sample_time: {step!r}\nplant: {{continuous: {{gain: {gain!r}, time_constant: {slow!r}, "
@@ -218,10 +227,12 @@ def _of_control(path: Path) -> PlantAnswer:
         data = json.loads(read_regular(path))
         num, den = ([float(c) for c in data[key]] for key in ("num", "den"))
         late = float(data.get("delay", 0.0))
+        if not np.all(np.isfinite([*num, *den, late])):
+            raise ValueError("a number is not finite")
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"{path} does not hold num and den: {error}"
         raise DataError.because(
-            "bad-answer", message, 'write {"num": [2], "den": [180, 1], "delay": 25}'
+            "bad-answer", message, 'write {"num": [2], "den": [180, 1], "delay": 25}', key="plant"
         ) from None
     poles = np.roots(den)
     decays = -poles.real[poles.real < 0]

@@ -74,7 +74,7 @@ def question(key: str) -> Question:
 def bad_answer(key: str, why: str) -> SpecError:
     """The error that names the question and tells what is allowed."""
     asked = question(key)
-    return SpecError.because("bad-answer", f"{asked.asks} ({key}): {why}", f"allowed: {asked.allowed}")
+    return SpecError.because("bad-answer", f"{asked.asks} ({key}): {why}", f"allowed: {asked.allowed}", key)
 
 
 def read_answers(file: Path | None, given: Sequence[str] = ()) -> dict[str, str]:
@@ -122,4 +122,7 @@ def complete(answers: Mapping[str, str]) -> dict[str, str]:
 
 
 def _plain(value: object) -> str:
-    return {True: "yes", False: "no", None: ""}[value] if value in (True, False, None) else str(value)
+    """A value of YAML as it would be typed; 1 and 0 are numbers."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "" if value is None else str(value)

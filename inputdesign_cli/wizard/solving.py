@@ -93,7 +93,7 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
     return None
 
 
-def to_log(spec: Spec, answer: str, file: str) -> list[str]:
+def to_log(spec: Spec, file: str) -> list[str]:
     """What to record, and how it is judged."""
     offset = spec.signal.offset or 0.0
     middle = f"u1={offset:g}" if isinstance(offset, float | int) else ""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 
-from inputdesign_cli.wizard.phrases import after, needed, seconds_after, share, short
+from inputdesign_cli.wizard.phrases import NUMBER, after, needed, number, seconds_after, share, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 
 _NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations
 _LINES = 20
+_ALONE = r"(?<![\w.])"  # the number that follows is no part of another
 
 
 def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> list[str]:
@@ -80,12 +81,11 @@ def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
 
 
 def _margin(text: str) -> str:
-    found = re.search(r"([\d.]+)\s*dB", text, re.I)
-    if found is not None:
-        return f"max_sensitivity_db: {short(needed(float(found.group(1)), 'wish', 'the margin in dB'))}"
-    found = re.search(r"([\d.]+)\s*(?:degrees|deg|°)", text, re.I)
-    if found is not None:
-        degrees = float(found.group(1))
+    peak = number(rf"{_ALONE}{NUMBER}\s*dB", text)
+    if peak is not None:
+        return f"max_sensitivity_db: {short(needed(peak, 'wish', 'the margin in dB'))}"
+    degrees = number(rf"{_ALONE}{NUMBER}\s*(?:degrees|deg|°)", text)
+    if degrees is not None:
         if not 0.0 < degrees < 60.0:
             raise bad_answer("wish", "a phase margin is between 0 and 60 degrees here")
         return f"phase_margin: {short(degrees)}"

@@ -1,17 +1,22 @@
 """Calibrated confidence: closed forms, plain Monte Carlo, properties; the designs that use it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import scipy.optimize
+import scipy.signal
 import scipy.stats
 from typer.testing import CliRunner
 
-from inputdesign_cli import analyse, parse_spec, simulate, solve
+from inputdesign_cli import analyse, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.accuracy.calibration import Calibration
 from inputdesign_cli.cli import app
 from inputdesign_cli.errors import InaccurateError, InfeasibleError, SpecError
 from inputdesign_cli.tasks.build.task import build_task
 from inputdesign_cli.tasks.confidence import settled_alpha
 
+SPECS = Path(__file__).parents[2] / "specs"
 FIR = """
 plant: {B: [1.0, -0.4, 0.2]}
 noise: {variance: 1}
@@ -21,10 +26,11 @@ spectrum: {type: fir, order: 4}
 """
 
 
-FEW = "{exact: 0.95, draws: 1000}"
+FEW = "{exact: 0.95, draws: 1000, runs: 0}"
+ASYMPTOTIC = "{exact: 0.95, runs: 0}"
 
 
-def spec(text, confidence="{exact: 0.95}", *overrides):
+def spec(text, confidence=ASYMPTOTIC, *overrides):
     return parse_spec(text.replace("CONFIDENCE", confidence), file="spec.yaml", overrides=list(overrides))
 
 
@@ -104,6 +110,8 @@ def test_it_says_when_there_is_none():
     [
         ("{exact: 1.2}", "out-of-range"),
         ("{exact: 0.99, draws: 100}", "out-of-range"),
+        ("{exact: 0.99, runs: 100}", "out-of-range"),
+        ("{exact: 0.99, runs: -1}", "out-of-range"),
         ("{exact: 0.9, draws: 1.0e9}", "too-large"),
         ("{draws: 10}", "missing-key"),
         ("{exact: 0.9, ellipsoid: 0.9}", "conflicting-keys"),
@@ -122,18 +130,109 @@ def test_an_ellipsoid_has_no_exact_confidence(tmp_path):
     assert "remove region" in done.stderr
 
 
-@pytest.mark.slow
-def test_runs_keep_the_bound_with_the_probability():
-    text = """
-plant: {A: [1, -1.5, 0.7], B: [0, 1, 0.5]}
-noise: {C: [1, -1, 0.2], variance: 1}
-experiment: {samples: 500}
-accuracy: {model_error: {relative: 0.1, band: [0.01, 1.5], confidence: CONFIDENCE}}
-spectrum: {type: fir, order: 20}
-simulation: {runs: 2000, seed: 3}
+GAIN = """
+plant: {B: [1.0]}
+noise: {variance: 1}
+experiment: {samples: 200}
+accuracy: {model_error: {absolute: 0.1, confidence: CONFIDENCE}}
+signal: {type: binary}
 """
-    study = simulate(spec(text)).result["simulation"]["inputs"]["design"]
-    assert study["within_r_adm"] == pytest.approx(0.95, abs=0.015)
+POLE = """
+plant: {B: [0, 1], F: [1, -0.9]}
+noise: {variance: 1}
+experiment: {samples: 60}
+accuracy: {model_error: {relative: 0.3, band: [0.01, 1], confidence: CONFIDENCE}}
+spectrum: {type: white}
+"""
+
+
+def test_estimates_that_are_normal_at_every_length_need_no_correction():
+    """A gain and a signal of two levels: least squares is normal with variance 1 / (N p) whatever N."""
+    told = solve(spec(GAIN, "{exact: 0.95, draws: 1000, runs: 1000}", "spectrum={type: white}")).result
+    error = told["model_error"]
+    assert error["confidence"]["excess"] == pytest.approx(1.0, abs=0.13)  # 3 standard errors
+    assert error["alpha"] == pytest.approx(scipy.stats.norm.ppf(0.975), rel=0.1)
+    assert error["confidence"]["kept"] == pytest.approx(0.95, abs=0.025)
+
+
+def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
+    """The records are simulated and fitted plainly here: a pole, by least squares of the simulation error."""
+    runs = "{exact: 0.9, draws: 1000, runs: 1000}"
+    found = solve(spec(POLE, runs)).result
+    power = found["power"]["excitation"][0]
+    told = found["model_error"]["confidence"]
+    assert told["kept"] == pytest.approx(0.9, abs=0.04)
+    rng, w, kept = np.random.default_rng(5), np.linspace(0.01, 1, 60), []
+
+    def response(b, f, u):
+        return scipy.signal.lfilter([0.0, b], [1.0, f], u)
+
+    def plant(b, f):
+        return b * np.exp(-1j * w) / (1 + f * np.exp(-1j * w))
+
+    for _ in range(300):
+        u = rng.standard_normal(60)
+        u *= np.sqrt(power / np.mean(u**2))
+        y = response(1.0, -0.9, u) + rng.standard_normal(60)
+        fit = scipy.optimize.least_squares(lambda p, u=u, y=y: y - response(*p, u), [1.0, -0.9])
+        kept.append(np.all(abs(plant(*fit.x) - plant(1.0, -0.9)) <= 0.3 * abs(plant(1.0, -0.9))))
+    assert np.mean(kept) == pytest.approx(0.9, abs=0.055)  # 3 standard errors of 300 runs
+    plain = solve(spec(POLE, "{exact: 0.9, draws: 1000, runs: 0}")).result
+    share = told["excess"]
+    assert share == pytest.approx(found["model_error"]["alpha"] / plain["model_error"]["alpha"], rel=0.15)
+
+
+def test_an_analysis_calibrates_as_the_design_does():
+    runs = "{exact: 0.9, draws: 1000, runs: 500}"
+    design = solve(spec(POLE, runs)).result
+    power = design["power"]["excitation"][0]
+    found = analyse(spec(POLE, runs, f"spectrum={{given: {{type: white, power: {power!r}}}}}")).result
+    assert found["model_error"]["alpha"] == pytest.approx(design["model_error"]["alpha"], rel=0.12)  # 2 s.e.
+    assert found["model_error"]["confidence"]["runs"] == 500
+
+
+def test_experiments_without_estimates_keep_no_confidence():
+    """A share of estimates that are missing, smaller and larger than that which may leave r_adm."""
+    calibration = Calibration(0.9, 1000)
+    errors, M = errors_of(FIR), np.diag([900.0, 800.0, 500.0])
+    lost = np.full((100, 3), np.nan)
+    lost[:80] = errors[0].experiment.model.theta
+    assert calibration.corrected(errors, M, lost).excess == np.inf
+    lost[80:95] = errors[0].experiment.model.theta + 1.0
+    assert np.isfinite(calibration.corrected(errors, M, lost).excess)
+
+
+PLANTS = {
+    "first order": ("{B: [0, 3.6], F: [1, -0.7]}\nnoise: {C: [1, -0.9], variance: 1.0}", "relative: 0.01"),
+    "resonance": (
+        "{B: [0, 1, 0.5], F: [1, -1.601, 0.9409]}\nnoise: {variance: 1.0}",
+        "relative: 0.1, band: [0.01, 1.5]",
+    ),
+    "armax": (
+        "{A: [1, -1.5, 0.7], B: [0, 1, 0.5]}\nnoise: {C: [1, -1, 0.2], variance: 1.0}",
+        "relative: 0.1, band: [0.01, 1.5]",
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*PLANTS, "flexible transmission"])
+def test_runs_keep_the_bound_with_the_probability(name):
+    study = {"simulation.runs": 1000, "simulation.seed": 3}
+    if name in PLANTS:
+        plant, error = PLANTS[name]
+        asked = parse_spec(
+            f"plant: {plant}\naccuracy: {{model_error: {{{error}, confidence: {{exact: 0.95}}}}}}\n"
+            "experiment: {samples: 500}\nspectrum: {type: fir, order: 20}\n"
+        )
+    else:
+        asked = load_spec(SPECS / "flexible_transmission.yaml").with_(
+            **{"accuracy.model_error.alpha": None, "accuracy.model_error.confidence": {"exact": 0.95}}
+        )
+        study["simulation.plant"] = None  # as the design takes it
+        study["simulation.noise"] = None
+    kept = simulate(asked.with_(**study)).result["simulation"]["inputs"]["design"]["within_r_adm"]
+    assert kept == pytest.approx(0.95, abs=0.015)
 
 
 def test_a_limit_that_leaves_just_enough_is_no_conflict():

@@ -1,7 +1,15 @@
-"""`idesign wizard` without a terminal."""
+"""`idesign wizard`, without a terminal and in one."""
 
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import time
 from itertools import pairwise
 
+import pytest
 import yaml
 
 ANSWERS = [
@@ -11,6 +19,84 @@ ANSWERS = [
     "time=20 min",
     "noise=resolution 0.1",
 ]
+
+
+# What somebody types, by a part of the question: bad answers first. Control-U takes the default away.
+TYPED = [
+    ("know of the plant", "a kettle"),
+    ("know of the plant", "gain 2, time constant 180 s, dead time 25 s"),
+    ("model for", "PI loop"),
+    ("model for", "own loop with 6 dB, Kp 1.5, Ti 180"),
+    ("input move?", "plus/minus 5 around 40"),
+    ("How much time", "\x15soon"),
+    ("How much time", "\x1520 min"),
+    ("how far the output", ""),
+    ("noise of the output", ""),
+    ("noise of the output", "resolution 0.1"),
+    ("drift by itself", ""),
+    ("open loop, or under", "\x15open"),
+    ("hardware apply", ""),
+    ("quantised", ""),
+    ("Design the experiment now", "n"),
+]
+
+
+class Terminal:
+    """A command in a pseudo-terminal, and what it has shown there."""
+
+    def __init__(self, folder, *command):
+        ours, theirs = pty.openpty()
+        ends = {"stdin": theirs, "stdout": theirs, "stderr": theirs}
+        self.process = subprocess.Popen(command, cwd=folder, env={**os.environ, "TERM": "xterm"}, **ends)
+        os.close(theirs)
+        self.end, self.shown, self.seen = ours, "", 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.wait()
+        os.close(self.end)
+
+    def wait_for(self, part, patience=60.0):
+        """Read until the part is shown, behind what was waited for before."""
+        latest = time.monotonic() + patience
+        while part not in self.shown[self.seen :]:
+            assert select.select([self.end], [], [], latest - time.monotonic())[0], f"{part}: {self.shown}"
+            try:
+                text = os.read(self.end, 65536).decode(errors="replace")
+            except OSError:  # the other end is closed
+                text = ""
+            assert text, f"{part}: {self.shown}"
+            self.shown += re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text)
+            if "\x1b[6n" in text:  # where is the cursor?
+                self.type("\x1b[1;1R")
+        self.seen = self.shown.index(part, self.seen) + len(part)
+
+    def type(self, text):
+        os.write(self.end, text.encode())
+
+
+def test_in_a_terminal_a_bad_answer_is_asked_again(tmp_path):
+    with Terminal(tmp_path, sys.executable, "-m", "inputdesign_cli", "wizard") as terminal:
+        for part, text in TYPED:
+            terminal.wait_for(part)
+            terminal.type(f"{text}\r")
+        assert terminal.process.wait(60) == 0
+    assert terminal.shown.count("error[bad-answer]") == 4
+    written = yaml.safe_load((tmp_path / "experiment.yaml").read_text())
+    assert (written["limits"]["duration"], written["signal"]["offset"]) == (1200, 40)
+
+
+@pytest.mark.parametrize("key", ["\x03", "\x04"])
+def test_control_c_and_d_end_the_questions(key, tmp_path):
+    with Terminal(tmp_path, sys.executable, "-m", "inputdesign_cli", "wizard") as terminal:
+        terminal.wait_for("know of the plant?")
+        terminal.type(key)
+        terminal.wait_for("interrupted")
+        assert terminal.process.wait(60) == 130
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_a_terminal_it_says_what_is_needed(run, tmp_path):

@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 from inputdesign_cli import from_control
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.specification.transfer_of_states import transfer_functions
+from inputdesign_cli.specification import transfer_of_states
 
 RATES = st.lists(st.floats(0.05, 20.0), min_size=1, max_size=5)
 
@@ -16,6 +16,11 @@ def modes(rates, gains):
     """Modes beside each other: the response is the sum of gain / (s + rate)."""
     n = len(rates)
     return -np.diag(rates), np.ones((n, 1)), np.array([gains]), np.zeros((1, 1))
+
+
+def transfer_functions(system):
+    matrices = (system.A, system.B, system.C, system.D)
+    return transfer_of_states.transfer_functions(*matrices, discrete=system.isdtime(strict=True))
 
 
 def response(entry, points):

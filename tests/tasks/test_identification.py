@@ -49,6 +49,29 @@ def test_data_that_suffice_meet_the_target(data):
     assert assessment.results.result["status"] == "met"
 
 
+@pytest.mark.parametrize("size", [3.0, 1e6])
+def test_spikes_leave_the_verdict_open_until_they_are_taken_out(size, write):
+    """Once they are, the estimate is one of the true plant."""
+    spec = parse_spec(
+        "plant: {B: [0, 0.5], F: [1, -0.7]}\nnoise: {variance: 0.01}\nexperiment: {samples: 500}\n"
+        "accuracy: {model_error: {relative: 0.1}}\n"
+    )
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(500)
+    y = scipy.signal.lfilter([0, 0.5], [1, -0.7], u) + 0.1 * rng.standard_normal(500)
+    y[[100, 301, 400]] += [size, -size, 1.5 * size]
+    spiked = assess(spec, write({"u1": u, "y1": y}))
+    assert spiked.verdict == "undecided"
+    reason = spiked.results.result["assessment"]["undecided"][0]
+    assert all(f"{at} s" in reason for at in (100, 301, 400))
+    y[[100, 301, 400]] = np.nan
+    mended = assess(spec, write({"u1": u, "y1": y}))
+    assert mended.verdict == "met"
+    found = mended.results.result["identification"]
+    for name, true in {"b1": 0.5, "f1": -0.7}.items():
+        assert abs(found["theta"][name] - true) < 4 * found["standard_deviation"][name]
+
+
 def test_a_top_up_makes_up_for_what_is_missing(write):
     u = 0.3 * np.random.default_rng(2).standard_normal(500)
     columns = record(u)

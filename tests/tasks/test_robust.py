@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from inputdesign_cli import load_spec, parse_spec, solve
+from inputdesign_cli.compute.time_limit import stoppable
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.question import Alternative
 from inputdesign_cli.figures.plots import draw_all
@@ -15,6 +16,7 @@ from inputdesign_cli.report.facts import facts
 from inputdesign_cli.report.question import read_question
 from inputdesign_cli.report.sources import assumptions, citations
 from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.robust import Batch, tried_on
 from tests.support.robust_specs import COVARIANCE, FIRST, LOOP, TWO, complaint, solved
 
@@ -210,3 +212,49 @@ def test_limits_on_powers_bind_the_record_at_every_plant():
     assert max(found)[0] < 4.0
     assert all(slow <= 5.0 * (1 + 1e-9) for _, slow in found)
     assert max(slow for _, slow in found) > 4.99  # the limit is what holds it back
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_limits_on_single_samples_bind_the_record_at_every_plant(loop):
+    """Of the output, and in a loop of the input: plain filters of plant and controller simulate both."""
+    controller = "experiment={samples: 500, controller: {numerator: [0.1], denominator: [1]}}"
+    plants, gain = [(3.6, -0.7), (3.6, -0.9), (5.0, -0.8)], 0.1 if loop else 0.0
+    scenarios = "uncertainty={scenarios: [{f1: -0.9}, {b1: 5.0, f1: -0.8}]}"
+    limits = "limits={amplitude: {input: 0.5, output: 9}}"
+    asked = ("objective=best_accuracy", limits, scenarios, *([controller] if loop else []))
+    result = solve(parse_spec(FIRST, overrides=asked))
+    record = result.tables["signal"].columns["r1" if loop else "u1"]
+    peaks = []
+    for b, f in plants:  # y = b q^-1 u / (1 + f q^-1), u = r - gain y
+        y = lfilter([0, b], [1, f + gain * b], record)
+        peaks.append((np.abs(y).max() / 9.0, np.abs(record - gain * y).max() / 0.5))
+    assert np.max(peaks) <= 1.0 + 1e-9
+    assert np.max(peaks[1:]) > 0.99  # the limit holds the record back at another plant than that of the spec
+    assert result.result["signal"]["of_limits"].keys() == {"amplitude.input", "amplitude.output"}
+
+
+def test_fresh_plants_are_tried_as_long_as_there_is_time():
+    """Peaks that are passed over neither miss nor are the largest; an end in time costs no design."""
+    asked = f"uncertainty={{covariance: {COVARIANCE}, scenarios: 10, fresh: 120}}"
+    done, _ = build_convex(parse_spec(FIRST, overrides=[asked])).designed()
+    batches = list(done.plants.afresh())
+    shares = [
+        kept.share for batch in batches for kept in tried_on(done.design, done.experiment.samples, batch)
+    ]
+    whole = robust_result(done, done.plants)
+    assert whole.entry["fresh"]["draws"] == len(shares) == 120
+    assert whole.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares) > 0
+    assert whole.entry["fresh"]["largest"] == pytest.approx(max(shares), rel=1e-12)
+    assert whole.notes == ()
+    with stoppable() as stop:
+
+        def ends_after_the_first():
+            yield batches[0]
+            stop()
+            yield batches[1]
+
+        cut = robust_result(done, replace(done.plants, afresh=ends_after_the_first))
+    first = len(batches[0].plants)
+    assert cut.entry["fresh"]["draws"] == first
+    assert cut.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares[:first])
+    assert f"after {first} of 120" in cut.notes[0]

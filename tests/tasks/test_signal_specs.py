@@ -10,6 +10,7 @@ import scipy.io.wavfile
 from inputdesign_cli import load_spec, parse_spec, solve, validate
 from inputdesign_cli.errors import InfeasibleError, SpecError
 from inputdesign_cli.figures.plots import draw_all
+from inputdesign_cli.report.facts import facts
 from inputdesign_cli.runs.run_directory import write_run
 
 BASE = """
@@ -32,6 +33,7 @@ CASES = [
     ("signal: {quantisation: {bits: 8, range: 4}, offset: 1}", {}),
     ("limits: {amplitude: 1.2}", {"peak": 1.2}),
     ("limits: {rate: 0.5}", {"input_move": 0.5 + 1e-12}),
+    ("limits: {rate: 0.5, amplitude: 1}\nsignal: {type: slewed}", {"input_move": 0.5 + 1e-12, "peak": 1}),
     (
         "limits: {amplitude: {input: 1.4, output: 13}}\nsignal: {candidates: 3}",
         {"input_peak": 1.4, "output_peak": 13},
@@ -78,6 +80,30 @@ def test_another_kind_of_signal_is_delivered_where_noise_does_not_fit():
     assert found["signal"]["worst_ratio"] <= 1 + 1e-9
     assert found["signal"]["peak"][0] <= 0.65
     assert any("no record of noise" in note for note in found["notes"])
+
+
+SLOW = """
+plant: {B: [0, 0.1], F: [1, -0.9]}
+noise: {variance: 0.05}
+experiment: {samples: 220}
+accuracy: {model_error: {relative: 0.1, band: [0.005, 0.4]}}
+spectrum: {type: fir, order: 30}
+limits: {amplitude: 1, rate: 0.1}
+solver: {any_spectrum: false}
+"""
+
+
+def test_ramps_between_two_levels_are_delivered_where_noise_and_sinusoids_do_not_fit():
+    outcome = solve(parse_spec(SLOW))
+    signal = outcome.result["signal"]
+    assert signal["type"] == "slewed"
+    assert signal["worst_ratio"] <= 1 + 1e-9
+    moves = np.abs(np.diff(outcome.tables["signal"].columns["u1"], prepend=0.0))
+    assert np.isclose(moves, 0.1).mean() > 0.5
+    assert moves.max() <= 0.1
+    with pytest.raises(InfeasibleError) as error:
+        solve(parse_spec(SLOW + "signal: {type: filtered_noise}\n"))
+    assert "a record of this length does with signal.type: slewed" in error.value.diagnostics[0].hint
 
 
 def test_a_converter_of_too_small_a_range_is_named():
@@ -149,6 +175,8 @@ BAD = [
     ("signal: {offset: 9, quantisation: {bits: 4, range: 5}}", "coarse-converter", "signal.offset"),
     ("sample_time: 0.3\nsignal: {also: [wav]}", "no-sample-rate", "signal.also"),
     ("signal: {order: 3}", "not-supported", "signal.order"),
+    ("signal: {type: slewed}", "unsuitable-key", "signal.type"),
+    ("limits: {rate: 1}\nsignal: {type: slewed, ramp: 9}", "unsuitable-key", "signal.ramp"),
 ]
 BAD_WORDS = [
     ("signal: {lines: even}", "unknown-word"),
@@ -201,3 +229,20 @@ def test_limits_count_from_the_offset_also_between_two_values_of_a_converter(off
     u = np.array(found.tables["signal"].columns["u1"])
     np.testing.assert_allclose(u / 0.25, np.rint(u / 0.25), atol=1e-9)
     assert np.abs(u - offset).max() <= 0.75 + 1e-12
+
+
+def test_the_share_of_each_limit_that_single_samples_take():
+    """Two levels -a and a move by 2 a: a limit on moves binds before one on values that is as large."""
+    limits = "limits: {amplitude: 1.6, rate: 1.6}\nsignal: {type: binary, candidates: 2}\n"
+    outcome = solve(parse_spec(BASE + "objective: shortest_experiment\n" + limits))
+    u, shares = outcome.tables["signal"].columns["u1"], outcome.result["signal"]["of_limits"]
+    moves = np.abs(np.diff(np.concatenate([[0.0], u])))
+    assert shares == pytest.approx({"amplitude.input": np.abs(u).max() / 1.6, "rate": moves.max() / 1.6})
+    assert shares["rate"] == pytest.approx(2.0 * shares["amplitude.input"])
+    assert 0.98 < shares["rate"] <= 1.0 + 1e-9
+    (note,) = [note for note in outcome.result["notes"] if "shortest record" in note]
+    rate, values = (f"{100 * shares[name]:.3g} %" for name in ("rate", "amplitude.input"))
+    assert note.endswith(f"the record takes {rate} of limits.rate")
+    (said,) = [value for name, value, _ in facts(outcome.result, "s") if name == "limits"]
+    assert said.endswith(f"single samples take {rate} of rate, {values} of amplitude.input")
+    assert outcome.curves["signal"].moves["u1"] == pytest.approx((moves.max(), 1.6))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli import parse_spec, simulate, solve
+from inputdesign_cli import analyse, parse_spec, simulate, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.tasks.build.system import build_experiment, build_model
 from inputdesign_cli.tasks.result.blocks import blocks_of
@@ -107,6 +107,11 @@ STATES = "A: [[a]], B: [[1]], C: [[1]]"
             "plant.state_space.delay",
         ),
         (
+            f"{{parameters: {{a: 0.5, L: 0}}, state_space: {{{STATES}, time: discrete, delay: L}}}}",
+            "unsuitable-key",
+            "plant.state_space.delay",
+        ),
+        (
             "{parameters: {a: -1}, state_space: {A: [[a, 0]], B: [[1]], C: [[1]]}, sample: zoh}",
             "wrong-shape",
             "plant.state_space.A",
@@ -149,3 +154,22 @@ def test_a_gain_beside_coloured_noise_is_refused():
     with pytest.raises(SpecError) as caught:
         build_experiment(spec_of(plant, REST.replace("{variance: 0.1}", "{C: [1, 0.2], variance: 0.1}")))
     assert caught.value.diagnostics[0].code == "conflicting-keys"
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_an_output_that_no_input_reaches_has_no_power(given):
+    """The inputs drive one mode, x2 = 2 x1, and output 2 reads 2 x1 - x2: zero but for rounding."""
+    states = (
+        "{parameters: {g: 1.3, s: 1.1}, sample: zoh, "
+        "state_space: {A: [['-0.7*s', '0.1*s'], ['0.2*s', '-0.6*s']], "
+        "B: [['0.1*g'], ['0.2*g']], C: [[1, 0.2], [0.2, -0.1]]}}"
+    )
+    asked = "{model_error: {relative: 0.1, band: [0.05, 1.5]}}"
+    rest = REST.replace(asked, "{standard_deviation: {s: 0.05}}")
+    spec = spec_of(states, rest, overrides=["spectrum={given: {type: white, power: 1}}"] if given else [])
+    result = (analyse if given else solve)(spec).result
+    pole = np.exp(-0.5 * 0.5 * 1.1)  # the mode x' = -0.5 s x + 0.1 g u
+    size = 1.4 * 0.1 * 1.3 / (0.5 * 1.1) * (1 - pole)
+    assert result["power"]["output"][1] == 0.0
+    if given:
+        assert result["power"]["output"][0] == pytest.approx(size**2 / (1 - pole**2), rel=1e-10)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, tasks
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.plants import TEMPLATES
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
@@ -27,6 +27,8 @@ WISHES = {
     "axis": "Bode plot within 10 % from 1 to 100",
     "column": "prediction within 10 % up to 0.005",
 }
+ROWS = np.arange(100.0)
+STEPS = np.where(ROWS >= 50, 1.0, 0.0)
 DURATIONS = {"motor": "60 s", "axis": "60 s", "column": "10 h"}
 
 
@@ -63,12 +65,15 @@ def test_templates_are_specs_that_can_be_designed(name):
         ("wish", "happiness", "per cent"),
         ("wish", "PI loop", "margin"),
         ("wish", "PI loop with 70 degrees", "60"),
+        ("wish", "PI loop with 1..2 dB", "margin"),
+        ("wish", "PI loop with -6 dB", "positive"),
         ("wish", "own loop with 6 dB", "Kp"),
         ("wish", "prediction within 5 %", "which frequency"),
         ("wish", "Bode plot within 5 % from 2 to 1", "not below"),
         ("range", "a bit", "no range"),
         ("range", "45 to 35", "not below"),
         ("range", "plus/minus 0", "positive"),
+        ("range", "plus/minus 5 around 1e999", "beyond"),
         ("time", "soon", "no time"),
         ("time", "-1 h", "no time"),
         ("time", "10 s", "samples"),
@@ -95,8 +100,9 @@ def test_bad_answers_are_told_by_their_question(key, text, told):
 
 def test_answers_come_from_a_file_and_from_options(tmp_path):
     file = tmp_path / "a.yaml"
-    file.write_text("plant: heater\ndrift: no\ntime: 1 h\n")
-    assert read_answers(file, ["time=2 h"]) == {"plant": "heater", "drift": "no", "time": "2 h"}
+    file.write_text("plant: heater\ndrift: no\ntime: 1 h\nlimits: 1\n")
+    expected = {"plant": "heater", "drift": "no", "time": "2 h", "limits": "1"}
+    assert read_answers(file, ["time=2 h"]) == expected
     for wrong in (["tim=2 h"], ["2 h"]):
         with pytest.raises(SpecError) as caught:
             read_answers(file, wrong)
@@ -133,6 +139,52 @@ def test_a_step_response_tells_the_plant_and_how_well(tmp_path):
     assert plant.time_constant == pytest.approx(180, rel=0.05)
     assert plant.dead_time == pytest.approx(25, abs=6)
     tasks.validate(draft.spec().with_(**{"uncertainty.scenarios": 3}))
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "t", "told"),
+    [
+        (STEPS, np.full(100, 3.0), ROWS, "does not answer"),
+        (STEPS * (ROWS < 80), STEPS, ROWS, "does not stay"),
+        (0 * STEPS, STEPS, ROWS, "does not step"),
+        (STEPS, STEPS, 0 * ROWS, "times that grow"),
+        (STEPS, STEPS, ROWS[::-1], "times that grow"),
+        (STEPS[:3], STEPS[:3], ROWS[:3], "10 rows"),
+    ],
+)
+def test_a_record_that_is_no_step_response_is_told(u, y, t, told, tmp_path):
+    """Warnings are errors in these tests: nothing is divided by zero."""
+    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), u.tolist(), y.tolist(), strict=True)]
+    (tmp_path / "step.csv").write_text("\n".join(["time,u,y", *rows]))
+    with pytest.raises(SpecError, match=told) as caught:
+        compose({**ENGINEER, "plant": "step step.csv"}, "x", tmp_path)
+    assert caught.value.diagnostics[0].key == "plant"
+
+
+@pytest.mark.parametrize(
+    "text", ['{"num": [NaN], "den": [1, 1]}', '{"num": [1], "den": [Infinity, 1]}', "[1]"]
+)
+def test_numbers_that_are_none_make_no_system(text, tmp_path):
+    (tmp_path / "g.json").write_text(text)
+    with pytest.raises(DataError) as caught:
+        compose({**ENGINEER, "plant": "g.json"}, "x", tmp_path)
+    assert (caught.value.diagnostics[0].code, caught.value.diagnostics[0].key) == ("bad-answer", "plant")
+
+
+def test_a_log_is_explored(tmp_path):
+    """The static gain of 0.5 q^-2/(1 - 0.8 q^-1) is 2.5."""
+    rng = np.random.default_rng(3)
+    u, y = np.repeat(rng.choice([-1.0, 1.0], 50), 6), np.zeros(300)
+    for t in range(2, 300):
+        y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 2]
+    rows = np.c_[5.0 * np.arange(300), u, y + 0.05 * rng.standard_normal(300)]
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time,u,y", comments="")
+    wish = "prediction within 5 % up to 0.1"
+    draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
+    draft.validate()
+    spec = draft.spec()
+    assert spec.sample_time == 5.0
+    assert sum(spec.plant.B) / sum(spec.plant.F) == pytest.approx(2.5, rel=0.01)
 
 
 def test_a_system_of_python_control_comes_as_a_file(tmp_path):

@@ -191,9 +191,8 @@ class Demands:
     def worst_ratio(self, informations: NDArray[np.float64]) -> Violation:
         """The worst violation of all requirements, criteria left out."""
         found = [
-            violation
+            asked.requirement.worst(informations[asked.scenario])
             for asked in self.asked
             if not isinstance(asked.requirement, Criterion)
-            for violation in asked.requirement.violations(informations[asked.scenario])
         ]
         return worst(found)

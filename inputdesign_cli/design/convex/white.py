@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.optimize
@@ -42,14 +43,15 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
             if without.ratio <= 1.0:
                 return 0.0
         lo, hi, trial = _enough(trial)
+        excess = cache(trial.excess)
         try:
-            while trial.excess(lo) <= 0:
+            while excess(lo) <= 0:
                 lo -= 2.0
                 if lo < _FAINT:
                     return 0.0  # nothing is asked
         except np.linalg.LinAlgError:
             return 0.0  # the noise alone tells what is asked, and nothing of other parameters
-        found = float(np.exp(scipy.optimize.brentq(trial.excess, lo, hi, xtol=1e-13, rtol=1e-14)))
+        found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
         if abs(found - power) <= 1e-3 * power:
             return found
         power = found

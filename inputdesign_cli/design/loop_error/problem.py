@@ -18,6 +18,7 @@ from inputdesign_cli.design.loop_error.plant import MatrixPlant
 from inputdesign_cli.design.loop_error.weight import adjoint, weight as weight_from
 from inputdesign_cli.information.quadrature import Quadrature, graded_quadrature
 from inputdesign_cli.plant.frequencies import graded_grid, logarithmic_distance
+from inputdesign_cli.plant.model import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import Rational
 
@@ -64,6 +65,8 @@ class LoopErrorProblem:
     """E||y - y0||^2 of the loop with the controller designed on the model, and what the input may cost.
 
     Attributes:
+        estimated: the model in what is estimated, with the G and H of `plant`; None where that is every
+            coefficient of `plant`.
         reference_variance: (n,) of the white noise behind the reference, one for each output.
         reference_filter: that colours it.
         band: normalised frequencies inside which the input may have power. The asymptotic
@@ -76,6 +79,12 @@ class LoopErrorProblem:
     reference_variance: Array
     reference_filter: Rational = _WHITE
     band: tuple[float, float] = (0.0, np.pi)
+    estimated: Model | None = None
+
+    @property
+    def structure(self) -> Model:
+        """The model in what is estimated."""
+        return self.plant if self.estimated is None else self.estimated
 
     def entering(self, w: ArrayLike) -> ComplexArray:
         """Phi_r + Phi_v (K, n, n)."""
@@ -164,8 +173,8 @@ class LoopErrorProblem:
         return float(np.einsum("kab,kba,k->", adjoint(J) @ entering @ J, variance, rule.weights).real)
 
     def parametric(self) -> ParametricCriterion:
-        """tr(W P) of the model structure of the plant."""
-        plant, rule = self.plant, self.rule(1, band=False)
+        """tr(W P) of the model structure."""
+        plant, model, rule = self.plant, self.structure, self.rule(1, band=False)
         X, relative = self._parameter_errors(rule.nodes)
         inverse = np.linalg.inv(plant.covariance)
         W = np.einsum("klab,kbc,kmac,k->lm", X, self.entering(rule.nodes), np.conj(X), rule.weights).real
@@ -173,7 +182,7 @@ class LoopErrorProblem:
             "klab,bc,kmdc,da,k->lm", relative, plant.covariance, np.conj(relative), inverse, rule.weights
         ).real
         whitener = np.linalg.inv(np.linalg.cholesky(plant.covariance))
-        return ParametricCriterion(W, M0, lambda w: np.asarray(whitener @ plant.input_gradient(w)))
+        return ParametricCriterion(W, M0, lambda w: np.asarray(whitener @ model.input_gradient(w)))
 
     def _noise_propagation(self, w: ArrayLike) -> ComplexArray | None:
         """d vec(S G Delta C S) / d vec H (K, n^2, n^2); None where C ignores H."""
@@ -186,8 +195,8 @@ class LoopErrorProblem:
 
     def _parameter_errors(self, w: Array) -> tuple[ComplexArray, ComplexArray]:
         """X_l (K, k, n, n) of the loop, see `parametric`, and H^-1 dH_l."""
-        plant = self.plant
-        dG, relative = plant.plant_gradient(w), plant.noise_gradient(w)
+        plant, model = self.plant, self.structure
+        dG, relative = model.plant_gradient(w), model.noise_gradient(w)
         G, T = plant.plant_at(w), self.law.complementary(w)
         X = -sensitivity(T)[:, None] @ dG @ (np.linalg.inv(G) @ T)[:, None]
         J = self._noise_propagation(w)

@@ -89,17 +89,24 @@ class Confidence(Section):
         default=None, description="Probability that |G(theta) - G| <= r_adm at all frequencies."
     )
     draws: Annotated[Count, SIZES["accuracy.model_error.confidence.draws"]] = Field(
-        default=4000, description="Simulated estimates that fix alpha for exact, and as many that check."
+        default=4000,
+        description="Estimates drawn by asymptotic theory that fix alpha for exact, and as many that check.",
+    )
+    runs: Annotated[Index, SIZES["accuracy.model_error.confidence.runs"]] = Field(
+        default=4000,
+        description="Simulated experiments that correct alpha for records this short, and as many that check "
+        "(0: none, asymptotic theory alone).",
     )
 
     def check(self) -> Iterator[PathDiagnostic]:
-        """One probability is given, and draws that tell it."""
+        """One probability is given, and draws and runs that tell it."""
         yield from self.exactly_one("ellipsoid", "exact")
         rare = min(self.exact or 0.5, 1.0 - (self.exact or 0.5))
-        if self.draws * rare < _LEAST_TELLING - 1e-9:
-            message = f"{{key}} is {self.draws}: too few to tell a probability of {self.exact:g}"
-            least = math.ceil(_LEAST_TELLING / rare - 1e-9)
-            yield PathDiagnostic("out-of-range", message, f"write {least} or more", ("draws",))
+        least = math.ceil(_LEAST_TELLING / rare - 1e-9)
+        for key, count, none in (("draws", self.draws, ""), ("runs", self.runs, ", or 0 for none")):
+            if count < least and not (none and count == 0):
+                message = f"{{key}} is {count}: too few to tell a probability of {self.exact or 0.5:g}"
+                yield PathDiagnostic("out-of-range", message, f"write {least} or more{none}", (key,))
 
 
 class ModelError(Section):

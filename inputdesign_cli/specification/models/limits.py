@@ -21,6 +21,7 @@ from inputdesign_cli.specification.models.fields import (
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.section import Section, Shorthand, pick, tag
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer, transfer_kind
+from inputdesign_cli.specification.models.units import MOVE
 from inputdesign_cli.specification.yaml.plain import Plain
 
 _NUMBERS = ({"type": "number", "exclusiveMinimum": 0}, {"type": "array"})
@@ -115,7 +116,7 @@ class Limits(Section):
     amplitude: Annotated[AmplitudeLimit, Shorthand("input", *_NUMBERS)] | None = Field(
         default=None, description="Largest |u|: a number or one per input; or {input, output}."
     )
-    rate: PerChannel[Level] | None = Field(
+    rate: PerChannel[Annotated[Level, MOVE]] | None = Field(
         default=None,
         description="Largest change of u from one sample to the next; a number or one per input.",
     )

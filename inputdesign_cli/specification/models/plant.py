@@ -1,12 +1,12 @@
-"""`plant:`, one of three kinds: polynomials in q^-1, a transfer matrix in s, a linear regression."""
+"""`plant:`, one of four kinds: polynomials in q^-1, a transfer matrix in s, states, a linear regression."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
+from pydantic import Field
 
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.specification.models.annotations import Wording
@@ -15,8 +15,6 @@ from inputdesign_cli.specification.models.fields import (
     GainMatrix,
     Index,
     MonicPerOutput,
-    Names,
-    Number,
     Numbers,
     StableMatrix,
 )
@@ -25,16 +23,12 @@ from inputdesign_cli.specification.models.named import (
     CoefficientTerms,
     NamedParameter,
     Terms,
-    check_names,
-    check_used,
     expressed,
     leading,
     matrix,
-    texts_in,
-    values_of,
-    worth,
 )
-from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, carry
+from inputdesign_cli.specification.models.named_plant import NamedPlant
+from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic
 from inputdesign_cli.specification.models.process import ProcessModel
 from inputdesign_cli.specification.models.section import Section, pick
 from inputdesign_cli.specification.models.shapes import (
@@ -48,7 +42,6 @@ from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.state_space import StateSpace
 from inputdesign_cli.specification.models.transfer import DelayedMatrix
 from inputdesign_cli.specification.models.values import PolynomialMatrix, depth
-from inputdesign_cli.specification.yaml.plain import Plain
 
 Continuous = Annotated[
     DelayedMatrix | ProcessModel,
@@ -60,64 +53,6 @@ Continuous = Annotated[
     ),
 ]
 """The plant itself in s."""
-
-
-class NamedPlant(Section):
-    """What plants have in common whose coefficients may be expressions in named parameters."""
-
-    TAKE_EXPRESSIONS: ClassVar[tuple[str, ...]] = ()
-
-    parameters: Annotated[Mapping[str, Number], SIZES["plant.parameters"]] | None = Field(
-        default=None,
-        min_length=1,
-        description="Named parameters and their values. Coefficients may then be expressions in them, and "
-        "these alone are estimated.",
-        examples=[{"K": 2.1, "T": 180}],
-    )
-    known: Names | None = Field(
-        default=None, description="Names of parameters that are known and not estimated.", examples=[["b1"]]
-    )
-
-    _written: dict[str, Plain] = PrivateAttr(default_factory=dict)
-
-    @model_validator(mode="wrap")
-    @classmethod
-    def _worth(cls, data: Plain, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """The section with the values of its expressions; it remembers what was written."""
-        if not isinstance(data, dict):
-            return handler(data)
-        numbers = dict(data)
-        if isinstance(data.get("parameters"), dict):
-            values = values_of(data["parameters"])
-            if len(values) > SIZES["plant.parameters"].most:
-                return handler(numbers)
-            found = list(check_names(values))
-            stated = [key for key in cls.TAKE_EXPRESSIONS if key in data]
-            numbers |= {key: worth(data[key], values, (key,), found) for key in stated}
-            if not found:
-                found += check_used(values, texts_in([data[key] for key in stated]))
-            if found:
-                raise carry(*found)
-        made = handler(numbers)
-        made._written = dict(data)
-        if wrong := tuple(made.check_written()):
-            raise carry(*wrong)
-        return made
-
-    def check_written(self) -> Iterator[PathDiagnostic]:
-        """What is wrong with what its coefficients are, whatever the values of its parameters."""
-        return iter(())
-
-    @property
-    def written(self) -> dict[str, Plain]:
-        """The section as it was written, with its expressions."""
-        return self._written
-
-    @property
-    def named_parameters(self) -> tuple[NamedParameter, ...]:
-        """Parameters with names of their own; none where the coefficients are the parameters."""
-        stated = self.parameters or {}
-        return tuple(NamedParameter(k, k, value, ("parameters", k)) for k, value in stated.items())
 
 
 class PolynomialPlant(NamedPlant, family="plant", phrase="a plant of polynomials A, B, F"):
@@ -281,6 +216,13 @@ class StateSpacePlant(NamedPlant, family="plant", phrase="a state-space plant"):
     def inputs(self) -> int:
         """The number of inputs."""
         return len(self.state_space.B[0])
+
+    def check_written(self) -> Iterator[PathDiagnostic]:
+        """Matrices of samples have no dead time beside them, whatever its value."""
+        if self.state_space.time == "discrete" and self.term("delay", 0, 0).present:
+            message = "{key} is in continuous time, but the matrices are those of samples"
+            path = ("state_space", "delay")
+            yield PathDiagnostic("unsuitable-key", message, "write the delay as states", path)
 
     @property
     def stated_matrices(self) -> tuple[str, ...]:

@@ -29,12 +29,12 @@ from inputdesign_cli.specification.models.sizes import SIZES
 from inputdesign_cli.specification.models.units import SECONDS_ONLY, SIGNAL
 
 Samples = Annotated[Count, SIZES["signal.samples"]]
-SignalType = Literal["filtered_noise", "multisine", "binary", "ternary", "prbs", "white"]
+SignalType = Literal["filtered_noise", "multisine", "binary", "slewed", "ternary", "prbs", "white"]
 
 # Settings that mean something for some types of signal only.
 _ONLY_FOR = {
     "phases": ("multisine",),
-    "lines": ("multisine", "binary", "ternary"),
+    "lines": ("multisine", "binary", "slewed", "ternary"),
     "ramp": ("filtered_noise", "multisine", "white"),
     "bits": ("prbs",),
     "order": ("filtered_noise",),

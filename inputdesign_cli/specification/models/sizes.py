@@ -79,6 +79,7 @@ SIZES = {
     "spectrum.given.frequencies": Size(5000, "a number is kept for each pair of lines"),
     "solver.grid": Size(2000, "the program has a matrix inequality at every frequency"),
     "accuracy.model_error.confidence.draws": Size(100_000, "every draw is a model of its own"),
+    "accuracy.model_error.confidence.runs": Size(100_000, "every run is a record that is identified"),
     "accuracy.frequency_response.lines": Size(100_000, "every line has a power and a deviation of its own"),
     "uncertainty.scenarios": Size(2000, "every plant has integrals and peaks of its own"),
     "uncertainty.fresh": Size(100_000, "every plant has integrals and peaks of its own"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -64,8 +64,3 @@ class StateSpace(Section):
             if matrix is not None and (len(matrix), len(matrix[0])) != (rows, columns):
                 message = f"{{key}} is {len(matrix)} x {len(matrix[0])}, and must be {rows} x {columns}"
                 yield PathDiagnostic("wrong-shape", message, f"it has {words}", (key,))
-        if self.time == "discrete" and self.delay:
-            message = "{key} is in continuous time, but the matrices are those of samples"
-            yield PathDiagnostic("unsuitable-key", message, "write the delay as states", ("delay",))
-
-    kind: ClassVar[Literal["state_space"]] = "state_space"

@@ -17,7 +17,7 @@ from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.scalars import resolve
 
 MOST_VALUES = 100_000
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _RANGE = re.compile(rf"\s*({_NUMBER})\s*:\s*({_NUMBER})\s*(?::\s*({_NUMBER})\s*)?")
 
 

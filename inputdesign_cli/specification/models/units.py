@@ -22,11 +22,13 @@ _WITH_UNIT = re.compile(_NUMBER + r"\s*([%A-Za-z\u00b0\u00b5\u03bc/]+)")
 class Measure:
     """What a number counts in; stands in the `Annotated[..]` of a type, for all numbers inside."""
 
-    of: Literal["time", "seconds", "frequency", "signal", "fraction"]
+    of: Literal["time", "seconds", "frequency", "signal", "move", "fraction"]
 
 
 TIME, SECONDS_ONLY = Measure("time"), Measure("seconds")
 FREQUENCY, SIGNAL, FRACTION = Measure("frequency"), Measure("signal"), Measure("fraction")
+MOVE = Measure("move")
+"""What a signal changes by in a sample."""
 
 
 def without_unit(text: str, measure: Measure | None, time_unit: str | None) -> str:
@@ -44,11 +46,15 @@ def without_unit(text: str, measure: Measure | None, time_unit: str | None) -> s
     if unit == "%":
         return _percent(number, of)
     value, seconds = float(number), "s" if of == "seconds" else time_unit
-    if of in ("time", "seconds"):
+    # A parameter with a name of its own may be anything; its unit tells what it is.
+    if of in ("time", "seconds") or (of is None and _seconds(unit)):
         return _time(number, _seconds(unit), seconds)
-    if of == "frequency":
+    if of == "frequency" or (of is None and (unit in _RADIANS or unit.startswith("rad/"))):
         return _frequency(number, value, unit, seconds)
-    if of == "signal":
+    moved, _, per = unit.rpartition("/")
+    if of == "move" and moved and _seconds(per):
+        return f"write the change in a sample, in the unit of the signal: {number} {unit} times sample_time"
+    if of in ("signal", "move"):
         return f"write {number}, in the unit of the signal"
     return f"write the number without a unit: {number}"
 
@@ -57,7 +63,7 @@ def _percent(number: str, of: str | None) -> str:
     share = f"{float(number) / 100:g}"
     if of == "fraction":
         return f"write it as a fraction: {share}"
-    if of == "signal":
+    if of in ("signal", "move"):
         return f"write {number}, in the unit of the signal"
     if of is not None:
         return f"this is no fraction of anything; write a {of if of == 'frequency' else 'time'}"
@@ -70,7 +76,9 @@ def _seconds(unit: str) -> str | None:
 
 
 def _time(number: str, unit: str | None, wanted: str | None) -> str:
-    if wanted not in SECONDS or wanted is None:
+    if wanted is None:
+        return "write the number alone, in time_unit" + (f": {number} if that is {unit}" if unit else "")
+    if wanted not in SECONDS:
         return f"write {number} and time_unit: {unit}" if unit else f"write the number alone: {number}"
     if unit is None:
         return f"write the number alone, in {wanted}"

@@ -42,6 +42,17 @@ def resolve(word: str) -> Scalar:
     return word if math.isinf(value) or _vanished(word, value) else value
 
 
+def plain_number(text: str) -> float:
+    """The number that a text writes in the digits 0 to 9: `float` takes `1_0` and those of other scripts too.
+
+    Raises:
+        ValueError: the text is none.
+    """
+    if not NUMBER.fullmatch(text.strip()):
+        raise ValueError(f"{clip(text)} is no number")
+    return float(text)
+
+
 def why_not_number(word: str) -> tuple[str, str, str]:
     """Code, what is wrong (after the key's name), and hint for a text where a number should stand."""
     text = word.strip()

@@ -8,6 +8,7 @@ from dataclasses import replace
 from inputdesign_cli.design.convex.problem import Goal
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.runs.results import Result
+from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
 from inputdesign_cli.spectrum import Basis, PolynomialBasis
@@ -21,7 +22,7 @@ from inputdesign_cli.tasks.build.parameters import check_known
 from inputdesign_cli.tasks.build.requirements import build_asked, stated_bounds
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
-from inputdesign_cli.tasks.build.simulation import build_simulation
+from inputdesign_cli.tasks.build.simulation import build_simulation, build_simulator
 from inputdesign_cli.tasks.build.spectra import build_basis
 from inputdesign_cli.tasks.build.system import build_cost, build_experiment, excitation_band
 from inputdesign_cli.tasks.build.uncertainty import build_plants
@@ -71,7 +72,9 @@ def build_convex(spec: Spec) -> ConvexTask:
         experiment=experiment,
         cost=cost,
         alpha=alpha,
-        exact=None if calibration is None else ExactConfidence(calibration, alpha, question),
+        exact=None
+        if calibration is None
+        else ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment)),
         tolerance=spec.solver.tolerance,
         any_spectrum_tolerance=spec.solver.any_spectrum_tolerance if spec.solver.any_spectrum else None,
         most_samples=spec.limits.samples,
@@ -151,7 +154,7 @@ def check_pairs(spec: Spec, known: Sequence[str]) -> None:
 def _check_interpolated(spec: Spec) -> None:
     """In continuous time samples are interpolated within their band: between them there are no levels."""
     signal = spec.signal
-    levels = signal.type in ("binary", "ternary", "prbs")
+    levels = signal.type in FROM_LEVELS
     if levels or signal.hold is not None or signal.bits is not None:
         key = "hold" if signal.hold is not None else "bits" if signal.bits is not None else "type"
         raise spec.complain(

@@ -23,7 +23,7 @@ from inputdesign_cli.tasks.build.model_error import build_calibration, model_err
 from inputdesign_cli.tasks.build.requirements import build_requirements
 from inputdesign_cli.tasks.build.signal_checks import check_signal
 from inputdesign_cli.tasks.build.signal_settings import build_record_request
-from inputdesign_cli.tasks.build.simulation import build_simulation
+from inputdesign_cli.tasks.build.simulation import build_simulation, build_simulator
 from inputdesign_cli.tasks.build.system import (
     build_cost,
     build_experiment,
@@ -77,6 +77,7 @@ def build_given(spec: Spec) -> GivenTask:
         cost=build_cost(spec),
         alpha=model_error_alpha(spec, experiment.model),
         calibration=build_calibration(spec),
+        simulator=build_simulator(spec, experiment),
         limits=_limits(spec),
         record=build_record_request(spec, experiment.size),
         ellipses=spec.report.ellipses,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,19 +18,12 @@ from inputdesign_cli.design.loop_error import (
 from inputdesign_cli.design.loop_error.checks import check_invertible
 from inputdesign_cli.errors import bad_spec, refuse
 from inputdesign_cli.plant import Rational, TransferMatrix, hold_entries
-from inputdesign_cli.plant.polynomial import join_roots, roots_in_z
-from inputdesign_cli.specification import ClosedLoopError, Noise, Simulation, SimulationNoise, Spec
-from inputdesign_cli.specification.models.plant import (
-    ContinuousPlant,
-    PolynomialPlant,
-    StateSpacePlant,
-    TruePlant,
-)
+from inputdesign_cli.specification import ClosedLoopError, Simulation, Spec
 from inputdesign_cli.specification.models.transfer import Transfer
 from inputdesign_cli.tasks.build.demand import check_record
 from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.loop_error_plant import estimated_model, matrix_plant
 from inputdesign_cli.tasks.build.signal_settings import build_bounds, stated_moves, stated_peaks
-from inputdesign_cli.tasks.build.system import held_plant, polynomial_model
 from inputdesign_cli.tasks.build.weights import held, rational
 from inputdesign_cli.tasks.loop_error import KEY, LoopErrorTask, LossTrial
 from inputdesign_cli.tasks.loop_error_signal import LoopErrorSignalSettings
@@ -39,8 +31,6 @@ from inputdesign_cli.tasks.result.loop_error import LoopErrorTerms
 
 _GRID = 512
 _CANDIDATES = 20
-# A pole this near to z = 1.
-_INTEGRATES = 1e-7
 
 
 def build_loop_error_task(spec: Spec) -> LoopErrorTask:
@@ -54,7 +44,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     error = spec.accuracy.closed_loop_error
     assert error is not None
     _check_supported(spec)
-    plant = _plant(spec, spec.plant, spec.noise, "plant")
+    plant = matrix_plant(spec, spec.plant, spec.noise, "plant")
     name, law = _law(spec, error, plant)
     check_invertible(plant, key="plant.B")
     law.check(plant, key=f"{KEY}.control.{name}")
@@ -62,6 +52,7 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
     lo, hi = spec.clip_band(spec.limits.band)
     problem = LoopErrorProblem(
         plant=plant,
+        estimated=estimated_model(spec),
         law=law,
         limits=_limits(spec),
         reference_variance=np.asarray(error.reference.variance) * np.ones(plant.outputs),
@@ -83,80 +74,6 @@ def build_loop_error_task(spec: Spec) -> LoopErrorTask:
         grid=spectrum.grid if spectrum is not None and spectrum.type == "pointwise" else _GRID,
     )
     return LoopErrorTask(problem, terms, _signal(spec, error, plant.inputs), _trial(spec, problem))
-
-
-def _not_coefficients(
-    plant: PolynomialPlant | ContinuousPlant | StateSpacePlant, noise: Noise | SimulationNoise, key: str
-) -> Iterator[tuple[str, str, str]]:
-    """What is estimated otherwise than coefficient by coefficient: its key, in words, and how to mend it."""
-    for part, listed in (("noise", noise.known), (key, plant.known)):
-        if listed:
-            yield f"{part}.known", f"{part} has known parameters", "remove known"
-    if plant.parameters is not None:
-        hint = "remove parameters, and write numbers for the expressions in them"
-        yield f"{key}.parameters", f"{key} has named parameters", hint
-    elif plant.named_parameters and plant.kind == "continuous":
-        names = ", ".join(dict.fromkeys(one.label.split("[")[0] for one in plant.named_parameters))
-        hint = f"write {_coefficients(plant)} under continuous"
-        yield f"{key}.continuous", f"the parameters of {key} are {names}", hint
-
-
-def _coefficients(plant: ContinuousPlant) -> str:
-    """A plant in s by its numerators, denominators and dead times."""
-    s, single = plant.continuous, (plant.inputs, plant.outputs) == (1, 1)
-    matrices = (
-        [[[float(f"{c:.12g}") for c in entry] for entry in row] for row in matrix]
-        for matrix in (s.numerator_matrix, s.denominator_matrix)
-    )
-    above, below = (rows[0][0] if single else rows for rows in matrices)
-    late = s.delays[0][0] if single else [list(row) for row in s.delays]
-    return f"{{numerator: {above}, denominator: {below}, delay: {late}}}"
-
-
-def _plant(spec: Spec, plant: TruePlant, noise: Noise | SimulationNoise, key: str) -> MatrixPlant:
-    """The matrix of polynomials of `plant` or of the true system `simulation.plant`."""
-    if noise.variance is None:
-        raise bad_spec(
-            "not-supported",
-            "this version takes the noise of this simulation as a variance",
-            hint="write variance in place of relative_std",
-            key="simulation.noise",
-        )
-    if any(noise.drifts):
-        raise bad_spec(
-            "not-supported",
-            "this version designs for the closed-loop error with noise that does not drift",
-            hint="write a root of D inside the unit circle in place of drift",
-            key="noise.drift",
-        )
-    if plant.kind != "parameters" and plant.kind != "regression":
-        for part, why, hint in _not_coefficients(plant, noise, key):
-            raise bad_spec(
-                "not-supported",
-                "this version designs for the closed-loop error with every coefficient of the sampled "
-                f"plant estimated, and {why}",
-                hint=hint,
-                key=part,
-            )
-    if plant.kind == "continuous" and plant.sampled:
-        plant = held_plant(plant, spec.sample_time)
-    if plant.kind != "polynomial":
-        raise bad_spec(
-            "not-supported",
-            "this version designs for the closed-loop error of sampled plants only",
-            hint="add sample: zoh to a continuous-time plant",
-            key=key,
-        )
-    made = MatrixPlant.of(polynomial_model(plant, noise, noise.covariance(plant.outputs)))
-    poles = join_roots(roots_in_z(part) for part in (*made.A, *(f for row in made.F for f in row)))
-    if np.any(np.abs(poles - 1.0) < _INTEGRATES):
-        raise bad_spec(
-            "not-supported",
-            "this version designs for the closed-loop error of plants that do not integrate",
-            hint="move the pole into the unit circle, or state the accuracy as model_error",
-            key=key,
-        )
-    return made
 
 
 def _law(spec: Spec, error: ClosedLoopError, plant: MatrixPlant) -> tuple[str, ControlLaw]:
@@ -261,7 +178,7 @@ def _trial(spec: Spec, problem: LoopErrorProblem) -> LossTrial:
             )
     true = problem.plant
     if simulation.plant is not None or simulation.noise is not None:
-        true = _plant(
+        true = matrix_plant(
             spec, simulation.plant or spec.plant, simulation.noise or spec.noise, "simulation.plant"
         )
     return LossTrial(

@@ -134,6 +134,8 @@ def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     """Values far from the median of a signal x (n,), with their rows in the file."""
     middle = np.median(x)
     spread = 1.4826 * np.median(np.abs(x - middle))
+    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
+    spread = max(spread, (high - low) / 4.0)  # two levels have no spread about the more frequent one
     if spread <= 0.0:
         return []
     found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from inputdesign_cli.signal import Quantiser, SignalSettings, blocks_of
-from inputdesign_cli.signal.settings import LEVELLED
+from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.signal_settings import (
     build_bounds,
@@ -22,7 +22,8 @@ def check_signal(spec: Spec) -> None:
     Raises:
         SpecError: `conflicting-keys` when the samples are no whole number of periods of held values, or
             the level exceeds the limit on the amplitude; `unsuitable-key` for a ramp of a signal of few
-            levels; `coarse-converter` when a limit is below the converter's step;
+            levels, and for ramps between levels without a limit on moves;
+            `coarse-converter` when a limit is below the converter's step;
             `no-sample-rate` for a WAV file of a sampling rate that is not a whole number of hertz.
     """
     settings = build_signal_settings(spec)
@@ -48,7 +49,7 @@ def check_signal(spec: Spec) -> None:
             hint="ask for more samples, fewer periods or a shorter hold",
             key="signal.periods" if settings.periods > 1 else "signal.hold",
         )
-    if settings.ramp and settings.method in LEVELLED:
+    if settings.ramp and settings.method in FROM_LEVELS:
         raise spec.complain(
             "unsuitable-key",
             f"ramp does not go with type: {settings.method}, whose values are of a few levels",
@@ -61,6 +62,15 @@ def check_signal(spec: Spec) -> None:
             f"ramp is {settings.ramp}, but the signal has {samples} samples to fade in and out",
             hint=f"write at most {samples // 2}",
             key="signal.ramp",
+        )
+    if settings.method == "slewed" and (spec.closed_loop or spec.limits.rate is None):
+        raise spec.complain(
+            "unsuitable-key",
+            "type: slewed is a signal of ramps between two levels, at the speed of limits.rate, which "
+            + ("in a loop does not limit what is applied" if spec.closed_loop else "is not stated"),
+            hint=("" if spec.closed_loop else "state limits.rate, or ")
+            + "use type: binary, which switches at once",
+            key="signal.type",
         )
     _check_harmonics(spec, settings, samples if fixed else None)
     _check_register(spec, settings)

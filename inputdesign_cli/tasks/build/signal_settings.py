@@ -20,6 +20,8 @@ _CANDIDATES, _FEWEST = 20, 4
 _PATIENCE = 4  # times as many at most, where noise happens to fit badly
 # Optimised phases take a twentieth of a second or more each, and hardly differ in quality.
 _OPTIMISED = 4
+# Signals whose times of switching are searched take seconds.
+_SEARCHED = 2
 
 
 def build_record_request(spec: Spec, parameters: int) -> RecordRequest:
@@ -70,8 +72,11 @@ def build_signal_settings(spec: Spec, method: Method | None = None) -> SignalSet
     limited = spec.limits.amplitude is not None or spec.limits.rate is not None
     uniform: Phases = "orthogonal" if inputs > 1 else "random"
     phases: Phases = signal.phases or ("optimised" if limited and method == "multisine" else uniform)
-    optimised = method == "multisine" and phases == "optimised"
-    candidates = _OPTIMISED if optimised else max(_CANDIDATES // inputs, _FEWEST)
+    candidates = max(_CANDIDATES // inputs, _FEWEST)
+    if method == "multisine" and phases == "optimised":
+        candidates = _OPTIMISED
+    elif method == "slewed":
+        candidates = _SEARCHED
     most = _PATIENCE * candidates if method == "filtered_noise" else candidates
     return SignalSettings(
         method=method,
@@ -193,8 +198,16 @@ def _other_methods(spec: Spec) -> tuple[Method, ...]:
     if signal.phases is not None or signal.lines is not None or signal.bits is not None:
         return ()
     levels: tuple[Method, ...] = ("binary",) if spec.plant.sampled and not signal.ramp else ()
+    if levels and _ramps_needed(spec):
+        levels = ("slewed",)
     others: list[Method] = list(dict.fromkeys((_usual_method(spec), "multisine", *levels)))
     return tuple(method for method in others if method != _method(spec))
+
+
+def _ramps_needed(spec: Spec) -> bool:
+    """Whether the limits on moves keep an input from switching between its levels at once."""
+    moves, (peak, _) = stated_moves(spec), stated_peaks(spec)
+    return moves is not None and not spec.closed_loop and peak is not None and bool(np.isfinite(moves).any())
 
 
 def per_channel(value: float | tuple[float, ...], channels: int) -> Array:

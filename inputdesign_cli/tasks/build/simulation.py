@@ -9,6 +9,7 @@ from inputdesign_cli.specification.models.experiment import Noise
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.model_error import unstated_errors
 from inputdesign_cli.tasks.build.system import build_cost, build_loop, build_model, held_plant
+from inputdesign_cli.tasks.simulated_estimates import Simulator
 from inputdesign_cli.tasks.simulation import Simulation, TrueSystem
 
 
@@ -33,6 +34,15 @@ def build_simulation(spec: Spec, nominal: Experiment) -> Simulation:
         cost=build_cost(spec),
         entries=unstated_errors(spec, nominal),
     )
+
+
+def build_simulator(spec: Spec, nominal: Experiment) -> Simulator | None:
+    """What simulates experiments for an exact confidence; None where asymptotic theory alone is to tell."""
+    error = spec.accuracy.error
+    stated = None if error is None else error.calibrated
+    if stated is None or not stated.runs:
+        return None
+    return Simulator(nominal, stated.runs, build_units(spec).step)
 
 
 def _true_system(spec: Spec) -> TrueSystem | None:

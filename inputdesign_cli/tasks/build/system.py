@@ -56,7 +56,7 @@ def build_model(spec: Spec) -> Model:
     match spec.plant:
         case PolynomialPlant() as plant:
             noise = spec.noise
-            one, pairs = np.ones(1), tuple(zip(_rows(noise.D), noise.held, strict=True))
+            one, pairs = np.ones(1), tuple(zip(per_output(noise.D), noise.held, strict=True))
             inside = polynomial_model(plant, noise, covariance, [one if held else d for d, held in pairs])
             outside = [d if held else one for d, held in pairs]
             return reparametrised(spec, plant, _coloured(inside, noise, [one], outside))
@@ -72,10 +72,10 @@ def build_model(spec: Spec) -> Model:
                 degrees=degrees_of(plant),
             )
             model = SampledModel(continuous, spec.sample_time) if plant.sampled else continuous
-            C, D = _rows(spec.noise.C), _rows(spec.noise.D)
+            C, D = per_output(spec.noise.C), per_output(spec.noise.D)
             return reparametrised(spec, plant, _coloured(model, spec.noise, C, D))
         case StateSpacePlant() as plant:
-            C, D = _rows(spec.noise.C), _rows(spec.noise.D)
+            C, D = per_output(spec.noise.C), per_output(spec.noise.D)
             states = state_space_model(spec, plant, covariance)
             return reparametrised(spec, plant, _coloured(states, spec.noise, C, D))
     raise spec.complain(
@@ -103,10 +103,10 @@ def polynomial_model(
     """
     return PolynomialModel(
         B=_arrays(plant.B_matrix),
-        A=_rows(plant.A),
+        A=per_output(plant.A),
         F=_arrays(plant.F_matrix),
-        C=_rows(noise.C),
-        D=_rows(noise.D) if D is None else tuple(D),
+        C=per_output(noise.C),
+        D=per_output(noise.D) if D is None else tuple(D),
         covariance=covariance,
         delays=plant.delays,
     )
@@ -119,6 +119,11 @@ def held_plant(plant: ContinuousPlant, sample_time: float) -> PolynomialPlant:
     held = hold_entries(*rows, sample_time, matrix.delays)
     B, F = (tuple(tuple(tuple(entry.tolist()) for entry in row) for row in rows) for rows in held)
     return PolynomialPlant.model_construct(A=(1.0,), B=B, F=F)
+
+
+def bare_experiment(spec: Spec, model: Model, loop: Loop | None = None) -> Experiment:
+    """The experiment in raw coordinates, of which nothing is checked and without its prior."""
+    return Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
 
 
 def build_experiment(spec: Spec) -> Experiment:
@@ -134,7 +139,7 @@ def build_experiment(spec: Spec) -> Experiment:
     loop = None if controller is None else build_loop(spec, model, controller)
     if loop is not None:
         loop.check_delay()
-    experiment = Experiment(model, spec.experiment.samples, excitation_band(spec), loop=loop)
+    experiment = bare_experiment(spec, model, loop)
     check_effects(spec, experiment)
     experiment = on_finite_information(spec, experiment)
     return replace(experiment, prior=_prior(spec, experiment))
@@ -261,6 +266,6 @@ def _reversed(rows: Sequence[Sequence[Sequence[float]]]) -> tuple[tuple[Array, .
     return tuple(tuple(entry[::-1] for entry in row) for row in _arrays(rows))
 
 
-def _rows(value: tuple) -> tuple[Array, ...]:
+def per_output(value: tuple) -> tuple[Array, ...]:
     """One polynomial, common to all outputs, or a list of one an output."""
     return tuple(np.array(p, dtype=float) for p in (value if depth(value) == 2 else (value,)))

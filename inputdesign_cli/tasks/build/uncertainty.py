@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,8 @@ _KEY = "uncertainty"
 _DEFAULT_SCENARIOS, _DEFAULT_RADIUS = 100, 0.998
 # So many draws for each plant that is asked for, and no fewer than so many.
 _TRIES, _LEAST_TRIES = 20, 500
-
+# Fresh plants between two looks at the clock.
+_AT_A_TIME = 50
 _ON_CIRCLE = 1e-9
 # Where an entry of G is looked at, of the band.
 _PROBES = np.array([0.31, 0.57, 0.83])
@@ -62,8 +64,10 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
     draw = drawing(spec, stated, experiment)
     batch = scenario.batch(draw, number, np.random.default_rng([stated.seed, 0]))
 
-    def afresh() -> Batch:
-        return scenario.batch(draw, stated.fresh, np.random.default_rng([stated.seed, 1]))
+    def afresh() -> Iterator[Batch]:
+        rng = np.random.default_rng([stated.seed, 1])
+        for begun in range(0, stated.fresh, _AT_A_TIME):
+            yield scenario.batch(draw, min(_AT_A_TIME, stated.fresh - begun), rng)
 
     return Plants(
         batch,
@@ -73,6 +77,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         paid,
         discard=int(stated.discard * number),
         afresh=afresh if stated.fresh else None,
+        fresh=stated.fresh,
         unknowns=None if basis.free else _unknowns(spec, basis),
         region=None if stated.worst_case is None else scenario.region(stated.worst_case),
     )
@@ -183,7 +188,7 @@ class _Scenarios(Unsure):
         flaw = model.flaw
         if flaw is not None:
             raise _NoPlantError("not-a-plant", flaw)
-        lost = self._acting(self.nominal) & ~self._acting(model)
+        lost = self._act & ~self._acting(model)
         if np.any(lost):
             output, input = np.argwhere(lost)[0] + 1
             raise _NoPlantError("not-a-plant", f"output {output} does not depend on input {input}")
@@ -199,6 +204,11 @@ class _Scenarios(Unsure):
                 "no-stable-plant", f"{what} has a pole, or C a root, on or beyond the unit circle"
             )
         return model, loop
+
+    @cached_property
+    def _act(self) -> NDArray[np.bool_]:
+        """(p, r): the entries of the nominal G that are not zero."""
+        return self._acting(self.nominal)
 
     def _acting(self, model: Model) -> NDArray[np.bool_]:
         """(p, r): whether an entry of G is zero nowhere but by chance."""

@@ -82,7 +82,7 @@ def design_result(terms: LoopErrorTerms, design: LoopErrorDesign) -> Entry:
             "limits": _limits(design),
         },
         "information": {
-            "parameters": list(design.problem.plant.names),
+            "parameters": list(design.problem.structure.names),
             "matrix": samples * design.information,
             "covariance": np.linalg.inv(design.information) / samples,
         },

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.compute.time_limit import OutOfTimeError, what_ended
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
@@ -15,20 +17,22 @@ from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed, costs_of
 from inputdesign_cli.tasks.result.fan import fan_curves
-from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Kept, Plants, Searched, kept_by, tried_on
+from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Batch, Kept, Plants, Searched, kept_by, tried_on
 
 # A plant binds when it keeps all but this share of what is admitted.
 _BINDS = 1e-5
 _LISTED = 12
+_FEWER = "{} ended the trial on fresh plants after {} of {} (uncertainty.fresh)"
 
 
 @dataclass(frozen=True)
 class RobustResult:
-    """`robust` of the result, with its tables and curves by the names of their files."""
+    """`robust` of the result, with its tables and curves by the names of their files, and what to note."""
 
     entry: dict[str, Json]
     tables: dict[str, Table]
     curves: dict[str, Curves]
+    notes: tuple[str, ...]
 
 
 def robust_result(done: Designed, plants: Plants) -> RobustResult:
@@ -62,13 +66,18 @@ def robust_result(done: Designed, plants: Plants) -> RobustResult:
         entry["searched"] = _searched(units, plants, plants.searched)
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
+    notes: tuple[str, ...] = ()
     if plants.afresh is not None and done.design.result.x.any():
-        entry["fresh"] = _fresh(done, plants)
+        fresh = _fresh(done, plants, plants.afresh())
+        entry |= {"fresh": fresh} if fresh else {}
+        tried = fresh.get("draws", 0)
+        if tried < plants.fresh:
+            notes = (_FEWER.format(what_ended(), tried, plants.fresh),)
     tables, curves = {"scenarios": _table(units, plants, numbers, at_each)}, dict[str, Curves]()
     fan = fan_curves(done, numbers, binding)
     if fan is not None and done.design.result.x.any():
         tables["fan"], curves["fan"] = fan
-    return RobustResult(entry, tables, curves)
+    return RobustResult(entry, tables, curves, notes)
 
 
 def _binding(done: Designed, shares: Array) -> list[int]:
@@ -112,22 +121,29 @@ def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
     return {"risk": risk}
 
 
-def _fresh(done: Designed, plants: Plants) -> dict[str, Json]:
-    """How many of other plants from the same distribution the design misses."""
-    assert plants.afresh is not None
-    batch = plants.afresh()
-    tried = tried_on(done.design, done.experiment.samples, batch)
+def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch]) -> dict[str, Json]:
+    """How many of other plants from the same distribution the design misses, as many as there is time for."""
+    tried, rejected, largest = list[Kept](), 0, 0.0
+    for batch in afresh:
+        try:
+            tried += tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
+        except OutOfTimeError:
+            break
+        tell(Counted("fresh plants", len(tried), plants.fresh))
+        rejected += batch.rejected
+        largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
+    if not tried:
+        return {}
     shares = np.array([one.share for one in tried])
     dearer = np.array([one.cost for one in tried]) > MET * done.design.result.objective  # of cost: worst
     missed = int(np.sum((shares > MET) | dearer))
-    finite = shares[np.isfinite(shares)]
     entry: dict[str, Json] = {
-        "draws": len(batch.plants),
-        "rejected": batch.rejected,
+        "draws": len(tried),
+        "rejected": rejected,
         "missed": missed,
-        "share": missed / len(batch.plants),
-        "limits": list(binomial_limits(missed, len(batch.plants))),
-        "largest": float(finite.max(initial=0.0)),
+        "share": missed / len(tried),
+        "limits": list(binomial_limits(missed, len(tried))),
+        "largest": largest,
     }
     promised = plants.paid == "worst" and done.problem.goal == "cost"
     return entry | ({"dearer": int(np.sum(dearer))} if promised else {})

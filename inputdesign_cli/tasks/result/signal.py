@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from inputdesign_cli.runs.curves import SignalCurves
 from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.signal_files import WRITERS
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.signal import DesignedSpectrum, Lines, Record
+from inputdesign_cli.signal import Bounds, DesignedSpectrum, Lines, Record
 from inputdesign_cli.tasks.record import Delivery, RecordRequest
 from inputdesign_cli.tasks.result.predicted import predicted_output
 
@@ -50,10 +50,10 @@ def signal_entry(
     entry |= {"samples": len(samples), "sample_time": units.sample_time} | _sizes(plant, samples)
     criterion = criterion_of(requirements)
     if criterion is not None:
-        reached = criterion.level(plant.information_of_experiment(samples))
-        entry["criterion"] = criterion.value(reached)
+        level = criterion.level(plant.information_of_experiment(samples))
+        entry["criterion"] = criterion.value(level)
         if designed is not None:
-            entry["efficiency"] = reached / criterion.level(designed)
+            entry["efficiency"] = level / criterion.level(designed)
     elif requirements and np.isfinite(record.worst_ratio):
         entry["worst_ratio"] = record.worst_ratio
     if record.method != "given":
@@ -63,6 +63,9 @@ def signal_entry(
     limits = _limits(request, units, record)
     if limits:
         entry["limits"] = {name: list(pair) for name, pair in limits.items()}
+    reached = _of_limits(request.bounds, entry)
+    if reached:
+        entry["of_limits"] = reached
     if record.factor_residual is not None:
         entry["spectral_factor_residual"] = record.factor_residual
     delivery = request.delivery
@@ -91,6 +94,7 @@ def signal_curves(
         {name: units.label(name) for name in units.excitations},
         panels,
         held=units.sampled,
+        moves=_moves(request, units, record),
     )
     return {"signal": Table(columns), "predicted_output": predicted}, curves
 
@@ -110,6 +114,30 @@ def _limits(request: RecordRequest, units: Units, record: Record) -> dict[str, t
     middle = np.zeros(most.size) if around is None else around
     pairs = zip((middle - most).tolist(), (middle + most).tolist(), strict=True)
     return dict(zip(units.excitations, pairs, strict=True))
+
+
+def _moves(request: RecordRequest, units: Units, record: Record) -> dict[str, tuple[float, float]]:
+    """The largest move of each channel from rest and its limit, where the record is the input."""
+    most = request.bounds.rate
+    if most is None or units.closed_loop:
+        return {}
+    pairs = zip(_largest_moves(record.samples).tolist(), most.tolist(), strict=True)
+    return dict(zip(units.excitations, pairs, strict=True))
+
+
+def _largest_moves(u: Array) -> Array:
+    """(r,): of inputs (n, r) that start from rest."""
+    return np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0)
+
+
+def _of_limits(bounds: Bounds, sizes: Mapping[str, Json]) -> dict[str, float]:
+    """The largest share over the channels of each limit on single samples that the record takes."""
+    stated = (
+        ("amplitude.input", bounds.amplitude, "input_peak"),
+        ("amplitude.output", bounds.output, "output_peak"),
+        ("rate", bounds.rate, "input_move"),
+    )
+    return {key: float(np.max(sizes[name] / most)) for key, most, name in stated if most is not None}
 
 
 def applied(delivery: Delivery, record: Record) -> Array:
@@ -165,7 +193,7 @@ def _sizes(plant: FiniteRecord, samples: Array) -> dict[str, list[float]]:
         "input_power": np.mean(u**2, axis=0).tolist(),
         "output_power": np.mean(y**2, axis=0).tolist(),
         "input_peak": np.abs(u).max(axis=0).tolist(),
-        "input_move": np.abs(np.diff(u, axis=0, prepend=0.0)).max(axis=0).tolist(),
+        "input_move": _largest_moves(u).tolist(),
         "output_peak": np.abs(y).max(axis=0).tolist(),
     }
 

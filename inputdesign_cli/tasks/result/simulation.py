@@ -107,16 +107,21 @@ def covariance_in_theory(information: Array) -> Array:
 
 def confidence_notes(result: Mapping[str, Json], inputs: Mapping[str, Json]) -> list[str]:
     """Whether the runs keep less than the exact confidence that was asked for."""
-    asked = result.get("model_error", {}).get("confidence", {}).get("asked")
+    told = result.get("model_error", {}).get("confidence", {})
+    asked = told.get("asked")
     entry = inputs.get("design", {})
     limits = entry.get("within_r_adm_limits")
     if asked is None or limits is None or "on_design_model" in entry or limits[1] >= asked:
         return []
-    return [
-        f"{100 * entry['within_r_adm']:.1f} % of the runs stay within r_adm, where exact: {asked:g} was "
-        "asked for: estimates of records this short scatter more than the asymptotic theory that sizes r_u; "
-        "ask for a little more, or take more samples"
-    ]
+    why = (
+        "alpha was calibrated by simulated experiments, and chance had a part in it: ask for more of them "
+        "(runs)"
+        if "runs" in told
+        else "estimates of records this short scatter more than the asymptotic theory that sizes r_u: leave "
+        "out runs: 0, ask for a little more, or take more samples"
+    )
+    kept = f"{100 * entry['within_r_adm']:.1f} % of the runs stay within r_adm"
+    return [f"{kept}, where exact: {asked:g} was asked for: {why}"]
 
 
 def searched_notes(searched: Mapping[str, int]) -> list[str]:

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from inputdesign_cli.design.loop_error import (
-    LoopErrorProblem,
-    MatrixPlant,
-    MinimumVariance,
-    ModelReference,
-    PowerLimit,
-)
+from inputdesign_cli.design.loop_error import LoopErrorProblem, MinimumVariance, ModelReference, PowerLimit
 from inputdesign_cli.design.loop_error.laws import sensitivity
 from inputdesign_cli.design.loop_error.loss import error_eigenvalues, root_moments
 from inputdesign_cli.plant import Rational, TransferMatrix
@@ -34,7 +28,7 @@ def moved(plant, index, step):
     """The plant with one parameter changed."""
     theta = plant.theta.copy()
     theta[index] += step
-    return MatrixPlant.of(plant.at(theta))
+    return plant.at(theta)
 
 
 @pytest.mark.parametrize("plant", [full_plant(), column().plant], ids=["all polynomials", "column"])

@@ -87,3 +87,19 @@ def test_what_is_not_known_is_not_guessed():
     assert "0.4 where a fraction" in hint
     assert "40 where the unit is percent" in hint
     assert "in s" in hint_of("sample_time", "sample_time: {}", "3 fortnights")
+
+
+def test_a_parameter_tells_by_its_unit_what_it_is():
+    """A parameter may be anything, and an expression is not told the unit of the spec."""
+    plant = "plant: {{parameters: {{T: %s}}, continuous: {{gain: 2, time_constant: %s}}, sample: zoh}}"
+    named, stated = "plant.parameters.T", "plant.continuous.time_constant"
+    assert proposed(hint_of(named, plant % ("{}", "T"), "1.5 h", "min")) == 90
+    assert proposed(hint_of(named, plant % ("{}", "T"), "3 rad/s", "min")) == 180
+    assert proposed(hint_of(named, plant % ("{}", "T"), "1.5 kg", "min")) == 1.5
+    assert "in time_unit: 1.5 if that is h" in hint_of(stated, plant % ("3", "{}"), "1.5 h", "min")
+
+
+def test_a_rate_is_that_of_a_sample():
+    hint = hint_of("limits.rate", "sample_time: 5\nlimits: {{rate: {}}}", "3 V/s")
+    assert "3 V/s times sample_time" in hint
+    assert proposed(hint_of("limits.amplitude", "limits: {{amplitude: {}}}", "3 m/s")) == 3

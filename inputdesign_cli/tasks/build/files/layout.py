@@ -9,13 +9,18 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from inputdesign_cli.specification.yaml.scalars import plain_number
 from inputdesign_cli.tasks.build.files.dates import is_moment
 
 Rows = list[tuple[int, list[str]]]
 
 COMMENTS = ("#", "%", "//")
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
-_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+")
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+", re.ASCII)
+# Numbers with marks between thousands, or in the digits of any script.
+_MARKED = re.compile(r"[-+\u2212]?\d[\d.,'\u2019_\s]*")
+# Numbers below a million in whole numbers, with a mark between thousands, and those that have one.
+_WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,2}(\.\d{3})?)", re.ASCII)
 _LOOKED_AT = 200
 # What may separate fields; None stands for blanks. Of equally good ones the first.
 _SEPARATORS = ("\t", ";", "|", None, ",")
@@ -160,7 +165,13 @@ def table_begins(rows: Rows, separator: str | None) -> int:
 def _of_numbers(row: Sequence[str], comma: bool) -> bool:
     filled = [cell for cell in row if cell.strip()]
     plain = sum(is_plain(cell, comma=comma) for cell in filled)
-    return plain > 0 and len(filled) <= 2 * plain
+    if not plain:  # not to be passed over: the reader of its columns says what is wrong with them
+        return bool(filled) and all(map(_is_marked, filled))
+    return len(filled) <= 2 * plain
+
+
+def _is_marked(cell: str) -> bool:
+    return _MARKED.fullmatch(cell.strip()) is not None
 
 
 def _of_words(row: Sequence[str], width: int, comma: bool) -> bool:
@@ -195,11 +206,27 @@ def headed(rows: Rows, comment: str, separator: str | None) -> tuple[tuple[int, 
         named = [part.strip() for part in (comment.split(separator) if comment else [])]
         return (line, text), named if len(named) == len(first) else [], rows
     units = [cell.strip() for cell in rows[1][1]] if len(rows) > 2 else []
-    wordy = bool(units) and len(units) == len(cells) and not any(is_known(unit) for unit in units if unit)
+    wordy = (
+        bool(units)
+        and len(units) == len(cells)
+        and not any(is_known(unit) or _is_marked(unit) for unit in units if unit)
+    )
     if wordy and any(units) and all(is_known(cell) or is_moment(cell) for cell in rows[2][1]):
         named = [f"{n} ({u})" if u else n for n, u in zip(cells, units, strict=True)]
         return (line, text), named, rows[2:]
     return (line, text), cells, rows[1:]
+
+
+def between_thousands(cells: Sequence[str]) -> int | None:
+    """The first of numbers, such as 1.250, whose point may stand between thousands; None where none may.
+
+    Others, such as 808, have no decimals, and none has one, two or more than three.
+    """
+    written = [cell.strip() for cell in cells if not is_missing(cell)]
+    if not all(map(_WHOLE.fullmatch, written)):
+        return None
+    hundreds = any("." not in cell and len(cell.lstrip("+-")) == 3 for cell in written)
+    return next((i for i, cell in enumerate(cells) if "." in cell), None) if hundreds else None
 
 
 def is_plain(cell: str, *, comma: bool) -> bool:
@@ -221,6 +248,6 @@ def is_missing(text: str) -> bool:
 def is_number(text: str) -> bool:
     """Whether a text is a finite number."""
     try:
-        return math.isfinite(float(text))
+        return math.isfinite(plain_number(text))
     except ValueError:
         return False

@@ -17,6 +17,7 @@ from inputdesign_cli.tasks.build.files.layout import (
     COMMENTS,
     OpenQuoteError,
     Rows,
+    between_thousands,
     decimal_commas,
     headed,
     is_missing,
@@ -67,8 +68,8 @@ def read_text(path: Path, key: str, text: str) -> Sheet:
     if long is not None:
         message = f"line {body[long][0]} has {len(body[long][1])} fields, and the header {width}"
         hint = (
-            "write a name in the header for each column, and numbers with a decimal point: 1.5, not 1,5; or "
-            "separate the columns with semicolons"
+            "write a name in the header for each column, and numbers with a decimal point and nothing "
+            "between thousands: 1234.5, not 1234,5 or 1,234.5; or separate the columns with semicolons"
         )
         raise DataError(sheet.error("data-extra-field", message, hint, long))
     return sheet
@@ -89,12 +90,19 @@ def _leading_comment(lines: Sequence[str]) -> tuple[str, int]:
 
 def _column(cells: list[str]) -> Column:
     try:
+        text = "".join(cells)
+        if "_" in text or not text.isascii():  # what float takes, and is_number does not
+            raise ValueError
         numbers = np.array(cells, dtype=float)
     except ValueError:
         numbers = np.array([float(cell) if is_number(cell) else np.nan for cell in cells])
     unclear = np.flatnonzero(~np.isfinite(numbers))
     numbers[unclear] = np.nan
     fault = next(((int(i), cells[i].strip()) for i in unclear if not is_missing(cells[i])), None)
+    thousand = between_thousands(cells) if fault is None else None
+    if thousand is not None:
+        wrong = "may have a mark between thousands, or three decimals: other cells have none"
+        return Column(numbers, (thousand, cells[thousand].strip()), wrong=wrong)
     moments = None if fault is None else moments_of(cells)
     if moments is None:
         return Column(numbers, fault)

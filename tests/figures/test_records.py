@@ -1,0 +1,68 @@
+"""Signals to be applied, fits and residuals of recorded ones, runs of a study, and the loop."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inputdesign_cli.runs.curves import ErrorBandCurves
+from tests.support.curves import BANDS, CURVES, G, W, Z, lines_by_label
+
+
+def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
+    figure = page(CURVES["long signal"])
+    record, histogram = figure.axes[:2]
+    assert "first 1000 of 3000 samples, 4 of 6 channels" in figure.axes[6].get_xlabel()
+    assert record.lines[0].get_xdata().size == 1000
+    assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
+    figure = page(CURVES["predicted signal"])
+    record, _, below, _ = figure.axes
+    assert record.lines[0].get_drawstyle() == "steps-post"
+    assert (record.get_ylabel(), below.get_ylabel()) == ("valve (%)", "level (m)")
+    band = below.collections[0].get_paths()[0].vertices
+    np.testing.assert_allclose([band[:, 1].min(), band[:, 1].max()], [-1.0, 49.0 + 2.0 * 7.0], atol=1e-9)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == [
+        "to be applied, held between samples",
+        "limits",
+        "± 2 standard deviations of noise since the start",
+        "predicted output, from rest",
+    ]
+
+
+def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(page):
+    upper, lower = page(CURVES["fit"]).axes
+    assert "simulated from u (fit 83.2 %)" in lines_by_label(upper)
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), -0.1)
+    panels = page(CURVES["fit of two outputs"]).axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
+
+
+def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
+    assert [axes.get_title() for axes in page(CURVES["residuals"]).axes] == ["with residual 1", "with u1"]
+    titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
+    assert titles == ["with residual 1", "with residual 2", "with u1", "", "", ""]
+
+
+def test_where_runs_leave_what_is_admitted_is_marked(page):
+    kept, missed = page(CURVES["error bands"]).axes[0], replace(BANDS, r_adm=np.where(W < 1, G, 0.3 * G))
+    assert not any("leave" in label for label in lines_by_label(kept))
+    (axes,) = page(ErrorBandCurves((missed,), "design", 100)).axes
+    (marked,) = [part for label, part in lines_by_label(axes).items() if "leave r_adm" in label]
+    assert marked.get_paths()[0].vertices[:, 0].min() >= 0.99
+    assert lines_by_label(axes)["r_adm, admitted"].get_linestyle() == "--"
+
+
+def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
+    (axes,) = page(CURVES["nyquist"]).axes
+    (discs,) = axes.collections
+    near = Z[150]
+    centre = 0.8 * near**2 / (1 - near)
+    offsets = discs.get_offsets()
+    assert np.hypot(offsets[:, 0] - centre.real, offsets[:, 1] - centre.imag).min() < 1e-9
+    np.testing.assert_allclose(discs.get_widths(), 0.2)
+    assert [circle.get_radius() for circle in axes.patches] == [0.5, 0.5]
+    assert not page(CURVES["nyquist without a bound"]).axes[0].patches

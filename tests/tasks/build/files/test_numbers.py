@@ -1,0 +1,88 @@
+"""Numbers in text are read as what they say, or refused: digits of other scripts, marks between thousands."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.tasks.build.tables import read_columns
+
+SCRIPTS = ["\u0660", "\u06f0", "\u0966", "\uff10", "\U0001d7ce"]  # zeros; their digits follow them
+
+
+def of_script(zero):
+    return str.maketrans({str(n): chr(ord(zero) + n) for n in range(10)})
+
+
+WRITERS = {
+    "plain": lambda x: f"{x:.2f}",
+    "thousands, point": lambda x: f"{x:,.2f}",
+    "whole thousands": lambda x: f"{x:,.0f}",
+    "apostrophes": lambda x: f"{x:,.2f}".replace(",", "'"),
+    "blanks": lambda x: f"{x:,.2f}".replace(",", "\u202f").replace(".", ","),
+    "points, comma": lambda x: f"{x:,.2f}".translate(str.maketrans(",.", ".,")),
+    "whole points": lambda x: f"{x:,.0f}".replace(",", "."),
+    "underscores": lambda x: f"{x:_.2f}",
+    "minus": lambda x: f"{x:.2f}".replace("-", "\u2212"),
+    **{
+        f"script {n}": lambda x, zero=zero: f"{x:.2f}".translate(of_script(zero))
+        for n, zero in enumerate(SCRIPTS)
+    },
+}
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    large=st.lists(st.integers(1000, 9_999_999), min_size=1, max_size=5),
+    small=st.lists(st.integers(-999, -100), min_size=1, max_size=5),
+    kind=st.sampled_from(sorted(WRITERS)),
+    mark=st.sampled_from([",", ";", "\t", "|"]),
+    quoted=st.booleans(),
+    only=st.booleans(),
+)
+def test_a_number_is_what_it_says_or_refused(tmp_path, large, small, kind, mark, quoted, only):
+    """Thousands beside hundreds; in the second column too, or plain numbers there."""
+    values = np.array([*large, *small], dtype=float)
+    cells = [WRITERS[kind](x) for x in values]
+    quote = '"' if quoted else ""
+    rows = [f"{quote}{cell}{quote}{mark}{7 if only else cell}" for cell in cells]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([f"u{mark}y", *rows]) + "\n", encoding="utf-8")
+    try:
+        found = read_columns(path, {"u": "u"}, key="")["u"]
+    except DataError:
+        found = None
+    if found is None:
+        assert kind != "plain"
+    else:
+        np.testing.assert_array_equal(found, values)
+
+
+@pytest.mark.parametrize("cell", ["1_0", "\u0661", "\uff11.5", "1,250.5", "1\u202f250", "\u22121"])
+def test_the_hint_says_how_to_write_it(cell, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(f'u,y\n0.5,1\n"{cell}",2\n', encoding="utf-8")
+    with pytest.raises(DataError, match="is not a finite number") as caught:
+        read_columns(path, {"u": "u"}, key="")
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.location.line == 3
+    assert "digits 0 to 9" in diagnostic.hint
+
+
+@pytest.mark.parametrize(
+    "cells", [("0.125", "100", "7"), ("1.125", "0", "-1.125"), ("1.250", "100.5", "3"), ("100", "2", "3")]
+)
+def test_decimals_stay_decimals(cells, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("u;y\n" + "".join(f"{cell};1\n" for cell in cells))
+    np.testing.assert_array_equal(
+        read_columns(path, {"u": "u"}, key="")["u"], [float(cell) for cell in cells]
+    )
+
+
+def test_a_point_that_may_stand_between_thousands_is_asked_about(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("u;y\n808;1\n1.250;2\n")
+    with pytest.raises(DataError, match=r"'1\.250' in column u may have a mark between thousands") as caught:
+        read_columns(path, {"u": "u"}, key="")
+    assert caught.value.diagnostics[0].location.line == 3

@@ -1,0 +1,158 @@
+"""The closed-loop error of plants in other parameters than coefficients: one design in all words."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, simulate, solve, validate
+from inputdesign_cli.errors import Diagnostic, SpecError
+
+REST = """
+noise: {variance: 0.04}
+experiment: {samples: 500}
+accuracy:
+  closed_loop_error:
+    control: {model_reference: {numerator: [0, 0, 0, 0, 0.2], denominator: [1, -0.8]}}
+    reference: {variance: 1}
+limits: {input_power: 1}
+spectrum: {type: pointwise}
+signal: {samples: 100, candidates: 1}
+"""
+PARAMETERS = "parameters: {K: 2.0, T: 5.0, L: 2.3}"
+IN_S = "continuous: {numerator: [K], denominator: [T, 1], delay: L}, sample: zoh"
+WORDS = [
+    f"{{{PARAMETERS}, {IN_S}}}",
+    "{continuous: {gain: 2, time_constant: 5, dead_time: 2.3}, sample: zoh}",
+    "{continuous: {numerator: [2], denominator: [5, 1], delay: 2.3}, sample: zoh}",
+    f'{{{PARAMETERS}, state_space: {{A: [["-1/T"]], B: [["K/T"]], C: [[1]], delay: L}}, sample: zoh}}',
+    f"{{{PARAMETERS}, B: [0, 0, 0, K*(1 - exp(-(3 - L)/T)), K*(exp(-(3 - L)/T) - exp(-1/T))], "
+    "F: [1, -exp(-1/T)]}",
+]
+EXACT = "accuracy.closed_loop_error.covariance=parametric"
+
+
+def losses(plant, *overrides, rest=REST):
+    """The value of the design, and what the model structure makes of white input."""
+    found = solve(parse_spec(f"plant: {plant}\n{rest}", overrides=overrides)).result
+    return found["objective"]["value"], found["closed_loop_error"]["parametric"]["white"]["value"]
+
+
+def assert_same(found):
+    """A design is as good as its tolerance; what white input gives has no solver in it."""
+    designs, white = np.array(found).T
+    np.testing.assert_allclose(designs, designs[0], rtol=1e-7)
+    np.testing.assert_allclose(white, white[0], rtol=1e-9)
+
+
+def sampled(K, T, L, w):
+    """K exp(-L s) / (T s + 1) behind a hold over one, 2 < L < 3, by its response to a step."""
+    q, E = np.exp(-1j * w), np.exp(-1 / T)
+    late = np.exp(-(3 - L) / T)
+    return K * q**3 * (1 - late + (late - E) * q) / (1 - E * q)
+
+
+@pytest.mark.parametrize("exact", [[], [EXACT]], ids=["asymptotic", "parametric"])
+def test_one_plant_in_five_words_is_one_design(exact):
+    assert_same([losses(plant, *exact) for plant in (WORDS[::2] if exact else WORDS)])
+
+
+@pytest.mark.parametrize(
+    ("known", "free"), [("", [0, 1, 2]), (", known: [L]", [0, 1]), (", known: [K, T]", [2])]
+)
+def test_what_is_known_leaves_no_error(known, free):
+    """tr(W P) from differences of G, and means over a circle of 4096 points."""
+    w = 2 * np.pi * (np.arange(4096) + 0.5) / 4096
+    nominal, step = np.array([2.0, 5.0, 2.3]), 1e-5
+    slopes = [
+        (sampled(*nominal + step * axis, w) - sampled(*nominal - step * axis, w)) / (2 * step)
+        for axis in np.eye(3)[free]
+    ]
+    q = np.exp(-1j * w)
+    T = 0.2 * q**4 / (1 - 0.8 * q)
+    X = [(1 - T) * slope / sampled(*nominal, w) * T for slope in slopes]
+    M, W = (np.array([[np.mean(a * np.conj(b)).real for a in rows] for b in rows]) for rows in (slopes, X))
+    expected = np.trace(np.linalg.solve(M / 0.04, (1 + 0.04) * W))
+    assert losses(f"{{{PARAMETERS}{known}, {IN_S}}}")[1] == pytest.approx(expected, rel=1e-8)
+
+
+def test_the_asymptotic_design_does_not_ask_what_is_known():
+    """The covariance of a model of high order knows no parameters."""
+    free, known = (losses(f"{{{PARAMETERS}{words}, {IN_S}}}") for words in ("", ", known: [L]"))
+    assert known[0] == pytest.approx(free[0], rel=1e-12)
+    assert known[1] < 0.6 * free[1]
+
+
+MATRIX = """
+noise: {variance: [[0.04, 0.01], [0.01, 0.09]]}
+experiment: {samples: 500}
+accuracy: {closed_loop_error: {control: {internal_model: {numerator: [0, 0.3], denominator: [1, -0.7]}},
+  reference: {variance: [1, 2]}}}
+limits: {input_power: [1, 0.5]}
+spectrum: {type: pointwise}
+signal: {samples: 100, candidates: 1}
+"""
+
+
+@pytest.mark.parametrize("exact", [[], [EXACT]], ids=["asymptotic", "parametric"])
+def test_states_of_several_channels(exact):
+    """One input of two acts late; the same entries in s."""
+    parameters = "parameters: {k: 1.5, T: 4.0, c: 0.4}"
+    words = [
+        f"{{{parameters}, sample: zoh, state_space: {{A: [['-1/T', 0], [0, -0.5]], B: [[k/T, 0], [0, 1]], "
+        "C: [[1, c], [0.3, 1]]}}",
+        f"{{{parameters}, sample: zoh, continuous: {{numerator: [[[k], [c]], [[0.3*k], [1]]], "
+        "denominator: [[[T, 1], [1, 0.5]], [[T, 1], [1, 0.5]]]}}",
+    ]
+    assert_same([losses(plant, *exact, rest=MATRIX) for plant in words])
+
+
+@pytest.mark.parametrize(
+    "law", ["{minimum_variance: true}", "{internal_model: {numerator: [0.5], denominator: [1, -0.5]}}"]
+)
+def test_a_gain_is_coloured_noise(law):
+    """x+ = a x + b u + k e is ARMAX with C = 1 + (k - a) q^-1, whose coefficients are as many."""
+    rest = REST.replace("{model_reference: {numerator: [0, 0, 0, 0, 0.2], denominator: [1, -0.8]}}", law)
+    states = (
+        "{parameters: {a: 0.8, b: 0.5, k: 0.3}, "
+        "state_space: {time: discrete, A: [[a]], B: [[b]], C: [[1]], K: [[k]]}}"
+    )
+    armax = rest.replace("{variance: 0.04}", "{C: [1, -0.5], variance: 0.04}")
+    assert_same([losses(states, EXACT, rest=rest), losses("{A: [1, -0.8], B: [0, 0.5]}", EXACT, rest=armax)])
+
+
+def refused(plant: str, *overrides: str, task=validate) -> Diagnostic:
+    with pytest.raises(SpecError) as caught:
+        task(parse_spec(f"plant: {plant}\n{REST}", overrides=list(overrides)))
+    (found,) = caught.value.diagnostics
+    return found
+
+
+ALL_KNOWN = f"{{{PARAMETERS}, known: [K, T, L], {IN_S}}}"
+GAIN = "parameters: {a: 0.5}, state_space: {time: discrete, A: [[a, 0], [0, 0.3]], B: [[1, 0], [0, 1]], "
+
+
+@pytest.mark.parametrize(
+    ("plant", "change", "code", "key"),
+    [
+        (ALL_KNOWN, "noise.variance=0.04", "nothing-to-estimate", "plant.known"),
+        (ALL_KNOWN, "noise.C=[1, 0.3]", "nothing-to-estimate", "plant.known"),
+        (WORDS[0], "noise.drift=true", "not-supported", "noise.drift"),
+        (WORDS[0], "noise={variance: 1, D: [1, -1], known: [d1]}", "not-supported", "noise.D"),
+        (WORDS[0].replace("[T, 1]", "[T, 0]"), "title=x", "not-supported", "plant"),
+        (WORDS[0].replace(", sample: zoh", ""), "title=x", "not-supported", "plant"),
+        (
+            f"{{{GAIN} C: [[1, 0], [0.2, 1]], K: [[0.1, 0], [0, 0.1]]}}}}",
+            "title=x",
+            "not-supported",
+            "plant.state_space.K",
+        ),
+    ],
+)
+def test_what_the_theory_has_no_answer_for(plant, change, code, key):
+    found = refused(plant, change)
+    assert (found.code, found.key) == (code, key)
+
+
+def test_least_squares_estimates_no_named_parameters():
+    found = refused("{parameters: {b: 0.5}, A: [1, -0.3], B: [0, 0, 0, b]}", task=simulate)
+    assert found.code == "not-supported"
+    assert "least squares" in found.message

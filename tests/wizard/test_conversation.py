@@ -1,0 +1,97 @@
+"""Questions that are asked one by one: a bad answer is told at once and asked again, and no other."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import tasks
+from inputdesign_cli.errors import OutputError
+from inputdesign_cli.wizard import conversation
+from inputdesign_cli.wizard.conversation import Conversation
+from inputdesign_cli.wizard.questions import KEYS
+
+GOOD = {
+    "plant": "gain 2, time constant 180 s, dead time 25 s",
+    "wish": "own loop with 6 dB, Kp 1.5, Ti 180",
+    "range": "plus/minus 5 around 40",
+    "time": "20 min",
+    "limits": "none",
+    "noise": "standard deviation 0.2",
+    "drift": "no",
+    "loop": "open",
+    "signals": "any",
+    "converter": "no",
+}
+BAD = {
+    "plant": ["a kettle", "", "step nothing.csv", "nothing.json", "gain 1e999, time constant 3"],
+    "wish": ["happiness", "PI loop with . dB", "own loop with 6 dB, Kp 1e200"],
+    "range": ["a bit", "1e999 to 2", ""],
+    "time": ["soon", "10 s", "1e308 h", "-1 h"],
+    "limits": ["be careful", "rate 0"],
+    "noise": ["little", "standard deviation 1e200", "rest nothing.csv"],
+    "drift": ["perhaps"],
+    "loop": ["closed", "PI Kp 1, Ti 2 parsecs"],
+    "signals": ["sine"],
+    "converter": ["16"],
+}
+
+
+def answered(talk, until=None):
+    """The conversation, answered as in GOOD up to the question of a key."""
+    while (one := talk.question) is not None and one.key != until:
+        assert talk.answer(GOOD[one.key]) is None, one.key
+    return talk
+
+
+def test_every_bad_answer_is_told_by_its_question_which_comes_again(tmp_path):
+    talk = Conversation({}, "x", tmp_path)
+    for key in KEYS:
+        for text in BAD[key]:
+            assert talk.question.key == key
+            (told,) = talk.answer(text).diagnostics
+            assert (told.code, told.key) == ("bad-answer", key), text
+            assert talk.draft is None
+        assert talk.answer(GOOD[key]) is None
+    assert talk.question is None
+    assert talk.draft.spec().accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
+
+
+def test_what_only_all_answers_together_tell_leads_back_to_its_question(tmp_path):
+    """The loop of Skogestad's rule has a peak of 1.59 here: 1 dB cannot be asked of it."""
+    talk = answered(Conversation({"wish": "PI loop with 1 dB"}, "x", tmp_path), "converter")
+    assert talk.answer("no").diagnostics[0].code == "admissible-not-positive"
+    assert (talk.question.key, talk.draft) == ("wish", None)
+    assert talk.answer("PI loop with 6 dB") is None
+    assert talk.draft is not None
+
+
+def test_the_loop_that_a_wish_needs_is_asked_for_by_the_wish(tmp_path):
+    talk = answered(Conversation({"plant": "tank", "wish": "PI loop with 6 dB"}, "x", tmp_path), "loop")
+    told = talk.answer("open")
+    assert "tuning do not know this plant" in str(told)
+    assert talk.question.key == "wish"
+
+
+def test_a_plant_is_understood_once(tmp_path, monkeypatch):
+    """A log takes seconds to be explored."""
+    seen = []
+    real = conversation.understand_plant
+    monkeypatch.setattr(conversation, "understand_plant", lambda *a: (seen.append(a[0]), real(*a))[1])
+    answered(Conversation({}, "x", tmp_path))
+    assert seen == [GOOD["plant"]]
+
+
+def test_a_step_response_stands_beside_the_spec(tmp_path):
+    t = 5.0 * np.arange(400)
+    y = 20 + 20 * np.where(t > 1025, 1 - np.exp(-(t - 1025) / 180), 0)
+    y = y + 0.2 * np.random.default_rng(2).standard_normal(400)
+    u = np.where(t >= 1000, 50.0, 40.0)
+    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), u.tolist(), y.tolist(), strict=True)]
+    (tmp_path / "step.csv").write_text("\n".join(["time,u,y", *rows]))
+    talk = answered(Conversation({"plant": "step step.csv"}, "x", tmp_path))
+    assert (tmp_path / "x-model.yaml").is_file()
+    tasks.validate(talk.draft.spec())
+    talk = answered(Conversation({"plant": "step step.csv"}, "x", tmp_path), "converter")
+    (tmp_path / "x-model.yaml").unlink()
+    (tmp_path / "x-model.yaml").mkdir()
+    with pytest.raises(OutputError):  # no other answer would help
+        talk.answer("no")
