@@ -1,19 +1,21 @@
 """How the time of a design grows with the number of parameters k and of channels.
 
-Four families of random plants, from the spec's words to the design with its proved bound over every
+Families of random plants, from the spec's words to the design with its proved bound over every
 spectrum (no signal):
 
 - output-error plants of order 2, 4, 6, 8 (k = 4 .. 16), |G - G0| held below a constant, FIR spectrum of
   order 40. The rival is what a user writes in forty lines: plain cvxpy with Clarabel in whitened
   coordinates, an exchange on 8001 frequencies that adds every local maximum, the FIR optimum alone, without
   a bound. Its plant, its gradients and its integrals are its own; they are outside of its time.
+- output-error plants of order 2 with FIR spectra of order 5 to 300, against the same rival;
 - the same with Box-Jenkins noise of order 6 and 10 (k = 24, 40), ours alone;
 - p x p plants with entries b q^-1 / (1 - f q^-1), p outputs with independent white noise, D-optimal
   within a limit on the input power, FIR of order 15; criteria A and E;
 - the same plants with every entry held to a relative model error, least cost.
 
-Times are of processor, one thread, in one run: only ratios mean anything. Memory is the largest ever
-of the process. `--quick` takes one plant of each row and leaves out the largest.
+Times are of processor, one thread, each family in one run: only ratios mean anything. What `--only` leaves
+out stays in the file as it was. Memory is the largest ever of the process. `--quick` takes one plant of each
+row and leaves out the largest.
 
     python benchmarks/scaling.py [--quick] [--only NAME ...] [--json FILE] [--plot FILE]
 """
@@ -75,7 +77,7 @@ def output_error(seed: int, order: int) -> tuple[np.ndarray, np.ndarray]:
     return B / size, F
 
 
-def output_error_spec(seed: int, order: int, *, noise_order: int = 0) -> Spec:
+def output_error_spec(seed: int, order: int, *, noise_order: int = 0, m: int = 40) -> Spec:
     """An absolute bound on |G - G0| at every frequency."""
     B, F = output_error(seed, order)
     noise: dict[str, object] = {"variance": 0.01}
@@ -88,7 +90,7 @@ def output_error_spec(seed: int, order: int, *, noise_order: int = 0) -> Spec:
         "experiment": {"samples": SAMPLES},
         "cost": {"input_power": 1},
         "accuracy": {"model_error": {"absolute": ADMISSIBLE, "alpha": 2.0}},
-        "spectrum": {"type": "fir", "order": 40},
+        "spectrum": {"type": "fir", "order": m},
     }
 
 
@@ -130,10 +132,10 @@ def ours(spec: Spec) -> tuple[Design, Row]:
     }
 
 
-def naive(seed: int, order: int) -> tuple[float, float]:
+def naive(seed: int, order: int, m: int = 40) -> tuple[float, float]:
     """The forty lines of cvxpy: the FIR optimum on 8001 frequencies and its processor time."""
     B, F = output_error(seed, order)
-    m, number = 40, 1 << 14
+    number = 1 << 14
     # Gradients of the prediction on a fine grid, and from it the M_i by the rectangle rule.
     w = 2 * np.pi * np.arange(number) / number
     lags, sigma = np.arange(m + 1), 0.1
@@ -197,6 +199,22 @@ def output_error_rows(*, quick: bool) -> Iterator[Row]:
             }
 
 
+def spectrum_order_rows(*, quick: bool) -> Iterator[Row]:
+    """m = 5 .. 300 at k = 4, against the naive loop."""
+    for m in (5, 20) if quick else (5, 10, 20, 40, 80, 160, 300):
+        for seed in range(1 if quick or m > 80 else 3):  # the naive loop takes its time
+            design, row = ours(output_error_spec(seed, 2, m=m))
+            on_grid, seconds = naive(seed, 2, m)
+            yield row | {
+                "name": "spectrum order",
+                "size": m,
+                "seed": seed,
+                "naive_seconds": seconds,
+                "share": float(row["seconds"]) / seconds,
+                "difference": on_grid / design.result.objective - 1.0,
+            }
+
+
 def box_jenkins_rows(*, quick: bool) -> Iterator[Row]:
     """k = 24 and 40."""
     for order in (6,) if quick else (6, 10):
@@ -227,6 +245,8 @@ def rows_of(name: str, *, quick: bool) -> Iterator[Row]:
     small = (2, 3)
     if name == "output-error":
         return output_error_rows(quick=quick)
+    if name == "spectrum-order":
+        return spectrum_order_rows(quick=quick)
     if name == "box-jenkins":
         return box_jenkins_rows(quick=quick)
     if name == "model-error":
@@ -235,7 +255,7 @@ def rows_of(name: str, *, quick: bool) -> Iterator[Row]:
     return criterion_rows(name, sizes)
 
 
-NAMES = ("output-error", "box-jenkins", "D", "A", "E", "model-error")
+NAMES = ("output-error", "spectrum-order", "box-jenkins", "D", "A", "E", "model-error")
 
 
 def exponent(rows: list[Row]) -> float:
@@ -263,28 +283,44 @@ def figures(rows: list[Row]) -> dict[str, float]:
     return found
 
 
+def middle(rows: list[Row], of: str, against: str) -> tuple[list[int], list[float]]:
+    """The sizes, and the median of the times of each."""
+    sizes = sorted({int(row[against]) for row in rows})
+    return sizes, [statistics.median(float(r[of]) for r in rows if r[against] == size) for size in sizes]
+
+
 def plot(rows: list[Row], path: Path) -> None:
-    """Time against k, a line for each family."""
+    """Time against k, a line for each family, and against the order m of the spectrum."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
-    for name in dict.fromkeys(str(row["name"]) for row in rows):
+    figure, (by_k, by_m) = plt.subplots(1, 2, figsize=(9.6, 4.0), layout="constrained", sharey=True)
+    families = dict.fromkeys(str(row["name"]) for row in rows)
+    for name in families:
         mine = [row for row in rows if row["name"] == name]
-        k = sorted({int(row["k"]) for row in mine})
-        middle = [statistics.median(float(r["seconds"]) for r in mine if r["k"] == size) for size in k]
-        axes.loglog(k, middle, "o-", label=name)
-    rival = [row for row in rows if "naive_seconds" in row]
-    k = sorted({int(row["k"]) for row in rival})
-    slow = [statistics.median(float(r["naive_seconds"]) for r in rival if r["k"] == size) for size in k]
-    if k:
-        axes.loglog(k, slow, "s--", color="0.5", label="naive loop (output error)")
-    ticks = [4, 8, 16, 32, 64, 128]
-    axes.set_xticks(ticks, labels=[str(tick) for tick in ticks])
-    axes.minorticks_off()
-    axes.set_xlabel("number of parameters k")
-    axes.set_ylabel("processor time [s]")
-    axes.legend(fontsize="small")
+        axes, against = (by_m, "size") if name == "spectrum order" else (by_k, "k")
+        axes.loglog(
+            *middle(mine, "seconds", against), "o-", label="output error, k = 4" if axes is by_m else name
+        )
+        if name in ("output error", "spectrum order"):
+            axes.loglog(
+                *middle(mine, "naive_seconds", against), "s--", color="0.5", label="naive loop for it"
+            )
+    for axes, ticks in ((by_k, [4, 8, 16, 32, 64, 128]), (by_m, [5, 10, 20, 40, 80, 160, 300])):
+        axes.set_xticks(ticks, labels=[str(tick) for tick in ticks])
+        axes.minorticks_off()
+        axes.legend(fontsize="small")
+    by_k.set_xlabel("number of parameters k")
+    by_m.set_xlabel("order m of the FIR spectrum")
+    by_k.set_ylabel("processor time [s]")
     figure.savefig(path)
+
+
+def left_as_they_were(path: Path, run: set[str]) -> list[Row]:
+    """The rows of a file whose families are not run again."""
+    if not path.exists():
+        return []
+    rows: list[Row] = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    return [row for row in rows if row["name"] not in run]
 
 
 def main() -> int:
@@ -293,7 +329,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="one plant of each row, none of the largest")
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("--json", type=Path, default=ROOT / "benchmarks" / "scaling.json")
-    parser.add_argument("--plot", type=Path, help="write a plot of time against k")
+    parser.add_argument("--plot", type=Path, help="write a plot of time against k and m")
     arguments = parser.parse_args()
     ours(output_error_spec(0, 1))  # imports and first calls
     rows: list[Row] = []
@@ -311,6 +347,7 @@ def main() -> int:
                 f"  {row['memory_gib']:.2f} GiB{'' if close else '  DISAGREE'}",
                 flush=True,
             )
+    rows += left_as_they_were(arguments.json, {str(row["name"]) for row in rows})
     report = {"rows": rows, "figures": figures(rows)}
     for text, value in report["figures"].items():
         print(f"{text}: {value:.3f}")

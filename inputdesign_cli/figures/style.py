@@ -104,14 +104,16 @@ def rendered(
         page = painted(paint, NARROW if narrow else SIZE)
         for axes in page.axes:
             _strokes(axes)
+        # Without a date and with ids that do not change, the same figure is the same file.
         if file_type == "png":
             FigureCanvasAgg(page).print_png(buffer)
+        elif file_type == "svg":  # by its own canvas: `print_figure` lays a page out and draws it twice
+            from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+            FigureCanvasSVG(page).print_svg(buffer, metadata={"Date": None, "Creator": None})
         else:
-            # Without a date and with ids that do not change, the same figure is the same file.
-            nothing = {"Date": None} if file_type == "svg" else {"CreationDate": None, "Producer": None}
-            FigureCanvasAgg(page).print_figure(
-                buffer, format=file_type, metadata={**nothing, "Creator": None}
-            )
+            nothing = {"CreationDate": None, "Producer": None, "Creator": None}
+            FigureCanvasAgg(page).print_figure(buffer, format=file_type, metadata=nothing)
     return buffer.getvalue()
 
 

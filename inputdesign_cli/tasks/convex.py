@@ -130,7 +130,8 @@ class ConvexTask:
                 None, self.record, done.design, notes=(no_record_in_time(self.record.settings.candidates),)
             )
         record = made.record
-        tables, curves = self._illustrations(done, record, result)
+        known = self._known(done, record)
+        tables, curves = self._illustrations(done, record, result, known)
         if done.plants is not None:
             robust = robust_result(done, done.plants)
             result["robust"] = robust.entry
@@ -138,14 +139,13 @@ class ConvexTask:
             notes += robust.notes
         files: dict[str, bytes] = {}
         if record is not None:
-            result["signal"] = self._signal_entry(done, made, record)
+            result["signal"] = self._signal_entry(done, made, record, known)
             drawn = signal_curves(made.request, self.header.units, done.experiment, record)
             tables, curves = tables | drawn[0], curves | {"signal": drawn[1]}
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
             taken = result.get("signal", {}).get("of_limits", {})
             notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record, taken)]
-            known = self._known(done, record)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
                 asked, step = done.problem.requirements, self.record.step
@@ -280,7 +280,9 @@ class ConvexTask:
             else ""
         )
 
-    def _signal_entry(self, done: Designed, made: Made, record: Record) -> dict[str, Json]:
+    def _signal_entry(
+        self, done: Designed, made: Made, record: Record, known: Array | None
+    ) -> dict[str, Json]:
         design = made.design
         entry = signal_entry(
             made.request,
@@ -291,13 +293,12 @@ class ConvexTask:
             designed=done.information if design is done.design else design.result.information,
             spectrum=designed_spectrum(made.request, design, done.experiment.inputs),
         )
-        known = self._known(done, record)
         if self.exact is not None and known is not None:
             entry["confidence"] = covered(self.exact.of_record(done, record, known))
         return entry | made.entry
 
     def _illustrations(
-        self, done: Designed, record: Record | None, result: Result
+        self, done: Designed, record: Record | None, result: Result, known: Array | None
     ) -> tuple[dict[str, Table], dict[str, Curves]]:
         """Tables and curves of the spectrum, of r_u and of the proof."""
         design, units = done.design, self.header.units
@@ -323,7 +324,7 @@ class ConvexTask:
                 white=white,
                 equal=equal_white(design, done.experiment.samples, result["baseline"]["white"]["ratio"]),
                 white_labels=white_labels(result),
-                record=self._known(done, record),
+                record=known,
                 stated=bool(errors),
                 active=active,
             )
