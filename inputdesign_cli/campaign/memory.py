@@ -19,7 +19,21 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
+from math import isfinite
 from pathlib import Path
+from typing import Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+)
 
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.regular_file import read_regular
@@ -94,28 +108,80 @@ def read_memory(directory: Path) -> Memory:
             f"the campaign in {directory} has version {campaign.get('version')}, and this is {VERSION}",
             hint="go on with the version of idesign that began it, which result.json tells under environment",
         )
-    if not _whole(campaign):
+    names = result.get("files")
+    try:
+        found = _Campaign.model_validate(campaign)
+    except ValidationError:
+        found = None
+    if found is None or not isinstance(names, list):
         raise unreadable(directory / RESULT, "its campaign is not what idesign writes")
     with output_errors(directory):
-        names = [name for name in result["files"] if _KEPT.fullmatch(name)]
-        files = {name: read_regular(directory / name) for name in names}
+        kept = [name for name in names if isinstance(name, str) and _KEPT.fullmatch(name)]
+        files = {name: read_regular(directory / name) for name in kept}
         spec = read_regular(directory / SPEC).decode("utf-8")
+    if not found.fits(files):
+        raise unreadable(directory / RESULT, "its campaign does not fit the plans and records beside it")
     origin = tuple(map(str, result.get("made_from", ())))
     return Memory(directory, campaign, spec, str(campaign["time_unit"]), origin, files)
 
 
-def _whole(campaign: Mapping[str, Json]) -> bool:
-    """Whether everything is there that the next decision goes by."""
+class _Kept(BaseModel):
+    """Of what idesign writes, what the next decision goes by."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
+
+
+class _Record(_Kept):
+    file: str
+    given: str
+    plan: str
+    withdrawn: bool
+    samples: PositiveInt
+    energy: NonNegativeFloat = Field(allow_inf_nan=False)
+
+
+class _Plan(_Kept):
+    file: str
+    samples: PositiveInt
+    power: NonNegativeFloat = Field(allow_inf_nan=False)
+    offset: list[FiniteFloat]
+
+
+class _Round(_Kept):
+    state: Literal["running", "stopped", "missed", "undecided"]
+    plan: _Plan | None = None
+    estimate: dict[str, FiniteFloat] = {}
+
+
+class _Campaign(_Kept):
+    state: Literal["running", "stopped", "missed", "undecided"]
+    folder: str
+    time_unit: str
+    records: list[_Record]
+    rounds: list[_Round] = Field(min_length=1)
+    last: dict[str, FiniteFloat] | None = None
+    first_cost: PositiveFloat | None = Field(default=None, allow_inf_nan=False)
+
+    def fits(self, files: Mapping[str, bytes]) -> bool:
+        """Whether all files are there that it speaks of, plans as long as what was applied of them."""
+        plans = [(record.plan, record.samples) for record in self.records]
+        due = self.rounds[-1].plan
+        plans += [] if due is None else [(due.file, due.samples)]
+        estimated = [set(each.estimate) for each in self.rounds if each.estimate]
+        return (
+            all(record.file in files for record in self.records)
+            and all(name in files and _rows(files[name]) >= samples for name, samples in plans)
+            and (self.last is None or set(self.last) in estimated)
+        )
+
+
+def _rows(content: bytes) -> int:
+    """Of a table of numbers; -1 where it is none."""
     try:
-        rounds, records = campaign["rounds"], campaign["records"]
-        texts = (campaign["state"], campaign["folder"], campaign["time_unit"], rounds[-1]["state"])
-        told = [(r["file"], r["given"], r["plan"], bool(r["withdrawn"])) for r in records]
-        sizes = [(int(record["samples"]), float(record["energy"])) for record in records]
-        plan = rounds[-1].get("plan")
-        wanted = [] if plan is None else [plan[key] for key in ("file", "samples", "power", "offset")]
-    except (LookupError, TypeError, ValueError, AttributeError):
-        return False
-    return all(isinstance(text, str) for text in texts) and len(told) == len(sizes) and None not in wanted
+        rows = [[float(cell) for cell in row.split(",")] for row in content.decode().splitlines()[1:]]
+    except ValueError:
+        return -1
+    return len(rows) if all(map(isfinite, chain.from_iterable(rows))) else -1
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.campaign.memory import VERSION, Memory
 from inputdesign_cli.campaign.pictures import history
@@ -58,7 +59,7 @@ def advanced(
     Raises:
         DataError: `campaign-over`; `record-too-long`, `record-other-scale`; what is wrong with a record.
     """
-    records, files = memory.records, dict(memory.files)
+    records, files, notes = memory.records, dict(memory.files), list[str]()
     if given is not None and part is not None:
         entry = _accepted(memory, given, part, unlike=unlike)
         name, text = f"record_{len(records) + 1:02d}", csv_text(part.table)
@@ -66,7 +67,23 @@ def advanced(
         files[f"{name}.csv"] = text.encode()
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
         records.append({"file": f"{name}.csv", "given": given.name, **entry})
-    return _again(decide, memory, records, files)
+        notes = [*part.notes, *_unlike(entry)]
+    decided = _again(decide, memory, records, files)
+    if not notes:
+        return decided
+    told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
+    return replace(decided, result={**decided.result, "notes": list(told)})
+
+
+def _unlike(entry: Mapping[str, Json]) -> list[str]:
+    """That a record is hardly that of its plan."""
+    if abs(entry.get("likeness", 1.0)) >= _UNLIKE:
+        return []
+    return [
+        f"what was applied is hardly {entry['plan']} (correlation {entry['likeness']:.2f}): is it the record "
+        "of another part, or are rows missing at its start? Withdraw it with --withdraw if so; the estimate "
+        "goes by what was recorded"
+    ]
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
@@ -160,18 +177,33 @@ def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> dict[
         return entry | {"energy": part.samples * plan["power"]}
     offset = np.array(plan["offset"], dtype=float)
     path = memory.directory / plan["file"]
-    wanted = np.stack(list(read_csv(path).values())[1:], axis=1)[: part.samples] - offset
+    whole = np.stack(list(read_csv(path).values())[1:], axis=1) - offset
     applied = part.excitation - offset
-    scale, likeness = _compared(wanted, applied)
-    if likeness > _LIKE and abs(scale - 1.0) > _OFF and not unlike:
+    begins = _begins(whole, applied, part.rows)
+    scale, likeness = _compared(whole[begins + part.rows], applied)
+    samples = begins + part.samples
+    entry |= {"samples": samples}
+    if abs(likeness) > _LIKE and abs(scale - 1.0) > _OFF and not unlike:
         raise DataError.because(
             "record-other-scale",
             f"{given.name} was applied at {scale:.4g} times the scale of {plan['file']}",
             hint="mend the column if it is in another unit; if it was really applied so, say "
             "--as-applied: the estimate goes by what was recorded",
         )
-    entry |= {"scale": scale} if likeness > _LIKE else {}
-    return entry | {"energy": float(np.sum(applied**2)), "likeness": likeness}
+    entry |= {"scale": scale} if abs(likeness) > _LIKE else {}
+    energy = float(np.sum(applied**2)) * samples / len(part.rows)
+    return entry | {"energy": energy, "likeness": likeness}
+
+
+def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
+    """The sample of the plan (n, r) that a record (m, r) of these `rows` begins with, if not the first."""
+
+    def likeness(start: int) -> float:
+        return abs(_compared(plan[start + rows], applied)[1])
+
+    starts = range(len(plan) - int(rows[-1]))
+    best = max(starts, key=likeness)
+    return best if likeness(0) <= _LIKE < likeness(best) else 0
 
 
 def _check_new(

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from inputdesign_cli.errors import STANDARD_INPUT, DataError, OutputError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.runs.record import RESULT, SPEC, load_result, owned_files
+from inputdesign_cli.runs.record import RESULT, SIGNAL, SPEC, load_result, owned_files
 from inputdesign_cli.runs.results import Json
 
 
@@ -134,6 +134,14 @@ def not_a_run(foreign: Sequence[str], directory: Path) -> OutputError:
     return OutputError.because("output-not-a-run", message, hint)
 
 
+def _changed(path: Path, known: Json) -> bool:
+    """Whether a file is there that is not the one of this SHA-256; False where none is known."""
+    try:
+        return known is not None and hashlib.sha256(read_regular(path)).hexdigest() != known
+    except OSError:
+        return False
+
+
 def _holds(path: Path, text: str) -> bool:
     try:
         return read_regular(path) == text.encode(errors="backslashreplace")
@@ -151,8 +159,8 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
         shown: how the user calls it.
 
     Raises:
-        OutputError: `output-other-run`; `output-spec-changed`, the user has worked on `spec.yaml` there;
-            `campaign-exists`, its records would be lost.
+        OutputError: `output-other-run`; `output-spec-changed` and `output-signal-changed`, the user has
+            worked on `spec.yaml` or `signal.csv` there; `campaign-exists`, its records would be lost.
     """
     try:
         result = load_result(target)
@@ -173,6 +181,12 @@ def check_origin(origin: Origin, spec: str, target: Path, *, shown: Path) -> Non
         message = f"{shown / SPEC} has been changed since its run was written, and would be lost"
         hint = "solve that file, choose another directory with -o, or give up the changes with --overwrite"
         raise OutputError.because("output-spec-changed", message, hint)
+    if _changed(target / SIGNAL, result.get("signal_sha256")):
+        raise OutputError.because(
+            "output-signal-changed",
+            f"{shown / SIGNAL} has been changed since its run was written, and would be lost",
+            "move it away if it is a record, choose another directory with -o, or give it up by --overwrite",
+        )
     ours, theirs = origin.seen_from(target), result.get("made_from")
     known = theirs if isinstance(theirs, list) else []
     if known[:1] != [SPEC] and origin.asked:  # or else spec.yaml is the user's own text

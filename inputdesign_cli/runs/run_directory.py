@@ -17,7 +17,7 @@ from types import MappingProxyType
 from inputdesign_cli.errors import DataError, OutputError
 from inputdesign_cli.runs.origin import Origin, check_directory, check_origin, digest, not_a_run
 from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.record import RESULT, SPEC, load_result, owned_files
+from inputdesign_cli.runs.record import RESULT, SIGNAL, SPEC, load_result, owned_files
 from inputdesign_cli.runs.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.text_formats import csv_text, json_text, plain
@@ -63,7 +63,7 @@ def write_run(
     Raises:
         OutputError: `output-not-a-directory`, `output-not-writable`, `output-full`, `output-not-a-run` (a
             file of the user's would be overwritten), `output-other-run`, `output-spec-changed`,
-            `output-busy`.
+            `output-signal-changed`, `output-busy`.
     """
     result = finished_result(results)
     with output_errors(directory):
@@ -154,7 +154,8 @@ def _write_files(
     for name, content in contents.items():
         (folder / name).write_bytes(content)
     names = [*texts, *contents]
-    _write(folder / RESULT, json_text({**result, "files": names}))
+    told = {"signal_sha256": digest(texts[SIGNAL])} if SIGNAL in texts else {}
+    _write(folder / RESULT, json_text({**result, **told, "files": names}))
     names.append(RESULT)
     for name in names:
         sync(folder / name)

@@ -56,18 +56,20 @@ def best_record(
     bounds: Bounds | None = None,
     *,
     first: bool = False,
+    limiting: FiniteRecord | None = None,
 ) -> Record:
     """The best of several records of a designed spectrum, each from its own stream of the seed.
 
     Args:
         plant: for records of the length of the generator's.
         first: whether the first that meets the target is enough.
+        limiting: the plants at which limits on single samples hold (default: those of `plant`).
 
     Raises:
         OutOfTimeError: the time limit passed before the first was made.
     """
     bounds, settings = bounds or Bounds(), generator.settings
-    limiter = limiter_of(plant, settings, bounds)
+    limiter = limiter_of(limiting or plant, settings, bounds)
     candidates = _Candidates(generator, limiter, Evaluator(plant, target, bounds.powers))
     best = candidates.record(_stream(settings.seed, 0))
     for number in range(1, max(settings.candidates, settings.most_candidates)):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import information_of_data
@@ -96,16 +97,18 @@ class Part:
     Attributes:
         table: times, inputs, outputs and, in a loop, the reference as they are kept.
         excitation: (n, r), what was applied; None where the file does not tell it.
+        rows: (n,), the numbers of the samples from the first one on; those without values are left out.
     """
 
     table: Table
     excitation: Array | None
+    rows: NDArray[np.int64]
     notes: tuple[str, ...]
 
     @property
     def samples(self) -> int:
-        """How many there are."""
-        return len(next(iter(self.table.columns.values())))
+        """How many were applied, to the last that is known."""
+        return int(self.rows[-1]) + 1
 
 
 def decide(task: Rounds, past: Past) -> Decision:
@@ -165,7 +168,14 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
     if data.r is not None:
         columns |= {f"r{j + 1}": values for j, values in enumerate(data.r.T)}
     applied = data.r if units.closed_loop else inputs
-    return Part(Table(columns), applied, data.notes)
+    return Part(Table(columns), applied, _numbered(data.time), data.notes)
+
+
+def _numbered(time: Array) -> NDArray[np.int64]:
+    """(n,): the times (n,) counted in samples from the first."""
+    if time.size < 2:
+        return np.zeros(time.size, dtype=np.int64)
+    return np.rint((time - time[0]) / np.median(np.diff(time))).astype(np.int64)
 
 
 def _part(task: Rounds, plan: Planned, done: int) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -171,22 +171,36 @@ def make_record(
 
     limited = partial(limited_responses, experiment, bounds, request.step, settings.hold)
     generator = SignalGenerator(spectrum, settings, samples, request.band, limited)
-    numbers = _binding(design)
+    others = {n: FiniteRecord(plant, samples, request.step) for n, plant in enumerate(plants)}
+
+    def beyond_peaks(record: Array, which: Iterable[int]) -> list[int]:
+        return _worst_few({n: peak_share(others[n], bounds, record) for n in which}, MET)
+
+    numbers, limiting = _binding(design), [0]
+    if len(plants) > 1 and bounds.hard:  # those that answer most to one record do so to others
+        values = generator.values(np.random.default_rng(settings.seed))
+        limiting += beyond_peaks(np.repeat(values, settings.hold, axis=0), range(1, len(plants)))
+
+    def together(which: Sequence[int]) -> FiniteRecords:
+        return FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in which if n))
+
     while True:
-        at = FiniteRecords(experiment, samples, request.step, others=tuple(plants[n] for n in numbers if n))
-        record = best_record(generator, at, target_at(numbers), bounds, first=first)
+        at, target = together(numbers), target_at(numbers)
+        record = best_record(generator, at, target, bounds, first=first, limiting=together(limiting))
         least = max(record.worst_ratio, MET) if meets else record.worst_ratio
         left = [n for n in range(len(plants)) if n not in numbers]
-        others = {n: FiniteRecord(plants[n], samples, request.step) for n in left}
-        ratios = {n: _ratio_at(others[n], scores[n], record) for n in left}
-        shares = {n: _share(others[n], bounds, record) for n in left}
-        missed = [n for n in left if ratios[n] > least]
-        beyond = [n for n in left if shares[n] > MET]
-        if not (missed or beyond):
+        missed = _worst_few({n: _ratio_at(others[n], scores[n], record) for n in left}, least)
+        beyond = _worst_few({n: _power_share(others[n], upper, record) for n in left if n not in missed}, MET)
+        higher = beyond_peaks(record.samples, [n for n in others if n not in limiting])
+        if not (missed or beyond or higher):
             return record
-        # What serves the worst few serves most of the others.
-        worst_few = sorted(missed, key=lambda n: -ratios[n])[:FEW]
-        numbers += [*worst_few, *sorted(set(beyond) - set(worst_few), key=lambda n: -shares[n])[:FEW]]
+        numbers += [*missed, *beyond]
+        limiting += higher
+
+
+def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:
+    """The numbers of the largest that are larger: what serves these serves most of the others."""
+    return sorted((n for n, figure in figures.items() if figure > most), key=lambda n: -figures[n])[:FEW]
 
 
 def _binding(design: Design) -> list[int]:
@@ -203,19 +217,21 @@ def _ratio_at(plant: FiniteRecord, score: Callable[[Array], float], record: Reco
         return np.inf
 
 
-def _share(plant: FiniteRecord, bounds: Bounds, record: Record) -> float:
-    """The largest share of a limit that a record uses at one plant, where the plant takes part."""
+def _power_share(
+    plant: FiniteRecord, limits: Sequence[tuple[PowerKind, int | None, float]], record: Record
+) -> float:
+    """The largest share of a limit on powers that a record uses at one plant, where the plant takes part."""
     powers = {
         kind: plant.mean_squares(kind, record.samples)
-        for kind, _, _ in bounds.powers
+        for kind, _, _ in limits
         if plant.experiment.depends_on_plant(kind)
     }
     used = (
         float(powers[kind].sum() if channel is None else powers[kind][channel]) / most
-        for kind, channel, most in bounds.powers
+        for kind, channel, most in limits
         if kind in powers
     )
-    return max([peak_share(plant, bounds, record.samples), *used])
+    return max(used, default=0.0)
 
 
 def as_long(request: RecordRequest, experiment: Experiment) -> int | None:

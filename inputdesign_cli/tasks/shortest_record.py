@@ -19,6 +19,7 @@ _GROWTH = 1.03
 _FAR = 1.5
 _FINE = 0.01
 _LENGTHS = 24
+_FALLS = 0.9  # of what seemed to be needed before
 _BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
 # A way that missed nearby, and by so much, is not tried: other phases change a ratio by less.
 _NEARBY, _HOPELESS = 1.2, 1.15
@@ -83,9 +84,10 @@ class ShortestRecord:
                 lengths += 1
                 found = self._met(high)
                 if found is None:
+                    before, low = self.needed if lengths > 1 else np.inf, high
                     self.needed = min((reach(record) for record in self._missed.values()), default=high)
-                    low = high
-                    if self.needed > _BEYOND * self.longest:
+                    # Records shorter than what the plant remembers promise far less than longer ones keep.
+                    if self.needed > max(_BEYOND * self.longest, _FALLS * before):
                         return None
             while found is not None and high - low > max(_FINE * high, self.block) and lengths < _LENGTHS:
                 lengths += 1

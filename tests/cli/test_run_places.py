@@ -1,5 +1,6 @@
 """Where runs go: none is lost to one of another spec, and a spec that is worked on is not overwritten."""
 
+import hashlib
 import io
 import json
 import shutil
@@ -86,6 +87,20 @@ def test_a_run_without_a_record_of_its_spec_is_kept(analyse, tmp_path):
     for record in (None, 7, "a.yaml", {}, [7]):
         result.write_text(json.dumps(json.loads(result.read_text()) | {"made_from": record}))
         assert analyse(spec) == (2, "output-other-run")
+
+
+def test_a_record_in_place_of_the_signal_is_kept(analyse, tmp_path):
+    spec = write(tmp_path / "a.yaml", "one")
+    result = tmp_path / "r" / "result.json"
+    assert analyse(spec, "-o", "r") == (0, "")
+    written = (tmp_path / "r" / "signal.csv").read_bytes()
+    assert json.loads(result.read_text())["signal_sha256"] == hashlib.sha256(written).hexdigest()
+    assert analyse(spec, "-o", "r") == (0, "")  # as it was written
+    (tmp_path / "r" / "signal.csv").write_text("time,u1,y1\n0,1,2\n")
+    assert analyse(spec, "-o", "r") == (2, "output-signal-changed")
+    assert (tmp_path / "r" / "signal.csv").read_text().startswith("time,u1,y1")
+    assert analyse(spec, "-o", "r", "--overwrite") == (0, "")
+    assert (tmp_path / "r" / "signal.csv").read_bytes() == written
 
 
 def test_changes_of_the_spec_in_the_run_directory_are_kept(analyse, tmp_path):

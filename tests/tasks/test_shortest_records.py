@@ -1,7 +1,7 @@
 """The shortest record within limits on single samples: solving at shorter lengths finds none that meets."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from unittest.mock import Mock
 
 import numpy as np
@@ -132,3 +132,18 @@ def test_a_search_ends_at_the_longest_record_and_with_its_time():
     found = cut.found(4)
     assert found is not None
     assert found >= 5000
+
+
+class Slow(Ways):
+    """Of a plant that hardly answers within the first samples: short records promise far too little."""
+
+    def record(self, number: int, samples: int) -> Record:
+        found = super().record(number, samples)
+        return replace(found, worst_ratio=found.worst_ratio * (1000.0 if samples < 30 else 1.0))
+
+
+@pytest.mark.parametrize("start", [3, 8, 20])
+def test_records_too_short_to_tell_do_not_end_the_search(start):
+    found = Slow([48]).found(start, longest=20_000)
+    assert found is not None
+    assert 48 <= found <= 49

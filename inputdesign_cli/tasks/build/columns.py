@@ -62,7 +62,8 @@ def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
     if len(timed) > 1:
         listed = f": {', '.join(timed)}" if sheet.shown else ""
         message = f"{sheet.path.name} has several columns of times{listed}"
-        hint = f"say which one counts: --columns time={timed[0] if sheet.shown else 'NAME'}"
+        which = timed[0] if timed.count(timed[0]) == 1 else str(sheet.header.index(timed[0]) + 1)
+        hint = f"say which one counts: --columns time={which if sheet.shown else 'NAME'}"
         raise DataError(sheet.error("data-missing-column", message, hint))
     return {"time": timed[0]} if timed else {}
 

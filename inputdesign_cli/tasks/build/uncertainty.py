@@ -136,7 +136,7 @@ def farthest_radius(spec: Spec, experiment: Experiment) -> float:
     if own > within:
         raise spec.complain(
             "no-stable-plant",
-            f"the nominal plant itself has a pole at radius {own:.6g}",
+            f"the nominal model itself has a pole, or a zero of its noise, at radius {own:.6g}",
             hint=f"write {0.5 * (1.0 + own):.6g}, or leave it out",
             key=f"{_KEY}.stable_within",
         )
