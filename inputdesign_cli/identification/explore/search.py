@@ -236,7 +236,7 @@ def explore_structure(
     penalty = np.log(samples) / samples
     near = min(quick, key=lambda n: np.log(max(quick[n].loss, 1e-300)) + (2 * n + 2) * penalty)
     resting = {n: from_rest(first, found, max(n, 2)) for n, found in quick.items()}
-    late = max(quick[near].delays)
+    late = max(max(found.delays) for found in quick.values())
     parts = _Parts(first, second, feedback, quick, resting, late)
 
     def judged(tried: Iterable[Shape]) -> list[Candidate]:
