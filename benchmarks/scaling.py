@@ -29,7 +29,6 @@ import resource
 import statistics
 import sys
 import time
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -37,8 +36,8 @@ from inputdesign_cli.compute.threads import ONE_THREAD
 
 os.environ.update(ONE_THREAD | os.environ)  # as the command line does, before numpy is imported
 
-import cvxpy as cp
 import numpy as np
+from rivals.naive_exchange import GRID, naive
 
 from inputdesign_cli.design.convex.designs import Design, solve_design
 from inputdesign_cli.specification import parse_spec
@@ -47,7 +46,6 @@ from inputdesign_cli.tasks.build.task import build_task
 ROOT = Path(__file__).parent.parent
 TOLERANCE = 1e-7
 SAMPLES = 1000
-GRID = np.linspace(0.0, np.pi, 8001)
 ADMISSIBLE = 0.1
 # At most this share of the naive loop's time, by the number of parameters.
 SHARES = {12: 1 / 4, 16: 1 / 8}
@@ -132,87 +130,32 @@ def ours(spec: Spec) -> tuple[Design, Row]:
     }
 
 
-def naive(seed: int, order: int, m: int = 40) -> tuple[float, float]:
-    """The forty lines of cvxpy: the FIR optimum on 8001 frequencies and its processor time."""
-    B, F = output_error(seed, order)
-    number = 1 << 14
-    # Gradients of the prediction on a fine grid, and from it the M_i by the rectangle rule.
-    w = 2 * np.pi * np.arange(number) / number
-    lags, sigma = np.arange(m + 1), 0.1
-
-    def gradient(at: np.ndarray) -> np.ndarray:
-        z = np.exp(-1j * np.outer(at, np.arange(1, order + 1)))
-        below = 1.0 + z @ F[1:]
-        return np.concatenate([z / below[:, None], -z * ((z @ B[1:]) / below**2)[:, None]], axis=1)
-
-    dG = gradient(w)
-    products = (dG[:, :, None] * dG[:, None, :].conj()).real
-    maps = SAMPLES / sigma**2 * np.fft.fft(products, axis=0).real[lags] / number
-    maps[1:] *= 2.0
-    white = np.linalg.inv(np.linalg.cholesky(maps[0]))
-    maps = white @ maps @ white.T
-    on_grid = gradient(GRID) @ white.T * (2.0 / ADMISSIBLE)
-    rows = np.stack([on_grid.real, on_grid.imag], axis=1)
-    power = float(np.linalg.norm(rows, 2, axis=(1, 2)).max() ** 2)
-    table = np.cos(np.outer(GRID, lags)) * np.where(lags > 0, 2.0, 1.0)
-    started = time.process_time()
-    cuts, positive = list(range(0, 8001, 800)), list(range(0, 8001, 50))
-    for _ in range(100):
-        c = cp.Variable(m + 1)
-        information = sum(c[i] * maps[i] for i in range(m + 1))
-        conditions = [table[positive] @ c >= 0]
-        conditions += [information - rows[i].T @ rows[i] / power >> 0 for i in cuts]
-        program = cp.Problem(cp.Minimize(c[0]), conditions)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            program.solve(solver=cp.CLARABEL)
-        M = np.tensordot(c.value, maps, axes=1)
-        ratio = np.linalg.norm(rows @ np.linalg.inv(np.linalg.cholesky(M)).T, 2, axis=(1, 2)) ** 2 / power
-        phi = table @ c.value
-        peaks = [i for i in maxima(ratio) if ratio[i] > 1.0 + 1e-6]
-        dips = [i for i in maxima(-phi) if phi[i] < -1e-6 * c.value[0]]
-        if not peaks and not dips:
-            break
-        cuts, positive = sorted({*cuts, *peaks}), sorted({*positive, *dips})
-    return power * float(c.value[0]), time.process_time() - started
-
-
-def maxima(values: np.ndarray) -> np.ndarray:
-    """Indices of the local maxima, ends included."""
-    beside = np.concatenate([[-np.inf], values, [-np.inf]])
-    return np.flatnonzero((values >= beside[:-2]) & (values >= beside[2:]))
+def against_naive(name: str, size: int, order: int, *, seeds: int, m: int = 40) -> Iterator[Row]:
+    """Random output-error plants of one order, each with the naive loop beside it."""
+    for seed in range(seeds):
+        design, row = ours(output_error_spec(seed, order, m=m))
+        on_grid, seconds = naive(*output_error(seed, order), m, admissible=ADMISSIBLE, samples=SAMPLES)
+        yield row | {
+            "name": name,
+            "size": size,
+            "seed": seed,
+            "naive_seconds": seconds,
+            "share": float(row["seconds"]) / seconds,
+            "difference": on_grid / design.result.objective - 1.0,
+        }
 
 
 def output_error_rows(*, quick: bool) -> Iterator[Row]:
     """k = 4 .. 16 against the naive loop, the worst of the random plants told by each one's row."""
     for order in (2, 4, 6, 8):
-        for seed in range(1 if quick else 5):
-            design, row = ours(output_error_spec(seed, order))
-            on_grid, seconds = naive(seed, order)
-            yield row | {
-                "name": "output error",
-                "size": row["k"],
-                "seed": seed,
-                "naive_seconds": seconds,
-                "share": float(row["seconds"]) / seconds,
-                "difference": on_grid / design.result.objective - 1.0,
-            }
+        yield from against_naive("output error", 2 * order, order, seeds=1 if quick else 5)
 
 
 def spectrum_order_rows(*, quick: bool) -> Iterator[Row]:
     """m = 5 .. 300 at k = 4, against the naive loop."""
     for m in (5, 20) if quick else (5, 10, 20, 40, 80, 160, 300):
-        for seed in range(1 if quick or m > 80 else 3):  # the naive loop takes its time
-            design, row = ours(output_error_spec(seed, 2, m=m))
-            on_grid, seconds = naive(seed, 2, m)
-            yield row | {
-                "name": "spectrum order",
-                "size": m,
-                "seed": seed,
-                "naive_seconds": seconds,
-                "share": float(row["seconds"]) / seconds,
-                "difference": on_grid / design.result.objective - 1.0,
-            }
+        few = quick or m > 80  # the naive loop takes its time
+        yield from against_naive("spectrum order", m, 2, seeds=1 if few else 3, m=m)
 
 
 def box_jenkins_rows(*, quick: bool) -> Iterator[Row]:

@@ -31,20 +31,14 @@ from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.grid_method import GridMethod
-from inputdesign_cli.tasks.record import (
-    Made,
-    RecordRequest,
-    designed_spectrum,
-    record_notes,
-    redrawn,
-    shortfall,
-)
+from inputdesign_cli.tasks.record import Made, RecordRequest, designed_spectrum, redrawn
 from inputdesign_cli.tasks.record_search import fitting_record, samples_of_record
 from inputdesign_cli.tasks.result.bound import bound_curves, equal_white
 from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.nyquist import nyquist_curves
+from inputdesign_cli.tasks.result.record_notes import record_notes, shortfall
 from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import optimality_curves, spectrum_curves, with_periodogram

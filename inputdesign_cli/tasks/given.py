@@ -26,19 +26,13 @@ from inputdesign_cli.signal import DesignedSpectrum, Record, SignalGenerator, in
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.confidence import Confidence
 from inputdesign_cli.tasks.foresight import Foresight
-from inputdesign_cli.tasks.record import (
-    RecordRequest,
-    as_long,
-    given_record,
-    least_period,
-    record_notes,
-    worst_ratio,
-)
+from inputdesign_cli.tasks.record import RecordRequest, as_long, given_record, least_period, worst_ratio
 from inputdesign_cli.tasks.result.bound import bound_curves
 from inputdesign_cli.tasks.result.design import information_entry, requirements_entry
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.given_limits import StatedLimits, broken_limits
 from inputdesign_cli.tasks.result.nyquist import nyquist_curves
+from inputdesign_cli.tasks.result.record_notes import record_notes
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
 from inputdesign_cli.tasks.result.spectrum import plain_complex, spectrum_curves
 from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates, Simulator

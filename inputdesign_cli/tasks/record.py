@@ -34,13 +34,7 @@ from inputdesign_cli.signal.evaluation import MET
 # Eigenvalues of the information in the coordinates of a design that are smaller, relative to the largest, are
 # those of rounding: checked in sixty digits, ratios are off by a thousandth there, and by any factor below.
 _UNTOLD = 1e-12
-_FALLS_SHORT = 5e-3
-_DEAR = 1.0  # beyond the cost of the design, relative to it
 _TAKES_PART = 1e-6
-_NO_RECORD = (
-    "there is no record: it would have {} samples, and at most {} are computed for this model; "
-    "signal.samples sets a shorter one"
-)
 
 
 @dataclass(frozen=True)
@@ -294,69 +288,6 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
         return max((r.worst(information).ratio for r in requirements), default=0.0)
 
     return ratio
-
-
-def record_notes(
-    request: RecordRequest, experiment: int, record: Record | None, of_limits: Mapping[str, float]
-) -> list[str]:
-    """What a user should know before applying the record.
-
-    Args:
-        experiment: its samples.
-        of_limits: the share of each limit on single samples that the record takes.
-    """
-    if record is None:
-        too_long = request.length(experiment) > request.longest
-        return [_NO_RECORD.format(request.length(experiment), request.longest)] if too_long else []
-    notes = []
-    if not record.met and not np.isfinite(record.worst_ratio):
-        notes.append(
-            "the record does not tell all parameters apart to working precision, so that nothing can be said "
-            "of the accuracy that it reaches: take more samples (signal.samples), or a model of lower order"
-        )
-    elif not record.met:
-        notes.append(
-            f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; the limits on the "
-            "powers, the level asked for or its length leave no room: a little more power or a few more "
-            "samples would do"
-        )
-    if record.method != "given" and record.extra_power > _DEAR:
-        notes.append(
-            f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its "
-            f"{len(record.samples)} samples are few beside the dead times and time constants of the plant, "
-            "and much of what they cause comes after the last one; take more samples"
-        )
-    asked = request.samples or experiment
-    if record.method != "given" and len(record.samples) > asked + request.settings.block:
-        nearest = max(of_limits, key=lambda name: of_limits[name], default=None)
-        share = f"; the record takes {100 * of_limits[nearest]:.3g} % of limits.{nearest}" if nearest else ""
-        notes.append(
-            f"within the limits on single samples {len(record.samples)} samples are the shortest record that "
-            f"was found, by trying, to one per cent; the spectrum alone would take {asked}{share}"
-        )
-    return notes
-
-
-def shortfall(design: Design, record: Record, information: Array) -> list[str]:
-    """What a record of the best accuracy misses: the accuracy that the design has, and what else is required.
-
-    Args:
-        information: (k, k) of the record.
-    """
-    problem, notes = design.problem, []
-    best = float(np.sqrt(design.result.objective))
-    if problem.goal == "factor" and problem.demands.criterion is None:
-        more = record.worst_ratio / best - 1.0
-        if more > _FALLS_SHORT:
-            notes.append(
-                f"the record reaches {record.worst_ratio:.4g} times the admissible error, the design "
-                f"{best:.4g}: {100 * more:.3g} % more, by its length or by the limits on single samples"
-            )
-    missed = worst_ratio(problem.side)(information)
-    if missed > 1.0 + _FALLS_SHORT:
-        names = " and ".join(dict.fromkeys(requirement.name for requirement in problem.side))
-        notes.append(f"the record misses {names}, which the design meets: its worst ratio is {missed:.4g}")
-    return notes
 
 
 def _score(requirements: Sequence[Requirement]) -> Callable[[Array], float]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.information import Experiment, FiniteRecord
-from inputdesign_cli.monte_carlo.excitations import InPhase, Recorded, Redrawn
+from inputdesign_cli.monte_carlo.excitations import InPhase, Reapplied, Recorded, Redrawn
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.spectrum import LinesBasis
 
@@ -55,3 +55,11 @@ def test_the_information_of_sinusoids_is_that_of_their_records(channels):
 def test_flat_excitations_have_their_power_exactly(method):
     records = flat(method, 2, 300).draw(5, 300, np.random.default_rng(2))
     np.testing.assert_allclose(np.mean(records**2, axis=1), np.tile(POWERS, (5, 1)))
+
+
+def test_reapplied_records_are_those_of_the_excitation_so_many_times_each():
+    drawn = Redrawn.flat("design", "white", np.array([2.0]), (0.0, np.pi), 40, 1.0)
+    once = drawn.draw(3, 40, np.random.default_rng(7))
+    again = Reapplied(drawn, 3).draw(7, 40, np.random.default_rng(7))
+    np.testing.assert_array_equal(again, once[[0, 0, 0, 1, 1, 1, 2]])
+    assert not np.array_equal(once[0], once[1])
