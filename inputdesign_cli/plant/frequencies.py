@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,12 +37,7 @@ def graded_grid(
     they are.
     """
     span = hi - lo
-    floor = max(lo, hi * 1e-6)
-    parts = [
-        np.linspace(lo, hi, points),
-        np.geomspace(floor, hi, points // 3),
-        np.asarray(knots, dtype=float),
-    ]
+    parts = [_spaced(float(lo), float(hi), points), np.asarray(knots, dtype=float)]
     near = np.linspace(0.0, 2.0, 81)
     for s in np.unique(np.round(np.asarray(singularities, dtype=complex), 12)):
         width = max(s.imag, 1e-8)
@@ -52,6 +48,14 @@ def graded_grid(
             parts += [s.real + offsets, s.real - offsets]
     grid = np.unique(np.concatenate(parts))
     return grid[(grid >= lo) & (grid <= hi)]
+
+
+# Every plant of a design asks for the same band.
+@lru_cache(maxsize=64)
+def _spaced(lo: float, hi: float, points: int) -> Array:
+    grid = np.concatenate([np.linspace(lo, hi, points), np.geomspace(max(lo, hi * 1e-6), hi, points // 3)])
+    grid.setflags(write=False)
+    return grid
 
 
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
