@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,10 +98,11 @@ def local_maxima(
     if index.size == 0:
         return np.zeros(0), np.zeros(0)
     around = np.unique(np.clip(index[:, None] + np.arange(-2, 2), 0, grid.size - 2))
-    inside = (grid[around, None] + np.diff(grid)[around, None] * _fractions(_REFINEMENT)).ravel()
-    finer = np.concatenate([grid, inside])
-    order = np.argsort(finer, kind="stable")
-    finer, values = finer[order], np.concatenate([values, function(inside)])[order]
+    inside = (
+        grid[around, None] + (grid[around + 1] - grid[around])[:, None] * _fractions(_REFINEMENT)
+    ).ravel()
+    places = np.repeat(around + 1, _REFINEMENT)
+    finer, values = np.insert(grid, places, inside), np.insert(values, places, function(inside))
     index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
@@ -151,5 +152,6 @@ def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:
     return index[kept]
 
 
+@cache
 def _fractions(number: int) -> Array:
     return np.linspace(0.0, 1.0, number + 2)[1:-1]
