@@ -21,7 +21,7 @@ _POLISH = 3
 # Logarithms: an excitation so much stronger is as good as any, and a ratio that moves less stands still.
 _PLENTY, _STILL = 46.0, 1e-6
 _FAINT = -650.0  # below, powers underflow
-_EXACT, _SETTLED = 1e-13, 1e-3
+_EXACT = 1e-13
 _SUITED = 8.0  # how far from their own power coordinates serve
 
 
@@ -46,10 +46,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         # The ratio falls as the root of the power where the excitation alone tells what is asked.
         at_once = trial.at + 2.0 * trial.excess(trial.at)
         if abs(at_once - trial.at) <= _SUITED and abs(trial.excess(at_once)) <= _EXACT:
-            if abs(at_once - trial.at) <= _SETTLED:
-                return float(np.exp(at_once))
-            power = float(np.exp(at_once))
-            continue
+            return float(np.exp(at_once))
         lo, hi, trial = _enough(trial)
         excess = cache(trial.excess)
         try:
@@ -60,7 +57,7 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
         except np.linalg.LinAlgError:
             return 0.0  # the noise alone tells what is asked, and nothing of other parameters
         found = float(np.exp(scipy.optimize.brentq(excess, lo, hi, xtol=1e-13, rtol=1e-14)))
-        if abs(found - power) <= _SETTLED * power:
+        if abs(found - power) <= 1e-3 * power:
             return found
         power = found
     return power
