@@ -84,8 +84,8 @@ recorded beside it, in `first.csv`. Do these data meet the target?
 
 They miss it: exit code 1. The log had told the fast part of the plant badly, so that the design stood on a
 wrong model; the new data tell it better, and at the new estimate the error is {ratio} times what is
-admitted. That is what assessing is for. The same command has designed what makes up for it: the shortest
-record that, after these data, meets the target.
+admitted. That is what assessing is for. The same command has designed what the new model still needs: the
+shortest record that, together with these data, meets the target if the structure of the model is right.
 
 ![the error that the first experiment leaves](images/tutorial_first_data_bound.png)
 

@@ -72,6 +72,8 @@ _UNDECIDED = {
     "chance": "chance may stand behind what was measured",
 }
 
+_RIGHT = " if the structure of the model is right"
+
 
 def verdict(result: Result) -> Iterator[str]:
     """What an assessment comes to, and what is left to do."""
@@ -93,13 +95,30 @@ def verdict(result: Result) -> Iterator[str]:
         number = assessment["experiments"]
         repeat = "" if number is None else f"apply it {number} times, "
         yield (
-            "the experiment below is the best within the limits, and after it the error is still "
-            f"{assessment['left']:.4g} times what is admitted: {repeat}widen the limits, or loosen the target"
+            "the experiment below is the best within the limits for the model of these data, and after it "
+            f"the error is still {assessment['left']:.4g} times what is admitted{_RIGHT}: {repeat}widen "
+            "the limits, or loosen the target"
         )
     elif "left" in assessment:
-        yield "the experiment below makes up for it, after these data"
+        yield (
+            "the experiment below is what the model of these data still needs: after both the error is "
+            f"{assessment['left']:.4g} of what is admitted{_RIGHT}; assess both records together"
+        )
+    if "left" in assessment:
+        yield from _open_structure(assessment)
     elif "no_top_up" in assessment:
         yield f"no experiment is designed: {assessment['no_top_up']}"
+
+
+def _open_structure(assessment: Result) -> Iterator[str]:
+    """What these data leave open that an experiment designed on their model does not count on."""
+    entries = assessment.get("neglected", [])
+    worst = max(entries, key=lambda entry: entry["may_move"], default={"may_move": 0.0})
+    if worst["may_move"] > 1.0:
+        yield (
+            f"that structure is open: one more parameter ({worst['parameter']}), which these data do not "
+            f"rule out, may move G by up to {worst['may_move']:.3g} times what is admitted (95 %)"
+        )
 
 
 def requirement_table(result: Result, time_unit: str) -> Rows | None:

@@ -208,7 +208,7 @@ def _goal(spec: Spec, verb: str) -> str:
     if verb == "identify":
         return "Asked: the model that explains the recorded data, and how sure it is."
     if verb == "assess":
-        return "Asked: do the recorded data meet this accuracy; if not, which experiment makes up for it?"
+        return "Asked: do the recorded data meet this accuracy; if not, which experiment is still needed?"
     if not spec.designs or verb == "analyse":
         return "Asked: what accuracy the given excitation buys."
     family, stated = _SPECTRA.get(_family(spec), ""), spec.spectrum

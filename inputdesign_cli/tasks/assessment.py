@@ -77,8 +77,8 @@ def assess(task: Identification, paths: Sequence[Path], preparation: Preparation
 
     Both sides are evaluated at the new estimate: r_u by the information of the data themselves, r_adm by the
     new model. Where tests refute the structure, or the question cannot be asked of the estimate, nothing is
-    decided. Where the data fall short, the experiment that makes up for it is designed as `solve` does, with
-    the data as prior information; where there is none, the result says why.
+    decided. Where the data fall short, the experiment that this model still needs is designed as `solve`
+    does, with the data as prior information; where there is none, the result says why.
 
     Raises:
         SpecError: nothing is asked that data could meet.
@@ -125,7 +125,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     if found.question is not None:
         without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
-    notes = objections(task.header.units, without) if met else []
+    notes = objections(task.header.units, without)
     causes = {
         "unsettled": unsettled(found.estimate),
         "contradicted": [
@@ -134,7 +134,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
             *repetitions(found.estimate, found.data.files),
             *refutations(found.model, found.estimate),
             *contradictions(found.estimate),
-            *notes,
+            *(notes if met else []),  # more parameters miss it all the more
         ],
         "unasked": [found.unasked] if found.unasked else [],
         "undetermined": [] if found.question is None else _rivals(task.header.units, found, found.question),

@@ -41,8 +41,8 @@ class ModelQuestion:
         confidence: the size of the confidence region of r_u.
         requirements: all that is asked, in these coordinates.
         entries: what has r_u of every entry of G where no requirement has it.
-        top_up: designs what makes up for what the data leave to be wished for, with a record about the
-            levels of the inputs by name; None where the spec designs nothing.
+        top_up: designs what the model needs beside the data, with a record about the levels of the
+            inputs by name; None where the spec designs nothing.
     """
 
     experiment: Experiment

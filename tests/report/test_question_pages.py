@@ -81,7 +81,9 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
     page, result = parse(report_text(tmp_path / "run")), found.results.result
     verdict = result["assessment"]["requirements"][0]
     assert f"model error reaches {verdict['worst_ratio']:.4g}" in words(page)
-    assert ("These data meet" if met else "The experiment below makes up for it") in words(page)
+    assert (
+        "These data meet" if met else "The experiment below is what the model of these data still needs"
+    ) in words(page)
     assert "idesign assess spec.yaml DATA" in words(page)
     cells = rows(page)
     assert ["model error", f"{verdict['worst_ratio']:.4g}", "met" if met else "missed"] == [

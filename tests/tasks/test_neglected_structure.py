@@ -5,6 +5,7 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli import assess, identify, parse_spec, solve
+from tests.support.heater import said
 
 NARROW = """
 sample_time: 10
@@ -21,9 +22,10 @@ signal: {type: binary, seed: 1}
 @pytest.fixture(scope="module")
 def narrow(tmp_path_factory):
     """Writes a record with the narrow-band input that is designed for the model, and perhaps a pole more."""
-    u = 1.3 * solve(parse_spec(NARROW)).tables["signal"].columns["u1"]
+    designed = solve(parse_spec(NARROW)).tables["signal"].columns["u1"]
 
-    def written(seed, pole=0.0):
+    def written(seed, pole=0.0, amplitude=1.3):
+        u = amplitude * designed
         e = 0.1 * np.random.default_rng(seed).standard_normal(u.size + 300)
         B, F = np.array([0, 0, 0, 0, 0.04]) * (1 - pole), np.convolve([1, -0.95], [1, -pole])
         y = scipy.signal.lfilter(B, F, u) + scipy.signal.lfilter([1], [1, -0.8], e)[300:]
@@ -42,6 +44,23 @@ def test_a_pole_that_a_narrow_band_hardly_shows_leaves_it_undecided(seed, narrow
     assert "one more " in reasons[-1]
     assert set(reasons) <= set(found.results.result["notes"])
     assert "(f2)" in " ".join(found.results.result["notes"])
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_top_up_does_not_promise_that_the_structure_is_right(seed, narrow):
+    """No test sees the missing pole; the true error is beyond what the top-up would leave, as is told."""
+    found = assess(parse_spec(NARROW), narrow(seed, 0.5, 0.8))
+    assert (found.verdict, found.results.result["identification"]["failed"]) == ("missed", [])
+    assessment, theta = found.results.result["assessment"], found.results.result["identification"]["theta"]
+    w = np.linspace(0.005, 0.2, 2000)
+    model = scipy.signal.freqz([0, 0, 0, 0, theta["b4"]], [1, theta["f1"]], w)[1]
+    true = scipy.signal.freqz([0, 0, 0, 0, 0.02], np.convolve([1, -0.95], [1, -0.5]), w)[1]
+    assert np.max(np.abs(true - model) / np.abs(model)) / 0.1 > assessment["requirements"][0]["worst_ratio"]
+    told = said(found.results)
+    assert f"after both the error is {assessment['left']:.4g} of what is admitted if the structure" in told
+    worst = max(assessment["neglected"], key=lambda entry: entry["may_move"])
+    assert f"one more parameter ({worst['parameter']}), which these data do not rule out" in told
+    assert ("estimate it along" in told) == (worst["moves"] > 1.0 and worst["probability"] < 0.05)
 
 
 def test_what_a_narrow_band_leaves_open_stands_beside_the_verdict(narrow):
