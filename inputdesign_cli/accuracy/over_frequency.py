@@ -142,9 +142,13 @@ class OverFrequency(Requirement):
 
     def most(self, information: Array) -> float:
         """From the points of the grid: a peak between them stands no higher than `local_maxima` admits."""
-        on_grid = self.measure(turned(self._grid_rows, inverse_factor(information).T), self.grid)
-        top = float(on_grid.max())
+        top = self.least(information)
         return top / (1.0 - SLACK) if np.isfinite(top) else np.inf
+
+    def least(self, information: Array) -> float:
+        """The largest ratio at the points of the grid; NaN where one is not finite."""
+        on_grid = self.measure(turned(self._grid_rows, inverse_factor(information).T), self.grid)
+        return float(on_grid.max())
 
     def worst(self, information: Array) -> Violation:
         """The largest of the violations; one beside frequency zero is told to be there."""

@@ -65,6 +65,10 @@ class Requirement(ABC):
         """What the ratio does not exceed; where the search for its maximum is long, without that search."""
         return worst(self.violations(information)).ratio
 
+    def least(self, information: Array) -> float:
+        """What the ratio is at least, in the same way."""
+        return worst(self.violations(information)).ratio
+
     def worst(self, information: Array) -> Violation:
         """The largest of the violations, for reports."""
         return worst(self.violations(information))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.optimize
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.adequacy import Echo, Echoes
@@ -201,9 +201,11 @@ class ReparametrisedKind(OfModel):
             jacobian = root @ at.at(share * unit).jacobian * unit
             return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
-        found = scipy.optimize.least_squares(
-            distance, at.theta / unit, jac=slope, x_scale="jac", max_nfev=_MOST_EVALUATIONS
-        )
+        # A step may go far beyond what doubles hold where the coefficients hardly move; it is taken back.
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = scipy.optimize.least_squares(
+                distance, at.theta / unit, jac=slope, x_scale="jac", max_nfev=_MOST_EVALUATIONS
+            )
         return np.asarray(found.x * unit, dtype=float)
 
     def extensions(self, theta: Array, *, feedback: bool) -> tuple[Extension, ...]:

@@ -12,7 +12,9 @@ from inputdesign_cli.information.finite_record import (
 )
 from inputdesign_cli.information.products import WeightedProducts as WeightedProducts
 from inputdesign_cli.information.quadrature import (
+    NODES_AT_ONCE as NODES_AT_ONCE,
     Quadrature as Quadrature,
+    Values as Values,
     graded_quadrature as graded_quadrature,
     integrate as integrate,
     integrate_band as integrate_band,

@@ -18,14 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
 from inputdesign_cli.information.products import WeightedProducts
-from inputdesign_cli.information.quadrature import Quadrature, band_quadrature, integrate
+from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, band_quadrature, integrate
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 PowerKind = Literal["input", "output", "excitation", "moves"]
 POWER_KINDS: tuple[PowerKind, ...] = ("input", "output", "excitation")
 """The powers that results tell; that of the moves of u from sample to sample is only limited."""
-_NODES_AT_ONCE = 256
 # What one channel has of the largest of all is rounding of nothing, if it is no more than this share.
 _NOTHING = 1e-13
 
@@ -182,15 +181,11 @@ class Experiment(Coordinates):
         if self.model.continuous or np.all(self._silent):
             return np.zeros((self.size, self.size))
 
-        def moments(rule: Quadrature) -> NDArray[np.float64]:
-            total = np.zeros((self.size, self.size))
-            for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
-                part = slice(start, start + _NODES_AT_ONCE)
-                rows = _rows(self.noise_gradient(rule.nodes[part]), rule.weights[part])
-                total += rows.T @ rows
-            return total
+        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
+            rows = _rows(values, rule.weights)
+            return rows.T @ rows
 
-        return self.samples * integrate(moments, self.singularities)
+        return self.samples * integrate(self.noise_gradient, sums, self.singularities, at_once=NODES_AT_ONCE)
 
     @property
     def baseline_information(self) -> Array:

@@ -7,7 +7,7 @@ only with the logarithm of the damping: a pole at radius 0.999999 costs some for
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
@@ -26,6 +26,12 @@ _MAX_REFINEMENTS = 4
 _ROUNDING = 1e-7
 _ON_AXIS = 1e-6
 _NONE = np.zeros(0)
+NODES_AT_ONCE = 256
+"""So many at a time where the values are large: those of several channels."""
+_MANY = 2048
+
+Values = Callable[[Array], NDArray]
+"""Values (n, ...) of an integrand at frequencies (n,)."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,14 @@ class Quadrature:
 
     nodes: Array
     weights: Array
+
+    def part(self, which: slice) -> Quadrature:
+        """Some of the nodes with their weights."""
+        return Quadrature(self.nodes[which], self.weights[which])
+
+
+Sums = Callable[[Quadrature, NDArray], NDArray[np.float64]]
+"""Sums over nodes of weighted values (n, ...) there; those over two sets of nodes add up."""
 
 
 def _edges(
@@ -101,19 +115,24 @@ def _panels(
 
 
 def integrate(
-    moments: Callable[[Quadrature], NDArray[np.float64]],
+    values: Values,
+    sums: Sums,
     singularities: ComplexArray,
     *,
     lo: float = 0.0,
     hi: float = np.pi,
     highest_lag: int = 0,
     knots: Array = _NONE,
+    at_once: int = _MANY,
 ) -> NDArray[np.float64]:
-    """`moments(rule)` on a rule that is fine enough, proved by halving every panel.
+    """`sums` of `values` on a rule that is fine enough, proved by halving every panel.
 
     Halving gains twelve digits or none. Where it gains none and the change is already small, what
     is left is rounding of the integrand (gradients in the whitened coordinates of a plant whose
     parameters are nearly indistinguishable), which no rule can mend.
+
+    Args:
+        at_once: values are computed at so many nodes at a time at most.
 
     Raises:
         InaccurateError: when refinement does not settle the integrals to 1e-11 of the largest entry:
@@ -125,10 +144,12 @@ def integrate(
             singularities, lo=lo, hi=hi, highest_lag=highest_lag, refine=refine, knots=knots
         )
 
-    coarse = moments(rule_of(0))
+    # The first rule never stands alone: one call for its values and those of the next.
+    coarse, fine = _summed(values, sums, [rule_of(0), rule_of(1)], at_once)
     earlier = np.inf
     for refine in range(1, _MAX_REFINEMENTS + 1):
-        fine = moments(rule_of(refine))
+        if refine > 1:
+            (fine,) = _summed(values, sums, [rule_of(refine)], at_once)
         scale = np.abs(fine).max(initial=0.0)
         change = np.abs(fine - coarse).max(initial=0.0)
         if change <= RELATIVE_ERROR * scale or 0.1 * earlier < change <= _ROUNDING * scale:
@@ -152,13 +173,32 @@ def integrate(
     )
 
 
+def _summed(
+    values: Values, sums: Sums, rules: Sequence[Quadrature], at_once: int
+) -> list[NDArray[np.float64]]:
+    """The sums on each of the rules."""
+    nodes = np.concatenate([rule.nodes for rule in rules])
+    ends = np.cumsum([rule.nodes.size for rule in rules]).tolist()
+    found: list[list[NDArray[np.float64]]] = [[] for _ in rules]
+    for start in range(0, nodes.size, at_once):
+        here = values(nodes[start : start + at_once])
+        for rule, end, parts in zip(rules, ends, found, strict=True):
+            first = end - rule.nodes.size
+            lo, hi = max(start, first), min(start + len(here), end)
+            if lo < hi:
+                parts.append(sums(rule.part(slice(lo - first, hi - first)), here[lo - start : hi - start]))
+    return [np.asarray(sum(parts[1:], start=parts[0])) for parts in found]
+
+
 def integrate_band(
-    moments: Callable[[Quadrature], NDArray[np.float64]],
+    values: Values,
+    sums: Sums,
     singularities: ComplexArray,
     band: tuple[float, float],
     *,
     highest_lag: int = 0,
     knots: Array = _NONE,
+    at_once: int = NODES_AT_ONCE,
 ) -> NDArray[np.float64]:
     """The same over [lo, hi] and its mirror image, in any unit of frequency: (1 / 2 pi) integral.
 
@@ -166,12 +206,17 @@ def integrate_band(
     """
     unit = (band[1] - band[0]) / np.pi
     near: ComplexArray = np.asarray(singularities, dtype=complex) * (1.0 / unit + 0j)
-
-    def stretched(rule: Quadrature) -> NDArray[np.float64]:
-        return moments(Quadrature(rule.nodes * unit, rule.weights * unit))
-
     lo, hi = band[0] / unit, band[1] / unit
-    return integrate(stretched, near, lo=lo, hi=hi, highest_lag=highest_lag, knots=knots / unit)
+    return integrate(
+        lambda w: values(w * unit),
+        lambda rule, here: sums(Quadrature(rule.nodes * unit, rule.weights * unit), here),
+        near,
+        lo=lo,
+        hi=hi,
+        highest_lag=highest_lag,
+        knots=knots / unit,
+        at_once=at_once,
+    )
 
 
 def band_quadrature(singularities: ComplexArray, band: tuple[float, float]) -> Quadrature:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,12 +37,7 @@ def graded_grid(
     they are.
     """
     span = hi - lo
-    floor = max(lo, hi * 1e-6)
-    parts = [
-        np.linspace(lo, hi, points),
-        np.geomspace(floor, hi, points // 3),
-        np.asarray(knots, dtype=float),
-    ]
+    parts = [_spaced(float(lo), float(hi), points), np.asarray(knots, dtype=float)]
     near = np.linspace(0.0, 2.0, 81)
     for s in np.unique(np.round(np.asarray(singularities, dtype=complex), 12)):
         width = max(s.imag, 1e-8)
@@ -52,6 +48,14 @@ def graded_grid(
             parts += [s.real + offsets, s.real - offsets]
     grid = np.unique(np.concatenate(parts))
     return grid[(grid >= lo) & (grid <= hi)]
+
+
+# Every plant of a design asks for the same band.
+@lru_cache(maxsize=64)
+def _spaced(lo: float, hi: float, points: int) -> Array:
+    grid = np.concatenate([np.linspace(lo, hi, points), np.geomspace(max(lo, hi * 1e-6), hi, points // 3)])
+    grid.setflags(write=False)
+    return grid
 
 
 def common_grid(plants: Sequence[ComplexArray], lo: float, hi: float) -> Array:
@@ -94,10 +98,11 @@ def local_maxima(
     if index.size == 0:
         return np.zeros(0), np.zeros(0)
     around = np.unique(np.clip(index[:, None] + np.arange(-2, 2), 0, grid.size - 2))
-    inside = (grid[around, None] + np.diff(grid)[around, None] * _fractions(_REFINEMENT)).ravel()
-    finer = np.concatenate([grid, inside])
-    order = np.argsort(finer, kind="stable")
-    finer, values = finer[order], np.concatenate([values, function(inside)])[order]
+    inside = (
+        grid[around, None] + (grid[around + 1] - grid[around])[:, None] * _fractions(_REFINEMENT)
+    ).ravel()
+    places = np.repeat(around + 1, _REFINEMENT)
+    finer, values = np.insert(grid, places, inside), np.insert(values, places, function(inside))
     index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
@@ -147,5 +152,6 @@ def _distinct(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:
     return index[kept]
 
 
+@cache
 def _fractions(number: int) -> Array:
     return np.linspace(0.0, 1.0, number + 2)[1:-1]

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import orjson
 
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.results import Array, Json, Table
@@ -70,9 +71,10 @@ def _shortest(values: Array) -> list[str]:
     """The shortest text of each of (n,) numbers, a whole one without its point."""
     if not np.all(np.isfinite(values)):
         return [repr(value).removesuffix(".0") for value in values.tolist()]
-    # The encoder of JSON writes the same digits, all at once.
-    text = json.dumps(values.tolist(), separators=(",", ","))[1:-1]
-    return f"{text},".replace(".0,", ",").split(",")[:-1] if values.size else []
+    if not values.size:
+        return []
+    text = orjson.dumps(np.ascontiguousarray(values), option=orjson.OPT_SERIALIZE_NUMPY).decode()[1:-1]
+    return f"{text},".replace(".0,", ",").split(",")[:-1]
 
 
 def read_csv(path: Path) -> dict[str, Array]:

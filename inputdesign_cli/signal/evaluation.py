@@ -26,12 +26,14 @@ class Target:
         cost: weights of the powers (of all channels together, or one weight a channel), to rank records
             that meet the target.
         designed: what the design costs in the same weights; its power when not given.
+        least_ratio: what `worst_ratio` is at least, in a shorter time; to leave out records early.
     """
 
     worst_ratio: Callable[[Array], float]
     meets: bool = False
     cost: Mapping[PowerKind, float | tuple[float, ...]] = field(default_factory=lambda: {"excitation": 1.0})
     designed: float | None = None
+    least_ratio: Callable[[Array], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,18 @@ class Evaluator:
                 for kind, weight in self.target.cost.items()
             )
         )
+
+    def costs_more(self, samples: Array, cost: float) -> bool:
+        """Whether multiples of the samples miss what is asked as long as they cost no more than that."""
+        least = self.target.least_ratio
+        if least is None or cost <= 0.0:
+            return False
+        known = self.plant.known
+        square = cost / self.cost(samples)
+        try:
+            return least(known + square * (self.plant.information(samples) - known)) > MET
+        except np.linalg.LinAlgError:
+            return False
 
     def needed_level(self, samples: Array) -> float | None:
         """The level that the accuracy needs, were there no limits; None when no level is enough."""

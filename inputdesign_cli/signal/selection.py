@@ -76,7 +76,7 @@ def best_record(
         if (first and best.met) or (number >= settings.candidates and candidates.suffices(best)):
             break
         try:
-            other = candidates.record(_stream(settings.seed, number))
+            other = candidates.record(_stream(settings.seed, number), best)
         except OutOfTimeError:
             break
         best = min((best, other), key=candidates.rank)
@@ -103,23 +103,34 @@ class _Candidates:
         """Whether it is not worth looking on: little is left to gain, or limits stand in the way."""
         return not self.evaluator.target.meets or not self.limiter.plain or record.extra_power <= _LITTLE
 
-    def record(self, rng: np.random.Generator) -> Record:
-        """One candidate at its level."""
+    def record(self, rng: np.random.Generator, best: Record | None = None) -> Record:
+        """One candidate at its level, or the best so far where it is seen early to be no better."""
         seconds_left()
         values, power = self.generator.values(rng), self.generator.spectrum.power
         values = values * np.sqrt(power / _power(values))
         if self.generator.method == "slewed":
             values = self._switched(values, rng)
-        samples, met = self._levelled(values)
         factor, evaluator = self.generator.factor, self.evaluator
+        designed = evaluator.target.designed or power
+        if best is not None and best.met and self._free:
+            held = np.repeat(values, self.limiter.settings.hold, axis=0)
+            if evaluator.costs_more(held, (1.0 + best.extra_power) * designed):
+                return best
+        samples, met = self._levelled(values)
         return Record(
             samples,
             self.generator.method,
             evaluator.ratio(samples),
             None if factor is None else factor.residual,
-            evaluator.cost(samples) / (evaluator.target.designed or power) - 1.0,
+            evaluator.cost(samples) / designed - 1.0,
             met,
         )
+
+    @property
+    def _free(self) -> bool:
+        """Whether a record is its values at the level that it needs, and nothing else."""
+        stated = self.limiter.settings.level is not None
+        return self.evaluator.target.meets and self.limiter.plain and not stated
 
     def _switched(self, values: Array, rng: np.random.Generator) -> Array:
         """The values (m, r) of two levels, switched at better times; what repeats stays so."""

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.information import Quadrature
+from inputdesign_cli.information import Values
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Factor, Functional
 
-_NODES_AT_ONCE = 256
 _SINGULAR = 1e-13
 # A price below this is none: its inverse would leave the range of double precision.
 _NOTHING = 1e-140
 _ROUNDING = 1e-15
 _LEVEL = 1e-10  # ratios this near to each other, relative, are the same
+
+WeightedSums = Callable[[NDArray, NDArray, Array], NDArray]
 
 
 def matrices(density: NDArray) -> NDArray:
@@ -24,42 +27,41 @@ def matrices(density: NDArray) -> NDArray:
     return density[:, None, None] if density.ndim == 1 else density
 
 
-def weighted_sums(
-    table: NDArray, density: Density, rule: Quadrature, inputs: int, factor: Factor | None = None
-) -> NDArray:
-    """sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r), a part of the nodes at a time."""
+def integrand(density: Density, factor: Factor | None, inputs: int) -> tuple[Values, WeightedSums]:
+    """What to compute at the nodes of a rule, and how to sum it against a table of functions.
+
+    The sums, of the table (n, functions), of the values at n nodes and of the weights (n,), are
+    sum_n weight_n table[n, f] D(node_n): (functions, ..., r, r). With a `factor` F of D, D = F^* F, the
+    values are those of F.
+    """
     if factor is not None and inputs > 1:
-        return _summed_products(table, factor, rule)
-    total: NDArray | float = 0.0
-    for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
-        part = slice(start, start + _NODES_AT_ONCE)
-        values = density(rule.nodes[part])
-        if inputs == 1:
-            values = values[..., None, None]
-        weighted = table[part] * rule.weights[part, None]
-        total = total + np.tensordot(weighted, values, axes=(0, 0))
-    return np.asarray(total)
+        return factor, _summed_products
+    return density, _summed_scalars if inputs == 1 else _summed
 
 
-def _summed_products(table: NDArray, factor: Factor, rule: Quadrature) -> NDArray:
+def _summed(table: NDArray, values: NDArray, weights: Array) -> NDArray:
+    return np.tensordot(table * weights[:, None], values, axes=(0, 0))
+
+
+def _summed_scalars(table: NDArray, values: NDArray, weights: Array) -> NDArray:
+    return _summed(table, values, weights)[..., None, None]
+
+
+def _summed_products(table: NDArray, F: NDArray, weights: Array) -> NDArray:
     """The sums of (F_m^* F_l + F_l^* F_m) / 2, (functions, k, k, r, r): one output after the other.
 
     Of an output only the parameters and inputs that matter to it take part.
     """
-    half: NDArray = np.zeros(0)
-    for start in range(0, rule.nodes.size, _NODES_AT_ONCE):
-        part = slice(start, start + _NODES_AT_ONCE)
-        F, weighted = factor(rule.nodes[part]), table[part] * rule.weights[part, None]
-        n, k, p, r = F.shape
-        if not half.size:
-            half = np.zeros((table.shape[1], k * r, k * r), dtype=complex)
-        for output in range(p):
-            rows = F[:, :, output].reshape(n, k * r)
-            size = np.abs(rows).max(axis=0)
-            used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
-            rows = rows[:, used]
-            for sums, weights in zip(half, weighted.T, strict=True):
-                sums[np.ix_(used, used)] += (rows.conj() * weights[:, None]).T @ rows
+    n, k, p, r = F.shape
+    weighted = table * weights[:, None]
+    half = np.zeros((table.shape[1], k * r, k * r), dtype=complex)
+    for output in range(p):
+        rows = F[:, :, output].reshape(n, k * r)
+        size = np.abs(rows).max(axis=0)
+        used = np.flatnonzero(size > _ROUNDING * size.max(initial=0.0))
+        rows = rows[:, used]
+        for sums, weight in zip(half, weighted.T, strict=True):
+            sums[np.ix_(used, used)] += (rows.conj() * weight[:, None]).T @ rows
     both = half.reshape(-1, k, r, k, r).transpose(0, 1, 3, 2, 4)
     return 0.5 * (both + both.swapaxes(1, 2))
 

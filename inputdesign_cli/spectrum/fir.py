@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information import Quadrature, integrate
@@ -78,11 +78,11 @@ class FirBasis(DensityFamily):
     ) -> NDArray[np.float64]:
         """(m + 1, ...): (1 / 2 pi) integral of density(w) times each basis function."""
 
-        def moments(rule: Quadrature) -> NDArray[np.float64]:
+        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
             weighted = self.functions(rule.nodes) * rule.weights[:, None]
-            return np.tensordot(weighted, density(rule.nodes), axes=(0, 0))
+            return np.tensordot(weighted, values, axes=(0, 0))
 
-        return integrate(moments, singularities, highest_lag=self.order)
+        return integrate(density, sums, singularities, highest_lag=self.order)
 
     def coarser(self) -> list[FirBasis]:
         """Lower orders, each about half the next, whose optimum is a good start for this one."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information import Experiment, Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Face, Factor, Functional, Pricing
-from inputdesign_cli.spectrum.directions import weighted_sums
+from inputdesign_cli.spectrum.directions import integrand
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,13 @@ class FlatBasis(DensityFamily):
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
         """(1, ...): level times (1 / 2 pi) integral of the trace of the density."""
+        source, summed = integrand(density, factor, self.inputs)
 
-        def moments(rule: Quadrature) -> NDArray[np.float64]:
-            sums = weighted_sums(np.ones((rule.nodes.size, 1)), density, rule, self.inputs, factor)
-            return self.level * np.trace(sums, axis1=-2, axis2=-1).real
+        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
+            found = summed(np.ones((rule.nodes.size, 1)), values, rule.weights)
+            return self.level * np.trace(found, axis1=-2, axis2=-1).real
 
-        return integrate_band(moments, singularities, self.band)
+        return integrate_band(source, sums, singularities, self.band)
 
     def coarser(self) -> list[FlatBasis]:
         """None."""

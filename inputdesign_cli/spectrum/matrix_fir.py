@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.information import Quadrature, integrate
+from inputdesign_cli.information import NODES_AT_ONCE, Quadrature, integrate
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Factor
-from inputdesign_cli.spectrum.directions import weighted_sums
+from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import svec_layout, svec_length
 
@@ -61,13 +61,14 @@ class MatrixFirBasis(GramBasis):
     ) -> NDArray[np.float64]:
         """(size, ...): (1 / 2 pi) integral of tr(density(w) Phi(w)) for each unknown."""
         lags = np.arange(self.order + 1)
+        source, summed = integrand(density, factor, self.inputs)
 
-        def moments(rule: Quadrature) -> NDArray[np.float64]:
+        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
             turn = np.exp(-1j * np.outer(rule.nodes, lags))
-            sums = weighted_sums(turn, density, rule, self.inputs, factor).real
-            return self._functional(np.moveaxis(sums, (-2, -1), (1, 2)))
+            found = summed(turn, values, rule.weights).real
+            return self._functional(np.moveaxis(found, (-2, -1), (1, 2)))
 
-        return integrate(moments, singularities, highest_lag=self.order)
+        return integrate(source, sums, singularities, highest_lag=self.order, at_once=NODES_AT_ONCE)
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""

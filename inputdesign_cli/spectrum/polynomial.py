@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, Factor
-from inputdesign_cli.spectrum.directions import weighted_sums
+from inputdesign_cli.spectrum.directions import integrand
 from inputdesign_cli.spectrum.gram import GramBasis
 from inputdesign_cli.spectrum.svec import hmat, hvec, hvec_layout, smat, svec, svec_layout, svec_length
 
@@ -88,17 +88,18 @@ class PolynomialBasis(GramBasis):
         rows, columns, scale, imaginary = self._layout()
         pairs = place[rows // self.inputs, columns // self.inputs]
         i, j = rows % self.inputs, columns % self.inputs
+        source, summed = integrand(density, factor, self.inputs)
 
-        def moments(rule: Quadrature) -> NDArray[np.float64]:
+        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
             p = self.functions(rule.nodes)
-            sums = weighted_sums(p[:, first] * p[:, second], density, rule, self.inputs, factor)
+            found = summed(p[:, first] * p[:, second], values, rule.weights)
             # The advanced indices are apart, so that their axis comes first: (size, ...).
-            entries = np.moveaxis(sums, (-2, -1), (1, 2))[pairs, i, j]
+            entries = np.moveaxis(found, (-2, -1), (1, 2))[pairs, i, j]
             spread = (slice(None), *[None] * (entries.ndim - 1))
             chosen = np.where(imaginary[spread], entries.imag, entries.real)
             return 0.5 * scale[spread] * chosen
 
-        return integrate_band(moments, singularities, self.band, highest_lag=2 * self.order)
+        return integrate_band(source, sums, singularities, self.band, highest_lag=2 * self.order)
 
     def directed(self, frequency: float, direction: ComplexArray) -> Array:
         """(size,): v^* Phi v at one frequency, v the `direction` (r,), as a functional."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.information import Quadrature, integrate_band
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.spectrum.basis import Density, DensityFamily, Factor
-from inputdesign_cli.spectrum.directions import weighted_sums
+from inputdesign_cli.spectrum.directions import integrand
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,12 @@ class TabulatedSpectrum(DensityFamily):
         self, density: Density, singularities: ComplexArray, factor: Factor | None = None
     ) -> NDArray[np.float64]:
         """(1, ...): (1 / 2 pi) integral of tr(D(w) Phi(w)) over both signs of w."""
+        r = self.inputs
+        source, summed = integrand(density, factor, r)
 
-        def moments(rule: Quadrature) -> NDArray[np.float64]:
-            r, phi = self.inputs, self._at(rule.nodes)
-            sums = weighted_sums(phi.reshape(-1, r * r), density, rule, r, factor)
-            return np.einsum("ba...ab->...", sums.reshape(r, r, *sums.shape[1:])).real[None]
+        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
+            found = summed(self._at(rule.nodes).reshape(-1, r * r), values, rule.weights)
+            return np.einsum("ba...ab->...", found.reshape(r, r, *found.shape[1:])).real[None]
 
         band = (float(self.frequency[0]), float(self.frequency[-1]))
-        return integrate_band(moments, singularities, band, knots=self.frequency)
+        return integrate_band(source, sums, singularities, band, knots=self.frequency)

@@ -1,4 +1,7 @@
-"""The verbs: spec in, results out. A spec becomes a task once; nothing after that knows the spec."""
+"""The verbs: spec in, results out. A spec becomes a task once; nothing after that knows the spec.
+
+What a verb needs is imported when it is called, so that a command waits for nothing else.
+"""
 
 from __future__ import annotations
 
@@ -11,29 +14,20 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.compute.time_limit import time_limit
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.arithmetic import finite, most_extreme, sound_arithmetic
-from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
-from inputdesign_cli.tasks.build.campaign import build_rounds
-from inputdesign_cli.tasks.build.exploration import model_to_judge
-from inputdesign_cli.tasks.build.header import build_header
-from inputdesign_cli.tasks.build.identification import build_identification
-from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.response import build_measurement
-from inputdesign_cli.tasks.build.system import build_model
-from inputdesign_cli.tasks.build.task import build_analysis, build_task
-from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past, decide, read_part
-from inputdesign_cli.tasks.control_systems import system_of
-from inputdesign_cli.tasks.exploration import Exploration, explore as explore_log, judge
-from inputdesign_cli.tasks.identification import identify as identify_records
-from inputdesign_cli.tasks.measured_response import measure
 
 if TYPE_CHECKING:
     import control
+
+    from inputdesign_cli.compute.executor import Executor
+    from inputdesign_cli.tasks.assessment import Assessment
+    from inputdesign_cli.tasks.build.preparation import Preparation
+    from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
+    from inputdesign_cli.tasks.exploration import Exploration
 
 Files = str | Path | Sequence[str | Path]
 
@@ -46,6 +40,8 @@ def solve(spec: Spec) -> Results:
         InfeasibleError: no excitation meets what is asked.
         InaccurateError: the proof did not close to the accuracy that is asked.
     """
+    from inputdesign_cli.tasks.build.task import build_task
+
     with _placed(spec), time_limit(spec.solver.time_limit):
         return finite(build_task(spec).solve(), most_extreme(spec.content))
 
@@ -56,12 +52,17 @@ def analyse(spec: Spec) -> Results:
     Raises:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
+    from inputdesign_cli.tasks.build.task import build_analysis
+
     with _placed(spec), time_limit(spec.solver.time_limit):
         return finite(build_analysis(spec).solve(), most_extreme(spec.content))
 
 
 def validate(spec: Spec) -> None:
     """Read, check and set up, but compute nothing: the design, or the estimation where none is asked for."""
+    from inputdesign_cli.tasks.build.identification import build_identification
+    from inputdesign_cli.tasks.build.task import build_task
+
     with _placed(spec):
         build_task(spec) if spec.asks_for_design else build_identification(spec)
 
@@ -76,6 +77,8 @@ def simulate(spec: Spec, *, executor: Executor | None = None) -> Results:
     Raises:
         SpecError: what this version does not simulate, and all that `solve` raises.
     """
+    from inputdesign_cli.tasks.build.task import build_task
+
     with _placed(spec), time_limit(spec.solver.time_limit):
         return finite(build_task(spec).simulate(executor), most_extreme(spec.content))
 
@@ -104,6 +107,11 @@ def identify(
         SpecError: the plant is not supported.
         DataError: the file cannot be used, or the data do not determine the parameters.
     """
+    from inputdesign_cli.tasks.build.identification import build_identification
+    from inputdesign_cli.tasks.build.response import build_measurement
+    from inputdesign_cli.tasks.identification import identify as identify_records
+    from inputdesign_cli.tasks.measured_response import measure
+
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
         if frequency_response:
@@ -131,6 +139,11 @@ def assess(
         SpecError: nothing is asked that data could meet; see `identify`.
         DataError: a file cannot be used.
     """
+    from inputdesign_cli.tasks.assessment import Assessment, assess as assess_records
+    from inputdesign_cli.tasks.build.identification import build_identification
+    from inputdesign_cli.tasks.build.response import build_measurement
+    from inputdesign_cli.tasks.measured_response import measure
+
     with _placed(spec):
         known = _prepared(preparation, operating_point, remove_means)
         if spec.accuracy.frequency_response is not None:
@@ -148,6 +161,9 @@ def next_round(spec: Spec, past: Past) -> Decision:
         DataError: a record cannot be used.
         InfeasibleError, InaccurateError: nothing can be planned.
     """
+    from inputdesign_cli.tasks.build.campaign import build_rounds
+    from inputdesign_cli.tasks.campaign_rounds import decide
+
     with _placed(spec), time_limit(spec.solver.time_limit):
         return decide(build_rounds(spec), past)
 
@@ -158,6 +174,9 @@ def recorded_part(spec: Spec, path: Path, preparation: Preparation) -> Part:
     Raises:
         DataError: the file cannot be used.
     """
+    from inputdesign_cli.tasks.build.campaign import build_rounds
+    from inputdesign_cli.tasks.campaign_rounds import read_part
+
     with _placed(spec):
         return read_part(build_rounds(spec), path, preparation)
 
@@ -175,6 +194,11 @@ def explore(data: Files, preparation: Preparation | None = None, *, model: Spec 
         DataError: the log cannot be used, or tells no model at all.
         InaccurateError: the numbers of the log leave the range of double precision.
     """
+    from inputdesign_cli.tasks.build.exploration import model_to_judge
+    from inputdesign_cli.tasks.build.header import build_header
+    from inputdesign_cli.tasks.build.preparation import Preparation
+    from inputdesign_cli.tasks.exploration import explore as explore_log, judge
+
     prepared = preparation or Preparation()
     if model is None:
         with sound_arithmetic(most_extreme({})):
@@ -195,6 +219,9 @@ def to_control(model: Spec | Results) -> control.lti.LTI:
 
 @to_control.register(Spec)
 def _(model: Spec) -> control.lti.LTI:
+    from inputdesign_cli.tasks.build.system import build_model
+    from inputdesign_cli.tasks.control_systems import system_of
+
     with _placed(model):
         return system_of(build_model(model), model.sample_time)
 
@@ -214,6 +241,8 @@ def _paths(data: Files) -> list[Path]:
 def _prepared(
     preparation: Preparation | None, operating_point: Mapping[str, float] | None, remove_means: bool
 ) -> Preparation:
+    from inputdesign_cli.tasks.build.preparation import Preparation
+
     given = preparation or Preparation()
     point = {**given.operating_point, **(operating_point or {})}
     detrend = "constant" if remove_means and given.detrend == "none" else given.detrend

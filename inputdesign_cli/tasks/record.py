@@ -154,12 +154,14 @@ def make_record(
     cost = design_cost(design, request.cost)
     plants = [replace(scenario.experiment, samples=experiment.samples) for scenario in problem.scenarios]
     scores = [_score(scenario.requirements) for scenario in problem.scenarios]
+    bounding = [_largest(scenario.requirements, lambda r, M: r.least(M)) for scenario in problem.scenarios]
 
     def target_at(numbers: Sequence[int]) -> Target:
-        def worst(informations: NDArray[np.float64]) -> float:
-            return max(scores[n](M) for n, M in zip(numbers, informations, strict=True))
+        def largest(of: Sequence[Callable[[Array], float]], informations: NDArray[np.float64]) -> float:
+            return max(of[n](M) for n, M in zip(numbers, informations, strict=True))
 
-        return Target(worst, meets=meets, cost=request.cost, designed=cost)
+        least = partial(largest, bounding) if meets else None
+        return Target(partial(largest, scores), meets, request.cost, cost, least)
 
     spectrum = designed_spectrum(request, design, experiment.inputs)
 
@@ -280,12 +282,17 @@ def worst_ratio(requirements: Sequence[Requirement]) -> Callable[[Array], float]
 
     It raises `LinAlgError` where rounding would decide: the record tells parameters apart by less than that.
     """
+    return _largest(requirements, lambda requirement, information: requirement.worst(information).ratio)
 
+
+def _largest(
+    requirements: Sequence[Requirement], of: Callable[[Requirement, Array], float]
+) -> Callable[[Array], float]:
     def ratio(information: Array) -> float:
         eigenvalues = np.linalg.eigvalsh(information)
         if requirements and eigenvalues[0] <= _UNTOLD * eigenvalues[-1]:
             raise np.linalg.LinAlgError
-        return max((r.worst(information).ratio for r in requirements), default=0.0)
+        return max((of(requirement, information) for requirement in requirements), default=0.0)
 
     return ratio
 

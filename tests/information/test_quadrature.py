@@ -23,16 +23,17 @@ def h2_squared(numerator, denominator):
     return float(C @ X @ C + D * D)
 
 
+def plain_sum(rule, values):
+    return np.array([rule.weights @ values])
+
+
 @pytest.mark.parametrize("radius", [0.5, 0.9, 0.99, 0.999])
 def test_integrals_equal_lyapunov_to_1e_10(radius):
     denominator = np.real(np.poly([radius * np.exp(0.7j), radius * np.exp(-0.7j), 0.3]))
     numerator = [0.0, 1.0, -0.4]
     g = Rational.build(numerator, list(denominator))
 
-    def moments(rule):
-        return np.array([rule.weights @ np.abs(g.at(rule.nodes)) ** 2])
-
-    found = integrate(moments, logarithmic_distance(g.poles))[0]
+    found = integrate(lambda w: np.abs(g.at(w)) ** 2, plain_sum, logarithmic_distance(g.poles))[0]
     assert found == pytest.approx(h2_squared(numerator, denominator), rel=1e-10)
 
 
@@ -48,10 +49,23 @@ def test_moments_of_a_first_order_spectrum(lag):
     assert values[lag] == pytest.approx((1 if lag == 0 else 2) * a**lag / (1 - a * a), rel=1e-10)
 
 
+@pytest.mark.parametrize("at_once", [1, 7, 333, 10**6])
+def test_however_many_nodes_are_taken_at_once_the_integral_is_the_same(at_once):
+    """1 / |1 - a e^{jw}|^2 has the mean 1 / (1 - a^2)."""
+    a = 0.95
+
+    def density(w):
+        assert 1 <= w.size <= at_once
+        return 1 / np.abs(1 - a * np.exp(-1j * w)) ** 2
+
+    found = integrate(density, plain_sum, logarithmic_distance([a]), at_once=at_once)
+    assert found[0] == pytest.approx(1 / (1 - a * a), rel=1e-12)
+
+
 def test_pole_on_the_circle_is_refused():
-    def moments(rule):
-        return np.array([rule.weights @ (1 / np.abs(1 - np.exp(-1j * rule.nodes)) ** 2)])
+    def density(w):
+        return 1 / np.abs(1 - np.exp(-1j * w)) ** 2
 
     with pytest.raises(InaccurateError) as error:
-        integrate(moments, logarithmic_distance([1.0]))
+        integrate(density, plain_sum, logarithmic_distance([1.0]))
     assert error.value.diagnostics[0].code == "integral-inaccurate"

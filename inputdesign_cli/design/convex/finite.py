@@ -113,8 +113,10 @@ def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | No
 
     blocks = []
     for index, matrix in enumerate(program.matrices):
-        own = _widened(sp.eye_array(entries, format="csc"), number + index * entries, total)
-        blocks.append(Block("zero", sp.csc_matrix(placed(-matrix.gains) + own), -matrix.offset))
+        wide = np.zeros((entries, total))
+        wide[:, :number], wide[:, s_at : s_at + scaled] = -matrix.gains[:, :number], -matrix.gains[:, number:]
+        wide[:, number + index * entries :][:, :entries] = np.eye(entries)
+        blocks.append(Block("zero", sp.csc_matrix(wide), -matrix.offset))
     face = program.face
     blocks.append(Block(face.kind, sp.eye_array(inside, total, format="csc"), np.zeros(inside), face.order))
     blocks += [Block("nonnegative", placed(row[None]), np.zeros(1)) for row in program.signs]
@@ -124,13 +126,12 @@ def by_cones(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | No
     for index, (matrix, part) in enumerate(zip(program.matrices, parts, strict=True)):
         for side, conic in zip(matrix.sides, part, strict=True):
             for block in conic:
-                pieces = _widened(block.information, number + index * entries, total)
-                pieces = pieces + _widened(block.auxiliary, start, total)
+                pieces = [(number + index * entries, block.information)]
                 if program.unit is not None and side:
-                    column = sp.csc_matrix(program.unit * block.constant[:, None])
-                    pieces = pieces + _widened(column, s_at, total)
+                    pieces.append((s_at, sp.csc_matrix(program.unit * block.constant[:, None])))
+                pieces.append((start, block.auxiliary))
                 offset = np.zeros(block.constant.size) if side else block.constant
-                blocks.append(Block(block.kind, sp.csc_matrix(pieces), offset, block.order))
+                blocks.append(Block(block.kind, _among(total, pieces), offset, block.order))
             start += conic[0].auxiliary.shape[1]
     q = np.zeros(total)
     q[:number] = program.cost[:number]
@@ -226,7 +227,12 @@ def _cut_cones(part: MatrixPart, entries: Entries) -> tuple[list[Cone], list[int
     return found, order
 
 
-def _widened(matrix: sp.csc_matrix, start: int, total: int) -> sp.csc_matrix:
-    rows, width = matrix.shape
-    left, right = sp.csc_matrix((rows, start)), sp.csc_matrix((rows, total - start - width))
-    return sp.hstack([left, matrix, right], format="csc")
+def _among(total: int, pieces: Sequence[tuple[int, sp.csc_matrix]]) -> sp.csc_matrix:
+    """Matrices of as many rows, in ascending order each with its first column, among `total` columns."""
+    counts = np.zeros(total + 1, dtype=np.int32)
+    for start, piece in pieces:
+        counts[start + 1 : start + 1 + piece.shape[1]] = np.diff(piece.indptr)
+    data, indices = (
+        np.concatenate(part) for part in zip(*((p.data, p.indices) for _, p in pieces), strict=True)
+    )
+    return sp.csc_matrix((data, indices, np.cumsum(counts)), shape=(pieces[0][1].shape[0], total))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.compute.time_limit import seconds_left
@@ -21,6 +21,7 @@ _POLISH = 3
 # Logarithms: an excitation so much stronger is as good as any, and a ratio that moves less stands still.
 _PLENTY, _STILL = 46.0, 1e-6
 _FAINT = -650.0  # below, powers underflow
+_EXACT = 1e-13
 _SUITED = 8.0  # how far from their own power coordinates serve
 
 
@@ -42,6 +43,10 @@ def least_white_power(experiment: Experiment, factories: Sequence[RequirementFac
             without = worst([v for _, v in problem.demands.violations(problem.baselines)])
             if without.ratio <= 1.0:
                 return 0.0
+        # The ratio falls as the root of the power where the excitation alone tells what is asked.
+        at_once = trial.at + 2.0 * trial.excess(trial.at)
+        if abs(at_once - trial.at) <= _SUITED and abs(trial.excess(at_once)) <= _EXACT:
+            return float(np.exp(at_once))
         lo, hi, trial = _enough(trial)
         excess = cache(trial.excess)
         try:

@@ -34,7 +34,7 @@ class Section(BaseModel):
     by a `phrase` in diagnostics ("type: fir"); the phrase is its tag in the union of the alternatives.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     phrase: ClassVar[str] = ""
     family: ClassVar[str] = ""

@@ -1,4 +1,7 @@
-"""What every kind of question answers, and the one dispatch: which kind a spec asks."""
+"""What every kind of question answers, and the one dispatch: which kind a spec asks.
+
+A kind is imported when it is asked for, so that a command waits for its own alone.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,6 @@ from typing import Protocol
 from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.tasks.build.campaign import build_campaign
-from inputdesign_cli.tasks.build.convex import build_convex
-from inputdesign_cli.tasks.build.given import build_given
-from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
-from inputdesign_cli.tasks.build.regression import build_regression_task
-from inputdesign_cli.tasks.build.response import build_response_task
 
 
 class Task(Protocol):
@@ -55,7 +52,11 @@ def build_analysis(spec: Spec) -> Task:
         SpecError, DataError: the spec or a file that it names cannot be used.
     """
     if spec.accuracy.frequency_response is not None and not spec.designs:
+        from inputdesign_cli.tasks.build.response import build_response_task
+
         return build_response_task(spec)
+    from inputdesign_cli.tasks.build.given import build_given
+
     return build_given(spec)
 
 
@@ -67,13 +68,23 @@ def build_task(spec: Spec) -> Task:
     """
     _check_uncertainty(spec)
     if spec.campaign is not None:
+        from inputdesign_cli.tasks.build.campaign import build_campaign
+
         return build_campaign(spec)
     if not spec.designs:
         return build_analysis(spec)
     if spec.accuracy.frequency_response is not None:
+        from inputdesign_cli.tasks.build.response import build_response_task
+
         return build_response_task(spec)
     if spec.plant.kind == "regression":
+        from inputdesign_cli.tasks.build.regression import build_regression_task
+
         return build_regression_task(spec)
     if spec.accuracy.closed_loop_error is not None:
+        from inputdesign_cli.tasks.build.loop_error import build_loop_error_task
+
         return build_loop_error_task(spec)
+    from inputdesign_cli.tasks.build.convex import build_convex
+
     return build_convex(spec)

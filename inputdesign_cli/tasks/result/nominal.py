@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.special
+import scipy
 
 from inputdesign_cli.accuracy import OnModelError
 from inputdesign_cli.identification import Estimate
