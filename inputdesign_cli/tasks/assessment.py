@@ -30,22 +30,16 @@ from inputdesign_cli.tasks.identification import (
     ModelQuestion,
     identification_results,
     identified,
+    speaking_against,
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
 from inputdesign_cli.tasks.result.levels import level_notes
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
-from inputdesign_cli.tasks.result.refutations import (
-    contradictions,
-    differences,
-    refutations,
-    repetitions,
-    unsettled,
-)
+from inputdesign_cli.tasks.result.refutations import contradictions, differences, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors, rival_notes
-from inputdesign_cli.tasks.result.spikes import spike_notes
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -129,10 +123,8 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     causes = {
         "unsettled": unsettled(found.estimate),
         "contradicted": [
-            *spike_notes(task.header.units, found.estimate, found.data),
+            *speaking_against(task.header.units, found),
             *differences(found.estimate, [name for name, _ in found.data.files]),
-            *repetitions(found.estimate, found.data.files),
-            *refutations(found.model, found.estimate),
             *contradictions(found.estimate),
             *(notes if met else []),  # more parameters miss it all the more
         ],
