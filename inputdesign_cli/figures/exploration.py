@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from inputdesign_cli.figures.style import ORANGE, PALETTE, legend_above
 from inputdesign_cli.runs.curves import OrderCurves
@@ -23,6 +24,7 @@ def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
         *curves.chosen, "o", markersize=12, markerfacecolor="none", color=ORANGE, label="chosen"
     )
     axes.set_xlabel("parameters")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     name = "y" if curves.output is None else f"y{curves.output + 1}"
     axes.set_ylabel(f"fit of {name} on unseen data (%)")
     legend_above(axes, handles)

@@ -165,6 +165,8 @@ def limits_of_sensor(name: str, x: Array) -> list[str]:
     if levels.size > _FEW_LEVELS:
         for word, value in (("largest", levels[-1]), ("smallest", levels[0])):
             at = x == value
+            # At the beginning it may be at rest, before the input moves.
+            at[: int(np.argmin(at))] = False
             runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]]))))[::2]
             stays = int(runs[runs >= _RUN].sum())
             if stays > _CLIPPED * x.size:

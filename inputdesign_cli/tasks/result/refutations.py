@@ -36,9 +36,10 @@ def unsettled(estimate: Estimate) -> list[str]:
     """What to say of a search that did not settle."""
     if estimate.converged:
         return []
+    begun = "its only start" if estimate.starts == 1 else f"the best of {estimate.starts} starts"
     return [
-        f"the search did not settle after {estimate.steps} steps from the best of {estimate.starts} "
-        "starts: the estimate may be far from the minimum; the orders may be too high for these data"
+        f"the search did not settle after {estimate.steps} steps from {begun}: "
+        "the estimate may be far from the minimum; the orders may be too high for these data"
     ]
 
 

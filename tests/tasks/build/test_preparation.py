@@ -78,6 +78,7 @@ def test_saturation_and_rounding_are_seen():
     x = np.sin(0.05 * np.arange(400.0))
     assert limits_of_sensor("y", x) == []
     assert "saturated" in limits_of_sensor("y", np.minimum(x, 0.8))[0]
+    assert limits_of_sensor("y", np.concatenate([np.full(50, x.min()), x])) == limits_of_sensor("y", x)
     assert "rounded to steps of 0.25" in limits_of_sensor("y", np.round(4 * x) / 4)[0]
 
 

@@ -27,7 +27,7 @@ def read_sheet(path: Path, *, key: str) -> Sheet:
     """
     raw = _bytes(path, key)
     if len(raw) > _MOST_BYTES:
-        raise unreadable(path, key, "is larger than 100 MiB", "keep to what the design needs")
+        raise unreadable(path, key, "is larger than 100 MiB", "keep the rows and columns that are needed")
     kind = path.suffix.lower()
     if kind == ".npz":
         return read_npz(path, key, raw)
