@@ -32,7 +32,7 @@ def shown(name):
 def test_the_page_is_that_of_the_script(name):
     """But for what the commands say: that fills the gaps."""
     text, _ = PAGES[name]
-    gaps = r"(?:```\n.*?\n```|\d[\d.]*(?: %)?)"
+    gaps = r"(?:```\n.*?\n```|\d[\d.]*(?: %)?|(?:\|.*\|\n?)+)"
     expected = gaps.join(map(re.escape, re.split(r"\{\w+\}", text)))
     assert re.fullmatch(expected, written(name), re.DOTALL)
     assert shown(name) == {file.name for file in DOCS.glob(f"images/{name}_*")}

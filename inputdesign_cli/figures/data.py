@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,6 +14,7 @@ from inputdesign_cli.runs.curves import FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.runs.results import Array
 
 SHOWN = 400
+_AS_LIVELY = 0.5
 
 
 def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
@@ -18,33 +22,51 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
     single = len(curves.panels) == 1
     rows = 2 if single else len(curves.panels)
     axes = page.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[2, 1] if single else None)[:, 0]
-    time = curves.time[:SHOWN]
+    shown = stretch([panel.y for panel in curves.panels])
+    time = curves.time[shown]
     unit = time_unit
     if curves.time.size > SHOWN:
-        unit = f"{time_unit}; first {SHOWN} of {curves.time.size} samples"
+        part = f"samples {shown.start + 1} to {shown.stop}" if shown.start else f"first {SHOWN}"
+        unit = f"{time_unit}; {part} of {curves.time.size}{'' if shown.start else ' samples'}"
     axes[-1].set_xlabel(f"time ({unit})")
     axes[-1].set_xlim(time[0], time[-1])
     if single:
         (panel,) = curves.panels
         explained = "" if panel.fit is None else f" (fit {panel.fit:.1f} %)"
-        handles = _plot(axes[0], time, panel, "y", f"simulated from u{explained}")
+        handles = _plot(axes[0], time, panel, shown, "y", f"simulated from u{explained}")
         axes[0].set_ylabel(panel.label or "output")
-        axes[1].plot(time, (panel.y - panel.predicted)[:SHOWN], color=BLUE, linewidth=0.8)
+        axes[1].plot(time, (panel.y - panel.predicted)[shown], color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
         legend_above(axes[0], handles)
         return
     longest: list[Artist] = []
     for panel, place in zip(curves.panels, axes, strict=True):
-        longest = max(longest, _plot(place, time, panel, "recorded", "simulated from u"), key=len)
+        longest = max(longest, _plot(place, time, panel, shown, "recorded", "simulated from u"), key=len)
         explained = "" if panel.fit is None else f", fit {panel.fit:.1f} %"
         name = panel.label or f"y{panel.output + 1}"
         place.set_title(f"{name}{explained}", loc="left", color=GREY)
     legend_over_all(page, longest)
 
 
-def _plot(axes: Axes, time: Array, panel: FitPanel, recorded: str, simulated: str) -> list[Artist]:
+def stretch(outputs: Sequence[Array]) -> slice:
+    """The first samples of outputs (n,), or those in which they move most, if that is far more."""
+    size = len(outputs[0])
+    if size <= SHOWN:
+        return slice(0, size)
+    begins = np.arange(0, size - SHOWN + 1, SHOWN // 4)
+    moves = np.zeros(begins.size)
+    for y in outputs:
+        windows = np.lib.stride_tricks.sliding_window_view(y, SHOWN)[begins]
+        moves += np.nanvar(windows, axis=1) / max(float(np.nanvar(y)), 1e-300)
+    best = int(np.argmax(moves))
+    begin = 0 if moves[0] >= _AS_LIVELY * moves[best] else int(begins[best])
+    return slice(begin, begin + SHOWN)
+
+
+def _plot(
+    axes: Axes, time: Array, panel: FitPanel, shown: slice, recorded: str, simulated: str
+) -> list[Artist]:
     handles: list[Artist] = []
-    shown = slice(0, SHOWN)
     handles += axes.plot(time, panel.y[shown], color=BLACK, linewidth=1.0, label=recorded)
     label = "predicted one step ahead"
     handles += axes.plot(time, panel.predicted[shown], color=BLUE, linewidth=1.0, label=label)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inputdesign_cli.runs.curves import ErrorBandCurves
+from inputdesign_cli.runs.curves import ErrorBandCurves, FitCurves, FitPanel
 from tests.support.curves import BANDS, CURVES, G, W, Z, lines_by_label
 
 
@@ -15,6 +15,24 @@ def test_a_long_record_shows_its_beginning_and_the_histogram_of_all(page):
     assert "first 1000 of 3000 samples, 4 of 6 channels" in figure.axes[6].get_xlabel()
     assert record.lines[0].get_xdata().size == 1000
     assert sum(bar.get_width() for bar in histogram.patches) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(
+    ("moves", "label"),
+    [
+        (slice(0, 3000), "(s; first 400 of 3000 samples)"),
+        (slice(2000, 2400), "(s; samples 2001 to 2400 of 3000)"),
+    ],
+)
+def test_a_fit_is_shown_where_the_output_moves(page, moves, label):
+    y = np.zeros(3000)
+    y[moves] = np.sin(np.arange(3000.0))[moves]
+    axes = page(FitCurves(np.arange(3000.0), (FitPanel(y, y, y),))).axes
+    assert label in axes[-1].get_xlabel()
+    begin = 2000 if "2001" in label else 0
+    for line in (axes[0].lines[0], axes[1].lines[0]):
+        np.testing.assert_array_equal(line.get_xdata(), np.arange(begin, begin + 400.0))
+    np.testing.assert_array_equal(axes[0].lines[0].get_ydata(), y[begin : begin + 400])
 
 
 def test_what_is_applied_is_held_and_stands_over_what_it_causes(page):
