@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from inputdesign_cli.accuracy.cut import Cut
 from inputdesign_cli.accuracy.cuts import DeterminantCut, MatrixCut, TraceCut, VarianceCut

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.information.coordinates import taking_part, triangular_factor

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.adequacy import Echoes, ScoreTest, failed, score_tests

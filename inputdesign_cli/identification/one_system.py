@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.special
+import scipy
 
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.plant.polynomial import Array

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.special
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.adequacy import by_chance

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.polynomial import polynomial as ascending
 
 from inputdesign_cli.plant.model import DELAY

@@ -14,7 +14,7 @@ from operator import or_
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import ArrayLike
 
 from inputdesign_cli.plant.frequencies import logarithmic_distance

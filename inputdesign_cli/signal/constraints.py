@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.plant.polynomial import Array

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.signal.sinusoids import Sinusoids

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 # Levels are found to this relative accuracy where the record is a multiple of its values, and to
 # the coarser one where limits and rounding make it depend on the level in another way.

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 import scipy.sparse.linalg
 
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, unit_circle

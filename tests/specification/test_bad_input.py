@@ -31,6 +31,10 @@ ROWS: list[Row] = [
     ("wrong-shape", "noise", "mapping", {"noise": "§[1]"}),
     ("wrong-shape", "spectrum", "mapping", {"spectrum": "§fir"}),
     ("wrong-shape", "accuracy.model_error", "mapping", {"accuracy": "{model_error: §0.01}"}),
+    ("wrong-shape", "uncertainty.intervals.b1", "two numbers, not 1", {
+        "uncertainty": "{intervals: {b1: §[0.7]}}"}),
+    ("wrong-shape", "uncertainty.intervals.b1", "two numbers, not 3", {
+        "uncertainty": "{intervals: {b1: §[0.7, 0.8, 0.9]}}"}),
     ("not-a-number", "sample_time", "true", {"sample_time": "§true"}),
     ("not-a-number", "sample_time", 'the text "yes"', {"sample_time": "§yes"}),
     ("not-a-number", "sample_time", "a list", {"sample_time": "§[1]"}),

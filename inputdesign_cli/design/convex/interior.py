@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from inputdesign_cli.compute.time_limit import seconds_left
 from inputdesign_cli.design.convex.cones import Cone

@@ -9,8 +9,7 @@ true plant.
 from __future__ import annotations
 
 import numpy as np
-import scipy.optimize
-import scipy.special
+import scipy
 
 from inputdesign_cli.plant.polynomial import Array
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from inputdesign_cli.accuracy import worst
 from inputdesign_cli.compute.time_limit import seconds_left

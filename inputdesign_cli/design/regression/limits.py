@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from inputdesign_cli.design.regression.lift import Box, Scaling
 from inputdesign_cli.design.regression.toeplitz import ToeplitzProblem

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
-import scipy.optimize
+import scipy
 
 from inputdesign_cli.compute.time_limit import finishing, seconds_left
 from inputdesign_cli.design.regression.alternating import alternate

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import singledispatch
 
 import numpy as np
-import scipy.special
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.identification.estimators import estimator

@@ -76,6 +76,10 @@ def _translate(error: ErrorDetails, root: type[Section], time_unit: Plain) -> li
         return [replace(found, path=path + found.path) for found in context[CARRIER]]
     if kind == "extra_forbidden":
         return [_unknown_key(path, declared_at(root, location[:-1]).section, root)]
+    if kind == "missing" and path and isinstance(path[-1], int):
+        what = declared_at(root, location[:-1]).wording.what or "a longer list"
+        message, hint = f"{{key}} must be {what}, not {path[-1]}", "write all of them, [.., ..]"
+        return [PathDiagnostic("wrong-shape", message, hint, path[:-1])]
     if kind == "missing":
         return [_missing(path, declared_at(root, location[:-1]).section)]
     if kind == "too_short" and error["input"]:
@@ -116,6 +120,8 @@ def _wrong_value(
         return "wrong-shape", f"{{key}} is {empty}; it needs at least one entry", hint
     # A list that is nested wrongly is a list; that it is one says nothing.
     mistaken = kind == "union_tag_invalid" and isinstance(value, list)
+    if kind == "too_long" and isinstance(value, list):
+        return "wrong-shape", f"{{key}} must be {what}, not {len(value)}", hint or "write as many"
     wrong = f"{{key}} must be {what}" + ("" if mistaken else f", not {describe(value)}")
     if kind in ("string_type", "string_pattern_mismatch"):
         return "not-a-text", wrong, hint or advice

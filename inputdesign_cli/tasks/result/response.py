@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.special
+import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
