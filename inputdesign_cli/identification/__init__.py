@@ -15,6 +15,11 @@ from inputdesign_cli.identification.frequency_response import (
     frequency_response as frequency_response,
     silent_in as silent_in,
 )
+from inputdesign_cli.identification.frozen import (
+    Frozen as Frozen,
+    frozen as frozen,
+    resolution_of as resolution_of,
+)
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (
     ResidualTest as ResidualTest,

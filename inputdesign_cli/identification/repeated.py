@@ -21,7 +21,7 @@ _LAGS = 8
 # Larger errors, in standard deviations, count as much: single spikes say nothing.
 _SPIKE = 3.0
 _ORDER = 20
-_NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
+NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Repetition:
 
 def repetition(errors: Array) -> Repetition | None:
     """The longest stretch of errors (samples, p) that comes again; None where none does."""
-    spread = np.median(np.abs(errors), axis=0) / _NORMAL
+    spread = np.median(np.abs(errors), axis=0) / NORMAL
     samples = len(errors)
     if samples < 2 * _IN_A_ROW or not np.all(spread > 0.0):
         return None
-    e = np.column_stack([_white(x) for x in np.clip(errors / spread, -_SPIKE, _SPIKE).T])
+    e = np.column_stack([whitened(x) for x in np.clip(errors / spread, -_SPIKE, _SPIKE).T])
     around = scipy.fft.rfft(e, 2 * samples, axis=0)
     products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)
     lags = np.arange(_IN_A_ROW, samples - _IN_A_ROW + 1)
@@ -49,7 +49,7 @@ def repetition(errors: Array) -> Repetition | None:
     return max(found, key=lambda one: one.length, default=None)
 
 
-def _white(x: Array) -> Array:
+def whitened(x: Array) -> Array:
     """What an autoregression leaves of a signal (N,), by the equations of Yule and Walker."""
     order = min(_ORDER, x.size // 10)
     x = x - x.mean()

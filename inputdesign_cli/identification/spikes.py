@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inputdesign_cli.identification.repeated import NORMAL
 from inputdesign_cli.plant.polynomial import Array
 
 # Farther from zero than so many robust standard deviations; of as few samples as this, than twice as many.
 _FAR, _UNSURE = 8.0, 20
 # Not more of the samples than this, which hold this share of the sum of squares.
 _FEW, _MOST = 0.05, 0.5
-_NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ def spikes(errors: Array) -> list[Spikes]:
     """Of prediction errors (samples, p): output by output, where few hold most of the sum of squares."""
     found = []
     for output, e in enumerate(errors.T):
-        spread = float(np.median(np.abs(e))) / _NORMAL
+        spread = float(np.median(np.abs(e))) / NORMAL
         far = np.flatnonzero(np.abs(e) > _FAR * (1.0 + _UNSURE / e.size) * spread)
         if not far.size or not spread > 0.0 or far.size > _FEW * e.size:
             continue

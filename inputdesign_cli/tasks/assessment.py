@@ -30,22 +30,17 @@ from inputdesign_cli.tasks.identification import (
     ModelQuestion,
     identification_results,
     identified,
+    speaking_against,
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
+from inputdesign_cli.tasks.result.faults import faults
 from inputdesign_cli.tasks.result.levels import level_notes
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
-from inputdesign_cli.tasks.result.refutations import (
-    contradictions,
-    differences,
-    refutations,
-    repetitions,
-    unsettled,
-)
+from inputdesign_cli.tasks.result.refutations import contradictions, differences, unsettled
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.rivals import beyond_admissible, beyond_errors, rival_notes
-from inputdesign_cli.tasks.result.spikes import spike_notes
 
 _ROUNDING = 1e-9
 # What a record that is rounded to a file may be off.
@@ -125,14 +120,13 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     if found.question is not None:
         without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
-    notes = objections(task.header.units, without)
+    broken = bool(faults(task.header.units, found.estimate, found.data))
+    notes = [] if broken else objections(task.header.units, without)
     causes = {
         "unsettled": unsettled(found.estimate),
         "contradicted": [
-            *spike_notes(task.header.units, found.estimate, found.data),
+            *speaking_against(task.header.units, found),
             *differences(found.estimate, [name for name, _ in found.data.files]),
-            *repetitions(found.estimate, found.data.files),
-            *refutations(found.model, found.estimate),
             *contradictions(found.estimate),
             *(notes if met else []),  # more parameters miss it all the more
         ],
@@ -149,7 +143,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
         assessment["neglected"] = [one.entry(task.header.units) for one in without]
     if found.question is not None:
         assessment["nominal"], told_apart = _from_nominal(task, found, found.question)
-        notes += told_apart
+        notes += [] if broken else told_apart
     if verdict == "met":
         notes += unseen(task.header.units, without)
     judged = _with_notes(_judged(identification, verdict, assessment), notes)

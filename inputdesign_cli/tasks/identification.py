@@ -16,7 +16,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.runs.units import Header
+from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.confidence import Confidence
@@ -27,9 +27,9 @@ from inputdesign_cli.tasks.result.estimates import (
     model_text,
     prior_notes,
 )
-from inputdesign_cli.tasks.result.refutations import differences, repetitions
+from inputdesign_cli.tasks.result.faults import faults
+from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_notes
-from inputdesign_cli.tasks.result.spikes import spike_notes
 
 
 @dataclass(frozen=True)
@@ -139,6 +139,14 @@ def told(error: IdesignError) -> str:
     return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
 
+def speaking_against(units: Units, found: Identified) -> list[str]:
+    """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
+    return faults(units, found.estimate, found.data) or [
+        *refutations(found.model, found.estimate),
+        *repetitions(found.estimate, found.data.files),
+    ]
+
+
 def identification_results(task: Identification, found: Identified, started: float) -> Results:
     """What `idesign identify` writes.
 
@@ -152,10 +160,9 @@ def identification_results(task: Identification, found: Identified, started: flo
     elif found.preparation.levels:
         result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
-    notes = spike_notes(header.units, estimate, found.data)
-    notes += identification_notes(found.data.notes, found.model, estimate)
+    against = speaking_against(header.units, found)
+    notes = identification_notes(found.data.notes, found.model, estimate, against)
     notes += differences(estimate, [name for name, _ in found.data.files])
-    notes += repetitions(estimate, found.data.files)
     notes += prior_notes(estimate, stated=task.has_prior)
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, norm
 from typer.testing import CliRunner
 
 from inputdesign_cli import assess, parse_spec
@@ -144,7 +145,9 @@ def test_in_a_loop_the_reference_is_used_where_it_is_recorded(heater_record, tmp
         assert ("record the reference as column r" in " ".join(result["notes"])) == (by == "u")
 
 
-@pytest.mark.parametrize(("factor", "contradicts"), [(1.0, False), (1.1, False), (-1.0, True), (3.0, True)])
+@pytest.mark.parametrize(
+    ("factor", "contradicts"), [(1.0, False), (1.1, False), (1.6, False), (-1.0, True), (3.0, True)]
+)
 def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, heater_record):
     path = heater_record("a.csv", 720, 1)
     B = [0, 0, 0, 0, 0, 0, *(factor * 2.35 * (1 - SLOW) * share for share in (0.4, 0.6))]
@@ -159,6 +162,8 @@ def test_a_plant_that_is_not_the_one_of_the_spec_is_told(factor, contradicts, he
     P = covariance_of(result, names)
     away = np.array([*B[6:], -SLOW]) - [result["identification"]["theta"][name] for name in names]
     assert nominal["statistic"] == pytest.approx(away @ np.linalg.solve(P, away), rel=1e-6)
+    far = nominal["statistic"] > chi2.isf(2 * norm.sf(5.0), 3)
+    assert (f"lies {np.sqrt(nominal['statistic']):.3g} standard dev" in notes) == (far and not contradicts)
     if contradicts:
         share = abs(factor - 1.0) / max(abs(factor), 1.0)
         assert nominal["worst_difference"] == pytest.approx(share, rel=0.15)

@@ -32,7 +32,8 @@ class Found:
     """What a record tells.
 
     Attributes:
-        outputs: what was found for each; `taken` is the candidate that the model is made of.
+        outputs: what was found for each; `taken` is the candidate that the model is made of, `ranges` has of
+            each input the delays that 95 % of confidence leaves it.
         model: of all channels, estimated on the whole record; inputs that never move have no part in it.
         estimate: its estimate; `used` are the records that it was made from.
         validation: the fits of the same structures, estimated on one part, to the other.
@@ -42,6 +43,7 @@ class Found:
 
     outputs: tuple[Chosen, ...]
     taken: tuple[Candidate, ...]
+    ranges: tuple[tuple[tuple[int, int], ...], ...]
     model: Model
     estimate: Estimate
     used: Parts
@@ -94,6 +96,7 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) 
     return Found(
         tuple(found),
         taken,
+        tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
         whole,
         replace(estimate, names=whole.names),
         busiest(parts, _MOST_SAMPLES),

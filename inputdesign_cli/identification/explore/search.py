@@ -117,15 +117,16 @@ class Chosen:
 
     Attributes:
         candidates: the best first.
-        ranges: of each input, the delays that 95 % of confidence leaves.
         by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
         finalists: those that may be taken, the best first.
+        estimated: the records of the first part, and `most` the longest delay that was looked for.
     """
 
     candidates: tuple[Candidate, ...]
-    ranges: tuple[tuple[int, int], ...]
     by_order: dict[int, float]
     finalists: tuple[Candidate, ...]
+    estimated: Parts
+    most: int
 
     @property
     def best(self) -> Candidate:
@@ -137,6 +138,11 @@ class Chosen:
         """Those that may be taken, then the others, the best first; those on the edge of stability last."""
         others = [c for c in self.candidates if all(c is not one for one in self.finalists)]
         return sorted((*self.finalists, *others), key=lambda c: not c.steady)
+
+    def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
+        """Of each input, the delays that 95 % of confidence leaves a candidate."""
+        order = min(max(candidate.orders.order, 1), max(self.by_order))
+        return candidate.ranges or _ranges(self.estimated, order, candidate.orders.delays, self.most)
 
     def best_of(self, *, physical: bool) -> Candidate | None:
         """The best with parameters of that kind among those that are about as good as any."""
@@ -273,9 +279,7 @@ def explore_structure(
     )
     best = good[0]
     rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
-    order = min(max(best.orders.order, 1), highest)
-    ranges = best.ranges or _ranges(first, order, best.orders.delays, most)
-    return Chosen((best, *rest), ranges, by_order, tuple(good))
+    return Chosen((best, *rest), by_order, tuple(good), first, most)
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:

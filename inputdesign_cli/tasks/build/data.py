@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
+from inputdesign_cli.identification import resolution_of
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
@@ -38,6 +40,21 @@ from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
 
 
 @dataclass(frozen=True)
+class Recorded:
+    """The outputs as they stand in the files.
+
+    Attributes:
+        rows: (samples,), where each sample stands; the nearest one, where times were evened out.
+        held: (samples, p), whether a value is that of the sample before.
+        resolution: (p,), the step in which each is recorded.
+    """
+
+    rows: NDArray[np.int64]
+    held: NDArray[np.bool_]
+    resolution: Array
+
+
+@dataclass(frozen=True)
 class Data:
     """u (samples, r) and y (samples, p) of experiments one after the other, and what to know of them.
 
@@ -48,6 +65,7 @@ class Data:
         time: (samples,), in the unit of the spec; counted from zero in a file that has none.
         notes: what was done to the record and what was seen in it.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
+        recorded: of the outputs; None: not known.
     """
 
     u: Array
@@ -58,6 +76,7 @@ class Data:
     files: tuple[tuple[str, int], ...]
     notes: tuple[str, ...]
     means: Array | None = None
+    recorded: Recorded | None = None
 
 
 def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Data:
@@ -94,6 +113,15 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
         np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
+        _together([part.recorded for part in parts if part.recorded is not None]),
+    )
+
+
+def _together(parts: Sequence[Recorded]) -> Recorded:
+    return Recorded(
+        np.concatenate([part.rows for part in parts]),
+        np.concatenate([part.held for part in parts]),
+        np.max([part.resolution for part in parts], axis=0),
     )
 
 
@@ -152,7 +180,7 @@ def _detrended(part: Segment, signals: Signals, preparation: Preparation) -> tup
             told.append(f"{what} was taken away from {name}")
             columns.append(x - away)
         found[letter] = np.column_stack(columns)
-    return Segment(part.time, found["u"], found["y"]), told
+    return Segment(part.time, found["u"], found["y"], part.held), told
 
 
 def _worst_step(time: Array, step: float) -> int:
@@ -181,7 +209,17 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         ((path.name, len(inputs)),),
         tuple(f"{path.name}: {note}" if named else note for note in told),
         np.nanmean(signals.u[:, : units.inputs], axis=0),
+        _recorded(signals, units.sample_time, segments),
     )
+
+
+def _recorded(signals: Signals, step: float, segments: Sequence[Segment]) -> Recorded:
+    stamped = np.flatnonzero(~np.isnan(signals.time))
+    stamps = signals.time[stamped] * (1.0 if signals.name else step)
+    times = np.concatenate([part.time for part in segments])
+    nearest = np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)
+    held = np.concatenate([part.held for part in segments])
+    return Recorded(signals.sheet.lines[stamped[nearest]], held, resolution_of(signals.y))
 
 
 def _check_different(paths: Sequence[Path], parts: Sequence[Data]) -> None:

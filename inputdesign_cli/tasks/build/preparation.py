@@ -61,11 +61,22 @@ class Preparation:
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p)."""
+    """A stretch of a record without gaps: times (n,), inputs (n, r), outputs (n, p).
+
+    Attributes:
+        held: (n, p), whether an output is what it was a sample before, as it was recorded.
+    """
 
     time: Array
     u: Array
     y: Array
+    held: NDArray[np.bool_]
+
+    @classmethod
+    def recorded(cls, time: Array, u: Array, y: Array) -> Segment:
+        """One from which nothing was taken away."""
+        held = np.concatenate([np.zeros((1, y.shape[1]), dtype=bool), y[1:] == y[:-1]])
+        return cls(time, u, y, held[: len(y)])
 
 
 def whole_segments(
@@ -99,7 +110,7 @@ def whole_segments(
             + (f"; {left} samples in shorter ones were left out" if left else "")
         )
         parts = longer
-    return [Segment(time[part], u[part], y[part]) for part in parts], told
+    return [Segment.recorded(time[part], u[part], y[part]) for part in parts], told
 
 
 def jitter(segments: Sequence[Segment], step: float) -> float:
@@ -114,7 +125,7 @@ def resampled(part: Segment, step: float) -> Segment:
     even = part.time[0] + step * np.arange(count)
     y = np.column_stack([np.interp(even, part.time, column) for column in part.y.T])
     nearest = np.searchsorted(0.5 * (part.time[1:] + part.time[:-1]), even)
-    return Segment(even, part.u[nearest], y)
+    return Segment.recorded(even, part.u[nearest], y)
 
 
 def trend(x: Array, kind: Detrend) -> tuple[Array, str]:

@@ -13,7 +13,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
-from inputdesign_cli.tasks.result.refutations import contradictions, refutations, unsettled
+from inputdesign_cli.tasks.result.refutations import contradictions, unsettled
 from inputdesign_cli.tasks.result.remedies import vague_notes
 from inputdesign_cli.tasks.result.rivals import rival_entries
 
@@ -99,11 +99,14 @@ def _free_start(estimate: Estimate) -> list[str]:
     ]
 
 
-def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Estimate) -> list[str]:
+def identification_notes(
+    of_the_data: Sequence[str], model: Model, estimate: Estimate, against: Sequence[str]
+) -> list[str]:
     """What a user should know of the data, and what speaks against trusting the estimate.
 
     Args:
         model: the estimate as a model.
+        against: what its tests and the record say against it.
     """
     notes, samples, predictor = list(of_the_data), len(estimate.errors), predictor_of(model)
     notes += [*unsettled(estimate), *_free_start(estimate)]
@@ -118,7 +121,7 @@ def identification_notes(of_the_data: Sequence[str], model: Model, estimate: Est
             "samples can tell: the covariance is not to be trusted there, and a design on this model would "
             "count on noise that vanishes or never fades; take more data, or a lower order"
         )
-    notes += refutations(model, estimate)
+    notes += against
     unexplained = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
     if unexplained:
         single = len(estimate.noise) == 1

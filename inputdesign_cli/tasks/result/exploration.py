@@ -46,11 +46,13 @@ def exploration_entry(
                 "output": f"y{i + 1}",
                 "structure": _structure(taken),
                 "delay": list(taken.orders.delays),
-                "delay_range": [list(pair) for pair in chosen.ranges],
+                "delay_range": [list(pair) for pair in ranges],
                 "output_error_by_order": {str(n): rms for n, rms in chosen.by_order.items()},
                 "structures": [_structure(candidate) for candidate in chosen.candidates],
             }
-            for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True))
+            for i, (chosen, taken, ranges) in enumerate(
+                zip(found.outputs, found.taken, found.ranges, strict=True)
+            )
         ],
         "trusted": not reasons,
         "reasons": list(reasons),
@@ -78,13 +80,13 @@ def exploration_notes(
     """What a user should know of the record and of how the model was chosen."""
     single, alone = found.model.outputs == 1, found.model.inputs == 1
     notes = []
-    for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True)):
+    for i, (chosen, taken, ranges) in enumerate(zip(found.outputs, found.taken, found.ranges, strict=True)):
         name = "y" if single else f"y{i + 1}"
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
         moving = [j for j in range(found.model.inputs) if j not in found.still]
         delays = " and ".join(
             f"{delay} from {'u' if alone else f'u{j + 1}'} (95 %: {low} to {high})"
-            for j, delay, (low, high) in zip(moving, taken.orders.delays, chosen.ranges, strict=False)
+            for j, delay, (low, high) in zip(moving, taken.orders.delays, ranges, strict=True)
         )
         notes.append(
             f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; estimated on one part it "

@@ -19,6 +19,8 @@ from inputdesign_cli.runs.units import Units
 _ANOTHER, _BEYOND_ERROR = 0.5, 2.0
 # A statistic that chance exceeds more often than this contradicts nothing.
 _CHANCE = 1e-3
+# The probability that a normal variable is farther than five standard deviations from its mean.
+_FIVE_DEVIATIONS = 5.733e-7
 _AWAY = 4.0
 _LISTED = 4
 
@@ -55,15 +57,23 @@ def from_nominal(
     found = [_apart(units, nominal, estimated, error, information) for error in errors]
     worst = max((one for places in found for one in places), key=lambda one: one.share, default=None)
     told: dict[str, Json] = {
+        "deviations": float(np.sqrt(statistic)),
         "statistic": statistic,
         "degrees_of_freedom": of_plant.size,
         "probability": float(scipy.special.chdtrc(of_plant.size, statistic)),
     }
+    deviations = np.abs(away) / scale
+    listed = [
+        f"{estimate.names[of_plant[k]]} is {estimate.theta[of_plant[k]]:.4g}, not "
+        f"{nominal.theta[of_plant[k]]:.4g} ({deviations[k]:.3g} standard deviations)"
+        for k in np.argsort(-deviations)[:_LISTED]
+        if deviations[k] > _AWAY
+    ]
     if worst is None:
-        return told, []
+        return told, _far(told, listed)
     told |= {"worst_difference": worst.share, "opposite_sign": any(o.opposite for p in found for o in p)}
     if worst.share <= _ANOTHER:
-        return told, []
+        return told, _far(told, listed)
     sign = "of the opposite sign at low frequency, and " if told["opposite_sign"] else ""
     apart = (
         f"G{worst.entry} is {sign}up to {100 * worst.share:.0f} % of the larger one apart at "
@@ -75,17 +85,23 @@ def from_nominal(
             "the estimate is far from the plant of the spec, but so uncertain that it does not contradict "
             f"it: {apart}, probability {told['probability']:.2g}). A longer record would tell"
         ]
-    deviations = np.abs(away) / scale
-    listed = [
-        f"{estimate.names[of_plant[k]]} is {estimate.theta[of_plant[k]]:.4g}, not "
-        f"{nominal.theta[of_plant[k]]:.4g} ({deviations[k]:.3g} standard deviations)"
-        for k in np.argsort(-deviations)[:_LISTED]
-        if deviations[k] > _AWAY
-    ]
     return told, [
         f"the estimate contradicts the plant of the spec: {apart}{'; ' * bool(listed)}{', '.join(listed)}). "
         "The design rested on the plant of the spec; what is admitted here is that of the estimate. Check "
         "signs and units of the record; if they are right, put the estimate into the spec"
+    ]
+
+
+def _far(told: dict[str, Json], listed: Sequence[str]) -> list[str]:
+    """What to say of a plant that is not the one of the spec, but near it."""
+    if told["probability"] > _FIVE_DEVIATIONS:
+        return []
+    return [
+        f"the estimate lies {told['deviations']:.3g} standard deviations from the plant of the spec (all "
+        f"parameters of G together, chi-squared {told['statistic']:.4g} with {told['degrees_of_freedom']} "
+        f"degrees of freedom{'; ' * bool(listed)}{', '.join(listed)}): it is another plant, its units are "
+        "others, or the numbers of the spec, on which the design rested, were poor. The verdict holds for "
+        "the estimate: r_u and r_adm are those at its parameters"
     ]
 
 

@@ -59,8 +59,11 @@ def test_order_and_family_of_a_simulated_plant():
     best = found.best
     assert abs(best.orders.order - 1) <= 1
     assert abs(best.orders.delays[0] - 4) <= 1
-    low, high = found.ranges[0]
+    ((low, high),) = found.ranges(best)
     assert low <= best.orders.delays[0] <= high
+    # A candidate has a range of its own, and with more coefficients it is no narrower at its low end.
+    assert len({found.ranges(c) for c in found.finalists}) > 1
+    assert all(found.ranges(c)[0][0] <= 4 for c in found.finalists)
     noise_free = 100.0 * (1.0 - np.sqrt(1.0 / 11.0))
     assert best.validation == pytest.approx(noise_free, abs=5.0)
 
@@ -154,6 +157,7 @@ def test_an_input_that_never_moves_has_no_part_of_the_model():
     assert found.still == (0,)
     assert not np.any(found.model.B[0][0])
     assert found.estimate.names == found.model.names
+    assert found.ranges == (found.outputs[0].ranges(found.taken[0]),)
     with pytest.raises(SpecError, match="same value"):
         explore_records([(np.full((300, 1), 3.0), y)])
 

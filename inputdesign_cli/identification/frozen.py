@@ -1,0 +1,106 @@
+"""Does a sensor stand still? Then samples are equal where noise, or the input, would move them.
+
+An innovation of standard deviation s falls into a cell of width d, wherever it lies, with a probability of at
+most d f / s, where f is the largest density of usual noise. So many equal samples in a row are beyond chance
+where that is small. Where rounding hides the noise, the model tells: it moves by more than a cell and its own
+errors while the sensor does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.repeated import NORMAL, whitened
+from inputdesign_cli.plant.polynomial import Array
+
+# Fewer equal samples in a row, and fewer samples in all, say nothing.
+_SHORTEST, _FEW = 5, 20
+# Of a record of noise, rounded or not, some run is called frozen with at most this probability.
+_CHANCE = 1e-4
+# The largest density of noise with two-sided exponential tails, by its robust deviation; normal: 0.4.
+_DENSITY = 0.52
+# A filter of two differences passes so much of the mean square of rounding, d^2 / 12.
+_ROUNDING = 6.0 / 12.0
+# The errors of a simulation hardly span so many of their robust standard deviations.
+_SPAN = 8.0
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Output `output` stands still for `length` samples from `first` on."""
+
+    output: int
+    first: int
+    length: int
+
+
+def frozen(
+    held: NDArray[np.bool_],
+    resolution: Array,
+    u: Array,
+    errors: Array,
+    apart: Array,
+    simulated: Array,
+    lengths: Sequence[int],
+) -> list[Frozen]:
+    """The stretches in which an output stands still while an input moves, output by output.
+
+    Args:
+        held: (samples, p), whether the sample is that before, as recorded.
+        resolution: (p,), the step in which each output is recorded.
+        u: (samples, r).
+        errors: (samples, p), of prediction.
+        apart: (samples, p), the record less what the model simulates.
+        simulated: (samples, p).
+        lengths: of the stretches without gaps.
+    """
+    ends = np.cumsum([0, *lengths])
+    found = []
+    for output, d in enumerate(resolution.tolist()):
+        stays = _likely(errors[:, output], d)
+        size = _spread(apart[:, output])
+        for start, end in pairwise(ends.tolist()):
+            for first, length in _runs(held[start:end, output]):
+                run = slice(start + first, start + first + length)
+                if not np.any(np.diff(u[run][:-1], axis=0)):
+                    continue
+                by_chance = len(u) * stays ** (length - 1)
+                if by_chance < _CHANCE or np.ptp(simulated[run, output]) > d + _SPAN * size:
+                    found.append(Frozen(output, start + first, length))
+    return found
+
+
+def resolution_of(y: Array) -> Array:
+    """(p,): the step in which outputs y (n, p), NaN where missing, are recorded; little for plain noise."""
+    found = np.zeros(y.shape[1])
+    for output, x in enumerate(y.T):
+        steps = np.abs(np.diff(x[~np.isnan(x)]))
+        moves = steps[steps > 0.0]
+        if moves.size:  # a single value between the cells, filled in by hand, is no step
+            found[output] = np.quantile(moves, 0.05, method="lower")
+    return found
+
+
+def _likely(errors: Array, d: float) -> float:
+    """The largest probability that a sample falls into the cell of the last one."""
+    if errors.size < _FEW or not np.any(errors):
+        return 1.0
+    white = whitened(errors)
+    variance = _spread(white) ** 2 - _ROUNDING * d**2
+    return min(1.0, _DENSITY * d / float(np.sqrt(variance))) if variance > 0.0 else 1.0
+
+
+def _spread(x: Array) -> float:
+    return float(np.median(np.abs(x - np.median(x)))) / NORMAL
+
+
+def _runs(held: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First samples and lengths of runs of equal samples that say something."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held[1:], [False]]).astype(int)))
+    found = zip(edges[::2].tolist(), (edges[1::2] - edges[::2] + 1).tolist(), strict=True)
+    return [(first, length) for first, length in found if length >= _SHORTEST]

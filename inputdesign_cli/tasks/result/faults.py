@@ -1,0 +1,65 @@
+"""What to say of faults of measurement: samples that decide what a record says, sensors that stand still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inputdesign_cli.identification import Estimate, frozen, spikes
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.data import Data
+
+_SHOWN = 5
+
+
+def faults(units: Units, estimate: Estimate, data: Data) -> list[str]:
+    """A sentence for every output and kind of fault."""
+    return [*_spikes(units, estimate, data), *_frozen(units, estimate, data)]
+
+
+def _frozen(units: Units, estimate: Estimate, data: Data) -> list[str]:
+    """A sentence for every output that stands still while an input moves."""
+    if data.recorded is None:
+        return []
+    known, simulated = data.recorded, estimate.simulated
+    found = frozen(
+        known.held, known.resolution, data.u, estimate.errors, data.y - simulated, simulated, data.lengths
+    )
+    told = []
+    for output in sorted({one.output for one in found}):
+        runs = [one for one in found if one.output == output]
+        places = [
+            f"rows {first} to {last}{_file(data, one.first)}"
+            for one in runs[:_SHOWN]
+            for first, last in [known.rows[[one.first, one.first + one.length - 1]]]
+        ]
+        name = f"y{output + 1}" if units.outputs > 1 else "y"
+        told.append(
+            f"{name} stands still while the input moves, for {sum(one.length for one in runs)} of "
+            f"{len(data.y)} samples ({', '.join(places)}{', ..' * (len(runs) > _SHOWN)}), and rounding does "
+            "not explain it: the sensor is frozen or saturated, or the logger repeats its last value; empty "
+            "these cells, which cuts the record there, and try again"
+        )
+    return told
+
+
+def _file(data: Data, at: int) -> str:
+    """Which file a sample is of, where there are several."""
+    ends = np.cumsum([samples for _, samples in data.files])
+    several = len(data.files) > 1
+    return f" of {data.files[int(np.searchsorted(ends, at, side='right'))][0]}" if several else ""
+
+
+def _spikes(units: Units, estimate: Estimate, data: Data) -> list[str]:
+    """A sentence for every output in whose residuals a few samples hold most of the sum of squares."""
+    told = []
+    for one in spikes(estimate.errors):
+        places = [f"{data.time[at]:.10g} {units.time_unit}{_file(data, at)}" for at in one.samples[:_SHOWN]]
+        many, output = len(one.samples), f"y{one.output + 1}" if units.outputs > 1 else "y"
+        told.append(
+            f"{many} of {len(estimate.errors)} samples of {output} hold{'s' * (many == 1)} "
+            f"{100 * one.share:.3g} % of the squares of its residuals (at {', '.join(places)}"
+            f"{', ..' * (many > _SHOWN)}): spikes, or events that the model does not know, decide what "
+            "these data say; empty the cells that are faults of measurement, which cuts the record there, "
+            "and try again"
+        )
+    return told
