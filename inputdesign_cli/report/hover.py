@@ -43,7 +43,7 @@ SCRIPT = """\
       at = panel;
       const x = xs[place], [left, top, width, height] = panel.box;
       const values = panel.curves.map((curve) => curve.name + " " + shown(curve.y[nearest(curve.x, x)]));
-      told.textContent = panel.x + " " + shown(x) + " | " + panel.y + ": " + values.join(", ");
+      told.textContent = panel.x + " " + shown(x) + " | " + panel.y + ": " + values.join("; ");
       cursor.style.left = 100 * (left + width * share(panel, x)) + "%";
       cursor.style.top = 100 * top + "%";
       cursor.style.height = 100 * height + "%";
