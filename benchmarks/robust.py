@@ -12,8 +12,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
 from pathlib import Path
+
+from inputdesign_cli.compute.threads import ONE_THREAD
+
+os.environ.update(ONE_THREAD)
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.design.convex.designs import Design, solve_design

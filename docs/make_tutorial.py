@@ -19,7 +19,7 @@ import scipy.signal
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Table
 from inputdesign_cli.runs.text_formats import csv_text, read_csv
-from pages import DOCS, Terminal, filled, write
+from pages import DOCS, Terminal, filled, keep, write
 
 LOG = DOCS / "data" / "tclab" / "two_heaters.txt"
 # The noise of the log, as `explore` finds it, and the sensor's last digit.
@@ -155,12 +155,6 @@ def experiment(signal: Path, record: Path, seed: int) -> None:
     record.write_text(csv_text(Table({"time_s": time, "u1": u, "y1": y})), encoding="utf-8")
 
 
-def keep(run: Path, images: Path, **figures: str) -> None:
-    """Copy figures of a run beside the page."""
-    for name, target in figures.items():
-        shutil.copy(run / f"{name}.png", images / f"tutorial_{target}.png")
-
-
 def tutorial(folder: Path, images: Path) -> str:
     """The page; its runs go into `folder`, its figures into `images`."""
     shutil.copy(LOG, folder / LOG.name)
@@ -189,10 +183,10 @@ def tutorial(folder: Path, images: Path) -> str:
     found["second"], _ = terminal.run(
         *("assess", "design/spec.yaml", "first.csv", "second.csv", "-o", "second_assessed"), kept=shown
     )
-    keep(folder / "found", images, fit="log_fit", frequency_response="log_frequency_response")
-    keep(folder / "design", images, signal="design_signal", bound="design_bound")
-    keep(folder / "first_assessed", images, data_bound="first_data_bound")
-    keep(folder / "second_assessed", images, bound="second_bound", fit="second_fit")
+    keep(folder / "found", images, "tutorial", fit="log_fit", frequency_response="log_frequency_response")
+    keep(folder / "design", images, "tutorial", signal="design_signal", bound="design_bound")
+    keep(folder / "first_assessed", images, "tutorial", data_bound="first_data_bound")
+    keep(folder / "second_assessed", images, "tutorial", bound="second_bound", fit="second_fit")
     return filled(TEXT, found)
 
 

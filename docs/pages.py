@@ -19,23 +19,26 @@ class Terminal:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def run(self, *words: str, kept: tuple[str, ...], code: int = 0) -> tuple[str, str]:
-        """The block of a page, and the whole output; the exit code must be as expected."""
+    def run(self, *words: str, kept: tuple[str, ...] = ("",), code: int = 0) -> tuple[str, str]:
+        """The block of a page for a command, and its whole output; the exit code must be as expected."""
+        return self._shown(["-m", "inputdesign_cli", *words], command(words), kept, code)
+
+    def python(self, script: str) -> str:
+        """A script in the folder: the block of a page."""
+        return self._shown([script], f"python {script}", ("",), 0)[0]
+
+    def _shown(self, run: list[str], typed: str, kept: tuple[str, ...], code: int) -> tuple[str, str]:
         done = subprocess.run(
-            [sys.executable, "-m", "inputdesign_cli", *words],
-            cwd=self.folder,
-            capture_output=True,
-            text=True,
-            check=False,
+            [sys.executable, *run], cwd=self.folder, capture_output=True, text=True, check=False
         )
         if done.returncode != code:
-            raise SystemExit(f"idesign {' '.join(words)}: exit code {done.returncode}\n{done.stderr}")
+            raise SystemExit(f"{typed}: exit code {done.returncode}\n{done.stderr}")
         lines, keeps = [], False
         for line in done.stdout.splitlines():
             keeps = line.startswith(kept) if not line.startswith(" ") else keeps
             if keeps:
                 lines.append(line if len(line) <= WIDTH else line[: WIDTH - 3].rsplit(" ", 1)[0] + " ..")
-        return f"```\n$ {command(words)}\n" + "\n".join(lines) + "\n```", done.stdout
+        return f"```\n$ {typed}\n" + "\n".join(lines).strip("\n") + "\n```", done.stdout
 
 
 def command(words: tuple[str, ...]) -> str:
@@ -53,6 +56,12 @@ def command(words: tuple[str, ...]) -> str:
 def filled(text: str, found: Mapping[str, str]) -> str:
     """A text with what was found in place of each {name}."""
     return re.sub(r"\{(\w+)\}", lambda match: found[match[1]], text)
+
+
+def keep(run: Path, images: Path, page: str, **figures: str) -> None:
+    """Copy figures of a run beside a page, by the names that they have there."""
+    for name, target in figures.items():
+        shutil.copy(run / f"{name}.png", images / f"{page}_{target}.png")
 
 
 def write(name: str, page: Callable[[Path, Path], str]) -> None:

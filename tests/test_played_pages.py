@@ -5,12 +5,16 @@ import re
 import numpy as np
 import pytest
 
+import make_mechatronics
 import make_records_page
+import make_research
 import make_tutorial
 from pages import DOCS
 
 PAGES = {
+    "mechatronics": (make_mechatronics.TEXT, make_mechatronics.mechatronics),
     "records": (make_records_page.TEXT, make_records_page.records),
+    "research": (make_research.TEXT, make_research.research),
     "tutorial": (make_tutorial.TEXT, make_tutorial.tutorial),
 }
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")
@@ -51,6 +55,24 @@ def test_the_tutorial_misses_and_then_meets():
         r"^verdict +(these data (?:miss|meet)) the accuracy", written("tutorial"), re.MULTILINE
     )
     assert verdicts == ["these data miss", "these data meet"]
+
+
+def test_the_motor_of_mechatronics_is_identified_and_its_margin_kept():
+    """The estimates are within three standard deviations of what was played, and |S| there is below 6 dB."""
+    text = written("mechatronics")
+    (said,) = re.findall(
+        r"^estimate +gain ([\d.]+) \+- ([\d.]+), time_constant ([\d.]+) \+- ([\d.]+)", text, re.M
+    )
+    K, dK, T, dT = map(float, said)
+    assert abs(K - make_mechatronics.GAIN) < 3 * dK
+    assert abs(T - make_mechatronics.LAG) < 3 * dT
+    (settings,) = re.findall(r"^loop +Kp ([\d.]+), Ti ([\d.]+) s", text, re.M)
+    Kp, Ti = map(float, settings)
+    step, fall = make_mechatronics.STEP, np.exp(-make_mechatronics.STEP / make_mechatronics.LAG)
+    q = np.exp(-1j * np.geomspace(1e-4, np.pi, 20000))
+    plant = make_mechatronics.GAIN * (1 - fall) * q**2 / (1 - fall * q)
+    controller = Kp * (1 + step / (2 * Ti) * (1 + q) / (1 - q))
+    assert np.max(1 / np.abs(1 + plant * controller)) < 10 ** (6 / 20)
 
 
 def test_the_board_of_the_tutorial_is_that_of_its_log():

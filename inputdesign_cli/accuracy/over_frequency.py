@@ -99,6 +99,8 @@ class OverFrequency(Requirement):
         near = self.grid_singularities
         places = np.unique(near.real[near.imag <= _ON_THE_CIRCLE])
         inside = places[(places >= lo - _EDGE * hi) & (places <= hi * (1.0 + _EDGE))]
+        if inside.size == 0:
+            return inside
         side = np.where(inside + 1e-5 * hi <= hi, 1e-6 * hi, -1e-6 * hi)
         far, close = (self.nominal_size(inside + step * side) for step in (10.0, 1.0))
         return inside[~np.isfinite(close) | (close > _GROWS * far)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Annotated
@@ -81,9 +82,17 @@ def _follow_spec(
                 place = place.checked(asked)
                 results = run_verb("solve", asked)
             if stamp(files) == before:
-                keep(results, place, figures=figures, json_output=False, quiet=True)
-                clock, seconds = time.strftime("%H:%M:%S"), time.monotonic() - started
-                followed = followed.solved(place.directory, clock, seconds)
+                keep(results, place, figures=False, json_output=False, quiet=True)
+                solved = partial(
+                    followed.solved, place.directory, time.strftime("%H:%M:%S"), time.monotonic() - started
+                )
+                # The answer at once; then what the page draws; then the figures that are files.
+                board.show(solved(pictures=False).page)
+                followed = solved()
+                board.show(followed.page)
+                if figures and stamp(files) == before:
+                    keep(results, place, figures=True, json_output=False, quiet=True)
+                    followed = solved()
         except IdesignError as error:
             followed = followed.failed(error, lines, str(spec))
         if stamp(files) == before:

@@ -52,9 +52,18 @@ _DRAWN_BY: dict[type[Curves], Callable[[Figure, Any, str], None]] = {
 }
 
 
-def draw(curves: Curves, time_unit: str = "s", file_type: FileType = "png", *, narrow: bool = False) -> bytes:
+def draw(
+    curves: Curves,
+    time_unit: str = "s",
+    file_type: FileType = "png",
+    *,
+    narrow: bool = False,
+    seen: Callable[[Figure], object] | None = None,
+) -> bytes:
     """The figure of `curves` as a file, see `rendered`; frequencies are labelled rad per `time_unit`."""
-    return rendered(lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type, narrow=narrow)
+    return rendered(
+        lambda page: _DRAWN_BY[type(curves)](page, curves, time_unit), file_type, narrow=narrow, seen=seen
+    )
 
 
 def figure(results: Results, name: str) -> Figure:

@@ -16,14 +16,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from inputdesign_cli.runs.results import Results
 
-# So many processors have to be idle: the second process does in all a little more than this one would.
-_IDLE = 0.5
-
 
 class SecondProcess:
     """Draws the figures of one run, by a process of its own where that saves time, and otherwise here.
 
-    It saves time where a second processor is idle, unless this process has loaded matplotlib itself. Where
+    It saves time where there is a second processor, unless this process has loaded matplotlib itself. Where
     the second process fails the figures are drawn here.
     """
 
@@ -32,8 +29,7 @@ class SecondProcess:
 
     def begin(self) -> None:
         """Start the process, which then loads what it needs."""
-        idle = len(os.sched_getaffinity(0)) - 1 - os.getloadavg()[0]
-        if idle < _IDLE or "matplotlib" in sys.modules or not sys.executable:
+        if len(os.sched_getaffinity(0)) < 2 or "matplotlib" in sys.modules or not sys.executable:
             return
         # -P: no module comes from the directory of the user. A session of its own: an interrupt from the
         # keyboard is for this process, and that one ends with its input.

@@ -91,11 +91,16 @@ class _LogTicks(LogFormatterSciNotation):
 
 
 def rendered(
-    paint: Callable[[Figure], object], file_type: FileType = "png", *, narrow: bool = False
+    paint: Callable[[Figure], object],
+    file_type: FileType = "png",
+    *,
+    narrow: bool = False,
+    seen: Callable[[Figure], object] | None = None,
 ) -> bytes:
     """The file of a figure that `paint` draws on an empty page, the same for the same figure.
 
-    A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves.
+    A `narrow` one is for a page that may be read on a phone: its text is larger beside its curves. `seen`
+    gets the page as it was laid out.
     """
     buffer = io.BytesIO()
     with mpl.rc_context(_RC), warnings.catch_warnings():
@@ -114,6 +119,8 @@ def rendered(
         else:
             nothing = {"CreationDate": None, "Producer": None, "Creator": None}
             FigureCanvasAgg(page).print_figure(buffer, format=file_type, metadata=nothing)
+        if seen is not None:
+            seen(page)
     return buffer.getvalue()
 
 

@@ -54,7 +54,8 @@ class Coordinates:
 
     @cached_property
     def _inverse_factor(self) -> Array:
-        return scipy.linalg.solve_triangular(self.factor, np.eye(self.size), lower=True)
+        inverse, _ = scipy.linalg.lapack.dtrtri(self.factor, lower=1)
+        return np.asarray(inverse)
 
     def to_raw(self, information: Array) -> Array:
         """An information matrix of these coordinates in raw parameters."""

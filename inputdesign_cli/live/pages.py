@@ -29,10 +29,12 @@ class Followed:
         """The same while it is computed anew."""
         return replace(self, state="computing", told="The file was saved: computing ..", errors=())
 
-    def solved(self, run: Path, clock: str, seconds: float) -> Followed:
-        """With the design that stands in `run` now."""
-        made = run_page(run, Trail()) | {"clock": clock}
-        told = f"Computed at {clock} in {seconds:.1f} s."
+    def solved(self, run: Path, clock: str, seconds: float, *, pictures: bool = True) -> Followed:
+        """With the design that stands in `run` now; without `pictures` these are still being drawn."""
+        made = run_page(run, Trail(), pictures=pictures) | {"clock": clock}
+        told = (
+            f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
+        )
         return replace(self, state="done", told=told, designs=(made, *self.designs[:1]))
 
     def failed(self, error: IdesignError, lines: Sequence[str], file: str) -> Followed:

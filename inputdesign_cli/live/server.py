@@ -18,12 +18,15 @@ from urllib.parse import parse_qs, urlsplit
 
 from inputdesign_cli.errors import OutputError
 from inputdesign_cli.live.board import Board
+from inputdesign_cli.report.hover import SOURCE
 
 HOST = "127.0.0.1"
 # Seconds that a page waits for news before it asks again, and that a client may take for its request.
 _PATIENCE, _SLOWEST = 20.0, 30.0
 _POLICY = (
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'self'; connect-src 'self'; "
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'self' "
+    + SOURCE
+    + "; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 # Takes the new page as soon as there is one, and keeps what is folded out and where one has scrolled to.
@@ -42,6 +45,7 @@ SCRIPT = """\
         const open = [...document.querySelectorAll("details")].map((part) => part.open);
         document.title = page.title;
         document.querySelector("main").replaceWith(page.querySelector("main"));
+        document.dispatchEvent(new Event("replaced"));
         document.querySelectorAll("details").forEach((part, i) => { part.open = open[i] || false; });
         version = page.documentElement.dataset.version;
       }

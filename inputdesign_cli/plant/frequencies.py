@@ -43,8 +43,9 @@ def graded_grid(
         width = max(s.imag, 1e-8)
         if width < span:
             reach = max(span / width, 2.5)
-            far = np.geomspace(2.0, reach, int(np.ceil(20 * np.log10(reach))))
-            offsets = width * np.concatenate([near, far[1:]])
+            steps = np.arange(1, int(np.ceil(20 * np.log10(reach))))
+            far = 2.0 * (0.5 * reach) ** (steps / steps[-1])
+            offsets = width * np.concatenate([near, far])
             parts += [s.real + offsets, s.real - offsets]
     grid = np.unique(np.concatenate(parts))
     return grid[(grid >= lo) & (grid <= hi)]

@@ -37,8 +37,14 @@ def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
 
     Trailing zeros are roots at the origin and are left out: they neither resonate nor destabilise.
     """
-    trimmed = np.trim_zeros(np.asarray(coefficients, dtype=float))
-    return np.asarray(np.roots(trimmed), dtype=complex) if trimmed.size > 1 else np.zeros(0, dtype=complex)
+    c = np.asarray(coefficients, dtype=float)
+    there = np.flatnonzero(c)
+    if there.size < 2:
+        return np.zeros(0, dtype=complex)
+    first, last = int(there[0]), int(there[-1])
+    if last == first + 1:  # by far the most are of first order
+        return np.asarray(-c[last : last + 1] / c[first], dtype=complex)
+    return np.asarray(np.roots(c[first : last + 1]), dtype=complex)
 
 
 def join_roots(parts: Iterable[ComplexArray]) -> ComplexArray:

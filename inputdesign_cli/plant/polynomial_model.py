@@ -215,15 +215,15 @@ class PolynomialModel(Parametrised):
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
-        G = self.plant_at(w) if self._outputs_count else np.zeros((np.size(w), self.outputs, self.inputs))
-        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (G.shape[0], self.inputs, self.inputs))
-        return self.prediction_gradient(w, G, u, np.zeros_like(G))
+        G = self.plant_at(w) if self._outputs_count else None
+        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
+        return self._gradient(w, self.inputs, G, u, None)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""
-        H = self.noise_at(w) if self._outputs_count else np.zeros((np.size(w), self.outputs, self.outputs))
-        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), H.shape)
-        return self.prediction_gradient(w, H, np.zeros((H.shape[0], self.inputs, self.outputs)), e)
+        H = self.noise_at(w) if self._outputs_count else None
+        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
+        return self._gradient(w, self.outputs, H, None, e)
 
     @property
     def _outputs_count(self) -> bool:
@@ -231,37 +231,43 @@ class PolynomialModel(Parametrised):
         return any(parameter.letter == "a" for parameter in self.parameters)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
-        """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j).
+        """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
+        return self._gradient(w, y.shape[2], y, u, e)
 
-        Written with the polynomials of the predictor alone, as `PolynomialModel.prediction_gradient`.
-        """
+    def _gradient(
+        self, w: ArrayLike, sources: int, y: NDArray | None, u: NDArray | None, e: NDArray | None
+    ) -> ComplexArray:
+        """`prediction_gradient` with the polynomials of the predictor alone; None stands for nothing."""
         q = unit_circle(w)
-        gradient = np.zeros((q.size, len(self.parameters), self.outputs, y.shape[2]), dtype=complex)
+        gradient = np.zeros((q.size, len(self.parameters), self.outputs, sources), dtype=complex)
         C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
         letters = {parameter.letter for parameter in self.parameters}
         noise: dict[tuple[str, int], ComplexArray] = {}
         for i in range(self.outputs):
-            if "a" in letters:
+            if y is not None and "a" in letters:
                 noise["a", i] = (-D[i] / C[i])[:, None] * y[:, i]
-            if "c" in letters:
+            if e is not None and "c" in letters:
                 noise["c", i] = e[:, i] / C[i][:, None]
-            if "d" in letters:
+            if e is not None and "d" in letters:
                 noise["d", i] = -e[:, i] / D[i][:, None]
         plant: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:
+            if u is None:
+                break
             F = evaluate(self.F[i][j], q)
             filtered = D[i] / (C[i] * F)
             plant["b", i, j] = filtered[:, None] * u[:, j]
             if "f" in letters:
                 plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
         for index, parameter in enumerate(self.parameters):
-            shift = (q**parameter.power)[:, None]
             if parameter.letter in "bf":
                 i, j = parameter.places[0]
-                gradient[:, index, i] = shift * plant[parameter.letter, i, j]
+                if (parameter.letter, i, j) in plant:
+                    gradient[:, index, i] = (q**parameter.power)[:, None] * plant[parameter.letter, i, j]
                 continue
             for i in {place[0] for place in parameter.places}:
-                gradient[:, index, i] = shift * noise[parameter.letter, i]
+                if (parameter.letter, i) in noise:
+                    gradient[:, index, i] = (q**parameter.power)[:, None] * noise[parameter.letter, i]
         return gradient
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialModel:

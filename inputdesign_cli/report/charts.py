@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import base64
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 from inputdesign_cli.figures.plots import draw
+from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.drawn import READERS, WITHOUT_LIMIT
 from inputdesign_cli.report.numbers import spoken
-from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.text_formats import read_csv
 
 _PICTURES = {"png": "image/png", "svg": "image/svg+xml"}
@@ -47,11 +50,12 @@ _CAPTIONS = {
 
 @dataclass(frozen=True)
 class Chart:
-    """A picture for an <img>: its data, what it shows in words, and a caption."""
+    """A picture for an <img>: its data, its text, a caption, and values for who points at it (JSON)."""
 
     uri: str
     alt: str
     caption: str
+    readings: str = ""
 
 
 def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) -> dict[str, Chart]:
@@ -64,12 +68,18 @@ def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) 
         if found is not None:
             curves, alt = found
             caption = alt if alt == WITHOUT_LIMIT else _CAPTIONS[stem]
-            charts[stem] = Chart(svg_uri(draw(curves, time_unit, "svg", narrow=True)), alt, caption)
+            charts[stem] = _readable(curves, time_unit, alt, caption)
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
         if kind in _PICTURES and stem not in charts and (run / name).is_file():
             charts[stem] = file_chart(run / name)
     return charts
+
+
+def _readable(curves: Curves, time_unit: str, alt: str, caption: str) -> Chart:
+    panels: list[dict[str, Json]] = []
+    drawn = draw(curves, time_unit, "svg", narrow=True, seen=lambda page: panels.extend(readings(page)))
+    return Chart(svg_uri(drawn), alt, caption, json.dumps(panels, separators=(",", ":")) if panels else "")
 
 
 def svg_uri(content: bytes) -> str:

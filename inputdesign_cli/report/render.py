@@ -1,4 +1,4 @@
-"""A run or a sweep as one HTML file that needs nothing else: no network, no script."""
+"""A run or a sweep as one HTML file that needs nothing else: no network, and its script only reads values."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.followed import Trail
+from inputdesign_cli.report.hover import SCRIPT
 from inputdesign_cli.report.run_page import run_page
 from inputdesign_cli.report.sweep_page import sweep_page
 from inputdesign_cli.runs.record import RESULT, unreadable
@@ -20,6 +21,7 @@ from inputdesign_cli.version import __version__
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
 
 # What a record leads to that somebody else wrote or changed: no schema says what each of its numbers must be.
 _BROKEN = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError)
@@ -73,7 +75,14 @@ def _filled(
 
 def filled(template: str, content: Mapping[str, Json]) -> str:
     """A template with its content; whatever text comes from a spec or a result is escaped."""
-    return _templates().get_template(template).render(version=__version__, **content)
+    return _templates().get_template(template).render(version=__version__, hover=_script(), **content)
+
+
+@cache
+def _script() -> Markup:
+    from markupsafe import Markup
+
+    return Markup(SCRIPT)
 
 
 @cache

@@ -27,7 +27,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, ValidationError
 
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.specification.models.fields import FileName, Number, Positive, Several, Text
 from inputdesign_cli.specification.models.path_diagnostic import PathDiagnostic, fail
 from inputdesign_cli.specification.models.pydantic_errors import translate
@@ -36,6 +36,8 @@ from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import parse_key
 from inputdesign_cli.specification.yaml.reader import read
 
+# What specs hold and golden files do not.
+_OF_SPECS = {"plant", "noise", "experiment", "accuracy"}
 _PATH = re.compile(r"[^.\[\]\s]+(\[\d+\])*(\.[^.\[\]\s]+(\[\d+\])*)*")
 
 
@@ -122,10 +124,18 @@ def load_golden(path: Path) -> Golden:
     """Read a golden file.
 
     Raises:
-        SpecError: Everything that is wrong with the file at once, with the codes of a spec's diagnostics and
-            `golden-path`, `golden-tolerance`, `golden-name`.
+        SpecError: `golden-is-spec`, it is a spec; or everything that is wrong with the file at once, with the
+            codes of a spec's diagnostics and `golden-path`, `golden-tolerance`, `golden-name`.
     """
     tree = read(read_text(path), str(path))
+    if isinstance(tree.data, dict) and "runs" not in tree.data and _OF_SPECS & tree.data.keys():
+        raise SpecError.because(
+            "golden-is-spec",
+            f"{path} is a spec: check compares runs with the values that a golden file expects",
+            f"`idesign validate {path}` checks the spec, `idesign solve {path}` runs it; a golden file names "
+            "it under runs, beside quantities with path, expected, a tolerance, why and source",
+            location=Location(str(path), 1, 1),
+        )
     try:
         content = _Content.model_validate(tree.data)
     except ValidationError as error:

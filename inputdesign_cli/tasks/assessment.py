@@ -34,6 +34,7 @@ from inputdesign_cli.tasks.identification import (
     told,
 )
 from inputdesign_cli.tasks.result.design import requirement_entry
+from inputdesign_cli.tasks.result.faults import faults
 from inputdesign_cli.tasks.result.levels import level_notes
 from inputdesign_cli.tasks.result.neglected import Neglected, neglected, objections, unseen
 from inputdesign_cli.tasks.result.nominal import from_nominal
@@ -119,7 +120,8 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     if found.question is not None:
         without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
-    notes = objections(task.header.units, without)
+    broken = bool(faults(task.header.units, found.estimate, found.data))
+    notes = [] if broken else objections(task.header.units, without)
     causes = {
         "unsettled": unsettled(found.estimate),
         "contradicted": [
@@ -141,7 +143,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
         assessment["neglected"] = [one.entry(task.header.units) for one in without]
     if found.question is not None:
         assessment["nominal"], told_apart = _from_nominal(task, found, found.question)
-        notes += told_apart
+        notes += [] if broken else told_apart
     if verdict == "met":
         notes += unseen(task.header.units, without)
     judged = _with_notes(_judged(identification, verdict, assessment), notes)

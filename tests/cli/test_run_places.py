@@ -246,6 +246,26 @@ def test_a_spec_from_standard_input(analyse, tmp_path, monkeypatch):
     assert analyse("-") == (2, "file-unreadable")
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "plant: {B: [0, 1], F: [1, -0.5]}\nexperiment: {sampls: 10}\n",
+        "plant: [1,\n b: {",
+        "plant: {B: [0, 1], F: [1, -1.5]}\nnoise: {variance: 1}\nexperiment: {samples: 50}\n"
+        "accuracy: {model_error: {relative: 0.1}}\nspectrum: {given: white}\n",
+    ],
+    ids=["key", "syntax", "build"],
+)
+def test_errors_of_standard_input_are_those_of_a_file_by_its_name(text, run, tmp_path, monkeypatch):
+    (tmp_path / "s.yaml").write_text(text)
+    code, _, told = run("analyse", "s.yaml")
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+    again, _, piped = run("analyse", "-")
+    assert (code, again) == (2, 2)
+    assert piped == told.replace("s.yaml", "<stdin>")
+    assert "<stdin>:" in piped
+
+
 @pytest.mark.parametrize("name", ["", "  "])
 def test_an_empty_name_is_no_place(analyse, tmp_path, name):
     code, err = analyse(write(tmp_path / "a.yaml", "one"), "-o", name)

@@ -85,6 +85,23 @@ def test_a_saved_file_is_solved_and_stands_beside_what_was_good(spec, tmp_path):
         assert answers(page_with(address, "Computed at"))[0] == first
 
 
+def test_the_answer_is_shown_before_the_pictures_are_drawn(spec, tmp_path):
+    """Within half a second beside solving, of which the page tells, where nothing else is under way."""
+    with watching(spec, "-o", tmp_path / "run", "--no-figures") as address:
+        page_with(address, "data:image/svg")
+        waited = []
+        for old, new in (("0.1,", "0.2,"), ("0.2,", "0.3,"), ("0.3,", "0.4,")):
+            before = page_with(address, "Computed at")
+            saved(spec, f"relative: {old}", f"relative: {new}")
+            started = time.monotonic()
+            text = ""
+            while answers(text) in ([], answers(before)):
+                text = page_with(address, "Computed at")
+            waited.append(time.monotonic() - started - float(re.search(r"in ([\d.]+) s", text)[1]))
+            page_with(address, " s.</p>")  # the pictures
+        assert min(waited) < 0.5
+
+
 def test_what_the_user_writes_is_text_on_the_page():
     line = "a: '<script>alert(1)</script>'"
     wrong = SpecError.because("unknown-key", line, line, location=Location("s.yaml", 1, 1, line))

@@ -197,3 +197,12 @@ def test_figures_of_the_paper_and_recomputed_ones_agree_with_each_other():
                         assert abs(other.expected - printed.expected) <= printed.tolerance
                         pairs += 1
     assert pairs >= 7
+
+
+@pytest.mark.parametrize("spec", sorted((Path(__file__).parents[2] / "specs").glob("*.yaml"))[::5])
+def test_a_spec_in_place_of_a_golden_file_is_told_as_one(spec):
+    with pytest.raises(SpecError) as raised:
+        load_golden(spec)
+    (one,) = raised.value.diagnostics
+    assert one.code == "golden-is-spec"
+    assert f"`idesign validate {spec}`" in one.hint

@@ -41,3 +41,16 @@ def test_without_these_rows_the_record_is_judged(tmp_path):
     found = assess(parse_spec(SPEC), saved(tmp_path / "a.csv", rows))
     assert found.verdict == "met"
     assert "stands still" not in str(found.results.result["notes"])
+
+
+def test_faults_of_measurement_are_told_alone(tmp_path):
+    """Spikes in a twentieth of a record upset every test and the estimate: one sentence sums them up."""
+    rng = np.random.default_rng(0)
+    rows = rows_of(5)
+    at = np.sort(rng.choice(len(rows), 24, replace=False))
+    rows[at, 1] += 30.0 * rng.choice([-1.0, 1.0], at.size)
+    found = assess(parse_spec(SPEC), saved(tmp_path / "a.csv", rows)).results.result
+    (only,) = found["assessment"]["undecided"]
+    assert only.startswith("24 of 500 samples of y hold")
+    assert f"(at {', '.join(f'{k} s' for k in at[:5])}, ..)" in only
+    assert not any("plant of the spec" in note or "structure" in note for note in found["notes"])

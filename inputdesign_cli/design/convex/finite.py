@@ -81,15 +81,15 @@ class FiniteSolution:
     converged: bool
 
 
-def solve_program(program: FiniteProgram, *, tolerance: float) -> FiniteSolution | None:
-    """Solve to about the tolerance; None when there is no point to show.
+def solve_program(program: FiniteProgram, *, tolerance: float, rough: float) -> FiniteSolution | None:
+    """Solve to about the tolerance, a large program to the `rough` one; None when there is no point to show.
 
     Raises:
         InaccurateError: `out-of-time`.
     """
     if program.work > _LARGE:
-        found, error = by_interior(program, tolerance=tolerance)
-        if error <= _STAYS * tolerance or (np.isfinite(error) and program.work > _MOST_WAITED_FOR):
+        found, error = by_interior(program, tolerance=rough)
+        if error <= _STAYS * rough or (np.isfinite(error) and program.work > _MOST_WAITED_FOR):
             return found
     return by_cones(program, tolerance=tolerance)
 

@@ -103,12 +103,14 @@ def solve_master(
     best: Candidate,
     *,
     tolerance: float,
+    rough: float = 0.0,
     keep: bool = False,
 ) -> MasterSolution | None:
     """Solve one finite program; None when the solver has no point to show.
 
     Args:
         best: the best design so far, which sets the scales.
+        rough: a tolerance that will do where it saves many steps: those of a large program.
         keep: let any multiple of the best spectrum be added to the face, so that the program stays
             feasible where scaling up is no remedy.
     """
@@ -149,7 +151,8 @@ def solve_master(
         unit=best.s if problem.scaled else None,
         size=problem.experiment.size,
     )
-    solution = solve_program(program, tolerance=max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR))
+    exact = max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR)
+    solution = solve_program(program, tolerance=exact, rough=max(_SOLVER_MARGIN * rough, exact))
     if solution is None:
         return None
     y = worth * _in_cone(face, solution.v[:inside])

@@ -92,8 +92,8 @@ class Uncertainty(Section):
     seed: Index = Field(default=1, description="Seed of the draws.")
     stable_within: Annotated[NonNegative, Field(gt=0, le=1)] | None = Field(
         default=None,
-        description="Plants with a pole (in closed loop: of the loop), or a zero of their noise model, beyond "
-        "this radius are not drawn (default: 0.998, or halfway from the nominal ones to one).",
+        description="Plants with a pole (in closed loop: of the loop), or a zero of their noise model, "
+        "beyond this radius are not drawn (default: 0.998, or halfway from the nominal ones to one).",
     )
     r_adm: Literal["own", "fixed"] = Field(
         default="own",
