@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -66,9 +66,11 @@ def solve(
         raise typer.BadParameter(message)
     if fast:
         overrides = [*(overrides or []), "solver.any_spectrum=false"]
-    shown = _Shown(figures, figure_format, json_output, quiet)
     if not keep_partial:
-        place = _run("solve", place, overrides, confine, shown)
+        results, place = _results("solve", place, overrides, confine, quiet)
+        keep(
+            results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet
+        )
         if trade:
             read = read_spec(spec, overrides, confine)
             beside = place.directory.with_name(f"{place.directory.name}-trade")
@@ -77,7 +79,7 @@ def solve(
         return
     with stoppable() as stop, ending_early(stop) as came:
         results, place = _results("solve", place, overrides, confine, quiet)
-    keep(results, place, **shown._asdict())
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
     if came:
         raise typer.Exit(128 + came[0])
 
@@ -100,7 +102,8 @@ def analyse(
     directory and prints a summary.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
-    _run("analyse", place, overrides, confine, _Shown(figures, figure_format, json_output, quiet))
+    results, place = _results("analyse", place, overrides, confine, quiet)
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def simulate(
@@ -125,35 +128,10 @@ def simulate(
     The runs go in batches, each with a seed of its own: the result is the same wherever they are computed.
     """
     place = Place(output, name_of(spec), [spec], overwrite, no_output)
-    workers = executor(jobs, cluster, worker_timeout, quiet=quiet)
-    shown = _Shown(figures, figure_format, json_output, quiet)
-    _run("simulate", place, overrides, confine, shown, workers)
-
-
-class _Shown(NamedTuple):
-    """How the results are to be shown."""
-
-    figures: bool
-    figure_format: str
-    json_output: bool
-    quiet: bool
-
-
-def _run(
-    verb: Verb,
-    place: Place,
-    overrides: list[str] | None,
-    confine: Path | None,
-    shown: _Shown,
-    executor: Executor | None = None,
-) -> Place:
-    """Do what a verb does with a spec, and keep it; the place, with its directory."""
-    from inputdesign_cli.figures.second_process import second_process
-
-    with second_process(wanted=shown.figures and not place.nowhere) as drawing:
-        results, place = _results(verb, place, overrides, confine, shown.quiet, executor)
-        keep(results, place, **shown._asdict(), drawing=drawing)
-    return place
+    results, place = _results(
+        "simulate", place, overrides, confine, quiet, executor(jobs, cluster, worker_timeout, quiet=quiet)
+    )
+    keep(results, place, figures=figures, figure_format=figure_format, json_output=json_output, quiet=quiet)
 
 
 def _results(

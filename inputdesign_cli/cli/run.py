@@ -13,7 +13,6 @@ from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import OutputError
 
 if TYPE_CHECKING:
-    from inputdesign_cli.figures.second_process import SecondProcess
     from inputdesign_cli.runs.origin import Origin
     from inputdesign_cli.runs.results import Results
     from inputdesign_cli.specification import Spec
@@ -95,12 +94,8 @@ def keep(
     figure_format: str = "png",
     json_output: bool,
     quiet: bool,
-    drawing: SecondProcess | None = None,
 ) -> None:
     """Write a run to its place, with figures or without, and print its result or its summary.
-
-    Args:
-        drawing: what draws the figures, where it has been begun.
 
     Raises:
         OutputError: as `write_run`, and `output-is-the-spec`.
@@ -117,7 +112,6 @@ def keep(
         figure_format=figure_format,
         json_output=json_output,
         quiet=quiet,
-        drawing=drawing,
     )
 
 
@@ -130,13 +124,11 @@ def renew(
     figure_format: str = "png",
     json_output: bool,
     quiet: bool,
-    drawing: SecondProcess | None = None,
 ) -> None:
     """Write a run directory, and print its result or its summary.
 
     Args:
         origin: what the run is made from; None for one that goes on with what is in the directory.
-        drawing: see `keep`.
 
     Raises:
         OutputError: as `write_run`.
@@ -147,9 +139,9 @@ def renew(
 
         drawings = {}
         if figures:
-            from inputdesign_cli.figures.second_process import SecondProcess
+            from inputdesign_cli.figures.plots import draw_all
 
-            drawings = (drawing or SecondProcess()).draw_all(results, figure_format)
+            drawings = draw_all(results, figure_format)
         replaced = has_other_values(directory, results.resolved_spec)
         files = write_run(results, directory, drawings, origin=origin)
     show(results, files, replaced=replaced, json_output=json_output, quiet=quiet)
