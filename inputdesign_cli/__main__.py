@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import signal
 import sys
@@ -13,11 +15,16 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130  # as in `errors`, which may not have been imported yet
 _AGAIN = 0.05  # seconds
+# New objects before cycles among them are looked for: a command makes about as many in all, most of them by
+# its imports.
+_YOUNG = 500_000
 
 
 def main() -> None:
     """The `idesign` command."""
     sys.unraisablehook = _send_again
+    gc.set_threshold(_YOUNG, 10, 10)
+    atexit.register(gc.freeze)  # what is left at the end need not be looked through
     try:
         from inputdesign_cli.compute.interruptions import bare_interruptions
 
