@@ -20,7 +20,7 @@ from inputdesign_cli.spectrum.svec import smat, svec_layout
 
 _FIRST_ORDER = 11  # spectra up to this order are designed whole, in one face
 _DIRECTIONS = 8
-_MOST_KEPT = 18
+_MOST_KEPT = 14
 _KEPT = 1e-14  # share of the largest eigenvalue below which a generator is dropped
 _SINGULAR_PRICE = 1e-10
 

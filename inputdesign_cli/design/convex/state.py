@@ -33,7 +33,7 @@ _MORE_CUTS = 6
 _HALVINGS = 6
 _BINDS = 1e-5
 _IDLE = 3
-_SHARE_OF_GAP = 1e-2
+_SHARE_OF_GAP, _FAR_OFF = 1e-2, 1e-2
 _PROGRESS = 1e-5
 _MOST_ROWS = 12
 
@@ -76,7 +76,7 @@ class State:
             self.rows,
             self.best,
             tolerance=tolerance,
-            rough=_SHARE_OF_GAP * min(self.gap, 1.0),
+            rough=_SHARE_OF_GAP * min(self.gap, 1.0) if self.gap > _FAR_OFF else 0.0,
             keep=self.interior is not None,
         )
         if answer is None:
