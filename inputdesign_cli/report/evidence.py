@@ -184,7 +184,12 @@ def simulation_table(result: Result) -> Rows | None:
         "mean estimate": lambda entry: listed(entry.get("mean_estimate", [])) if "mse" in entry else "",
         "deviations over theory": lambda entry: _range(entry.get("deviation_ratio"), entry.get("chance")),
         "worst over admitted": lambda entry: shown(entry["worst_ratio"]) if "worst_ratio" in entry else "",
-        "within r_adm": lambda entry: _share(entry, "within_r_adm"),
+        "within r_adm": lambda entry: (
+            _share(entry, "within_r_adm") if "within_r_adm_true" not in entry else ""
+        ),
+        "within r_adm of the spec": lambda entry: (
+            _share(entry, "within_r_adm") if "within_r_adm_true" in entry else ""
+        ),
         "were the design model true": lambda entry: _share(entry.get("on_design_model", {}), "within_r_adm"),
         "within r_u": lambda entry: _share(entry, "within_r_u"),
         "cost": lambda entry: f"{entry['cost']:.5g}" if "cost" in entry else "",

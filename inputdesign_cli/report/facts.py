@@ -23,14 +23,14 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
         yield (
             cost if kind == "least_cost" else objective(kind).name,
             _clean(found["value"], kind),
-            white(result),
+            "; ".join(filter(None, [_paid(result), white(result)])),
         )
     if kind != "least_cost" and "cost" in result:
         yield cost, shown(result["cost"]), ""
     power = result.get("power", {})
     powers = ", ".join(f"{name} {listed(power[name])}" for name in power)
     if powers:
-        yield "power", powers, ""
+        yield "power", powers, "at the plant of the spec" if _paid(result) else ""
     limits = "; ".join(_limits(result))
     if limits:
         yield "limits", limits, ""
@@ -113,6 +113,17 @@ def _loop(found: Mapping[str, Json], time_unit: str) -> Fact:
     return "loop", f"{told}, {peak}" if told else peak, kept
 
 
+def _paid(result: Result) -> str:
+    """Of which plants a cost is that is not the nominal one; empty for that, and where all cost the same."""
+    robust, loop = result.get("robust", {}), "excitation" in result.get("power", {})
+    if result.get("objective", {}).get("kind") != "least_cost" or not robust or not loop:
+        return ""
+    number = 1 + robust["scenarios"] - robust["discarded"]
+    return {"mean": f"mean over {number} plants", "worst": f"the largest of {number} plants"}.get(
+        robust["cost"], ""
+    )
+
+
 def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     """What holds at the plants that the true one might be, and at others drawn in the same way."""
     kept = found["scenarios"] - found["discarded"]
@@ -126,6 +137,10 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     yield "plants", f"what is asked holds at the plant of the spec and {kept} {drawn}{left}", again
     if bound:
         yield "binding", ", ".join(bound) + more, ""
+    if "dearest" in found:
+        told = found["dearest"]
+        at = f"plant {told['scenario']}" if told["scenario"] else "the plant of the spec"
+        yield "dearest", f"{at}, where it costs {shown(told['cost'])}", ""
     if "searched" in found:
         told = found["searched"]
         more = f" after {told['added']} were added" if told["added"] else ""
@@ -140,7 +155,7 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
         yield (
             "fresh plants",
             f"{told['missed']} of {told['draws']} drawn afresh are missed: {100 * told['share']:.3g} % "
-            f"({low} to {high})",
+            f"({low} to {high})" + (f"; at {told['dearer']} it costs more" if told.get("dearer") else ""),
             "said of plants drawn as the spec says, not of the true plant",
         )
 

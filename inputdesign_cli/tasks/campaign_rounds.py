@@ -25,6 +25,10 @@ from inputdesign_cli.tasks.identification import Identification, Identified, est
 from inputdesign_cli.tasks.result.refutations import contradictions, differences
 
 State = Literal["running", "stopped", "missed", "undecided"]
+_SPEAK_AGAINST = (
+    "what has been recorded speaks against the model (see the other notes): before more is applied, see "
+    "whether its structure should change; as it stands the campaign would end undecided"
+)
 _ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided": "undecided"}
 # Data that say nothing yet; more of them will.
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
@@ -142,6 +146,8 @@ def decide(task: Rounds, past: Past) -> Decision:
                 state = "undecided"
             elif task.rules.over(past.done, met=met):
                 state = _ENDED[assessment.verdict]
+            elif assessment.verdict == "undecided":
+                notes.append(_SPEAK_AGAINST)
     if state != "running":
         return Decision(header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes))
     plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost)

@@ -130,7 +130,7 @@ class ConvexTask:
             robust = robust_result(done, done.plants)
             result["robust"] = robust.entry
             tables, curves = tables | robust.tables, curves | robust.curves
-            notes += robust.notes
+            result |= {"notes": [*result.get("notes", []), *robust.notes]} if robust.notes else {}
         files: dict[str, bytes] = {}
         if record is not None:
             result["signal"] = self._signal_entry(done, made, record, known)

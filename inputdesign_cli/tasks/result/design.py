@@ -272,7 +272,8 @@ def _notes(done: Designed) -> list[str]:
         sources = ["the noise in normal operation"] if units.closed_loop else []
         sources += ["experiment.prior"] if experiment.prior is not None else []
         known = " and ".join(sources) or "the noise"
-        return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy"]
+        kept = " at every plant that is not left out" if done.kept else ""
+        return [f"no excitation is needed: what {known} tells of the parameters meets the accuracy{kept}"]
     notes = _left_out(done) + _too_short(experiment) + _as_large_as_the_plant(done)
     if units.closed_loop and not found.basis.has_density:
         notes += _free_of_charge(done)

@@ -66,18 +66,30 @@ def robust_result(done: Designed, plants: Plants) -> RobustResult:
         entry["searched"] = _searched(units, plants, plants.searched)
     if plants.afresh is not None:
         entry |= _risk(plants, len(support), len(kept))
-    notes: tuple[str, ...] = ()
-    if plants.afresh is not None and done.design.result.x.any():
+    notes = _unstable(batch)
+    if plants.afresh is not None:
         fresh = _fresh(done, plants, plants.afresh())
         entry |= {"fresh": fresh} if fresh else {}
         tried = fresh.get("draws", 0)
         if tried < plants.fresh:
-            notes = (_FEWER.format(what_ended(), tried, plants.fresh),)
+            notes = (*notes, _FEWER.format(what_ended(), tried, plants.fresh))
     tables, curves = {"scenarios": _table(units, plants, numbers, at_each)}, dict[str, Curves]()
     fan = fan_curves(done, numbers, binding)
     if fan is not None and done.design.result.x.any():
         tables["fan"], curves["fan"] = fan
     return RobustResult(entry, tables, curves, notes)
+
+
+def _unstable(batch: Batch) -> tuple[str, ...]:
+    """A note where most of what the plant is said to be is no plant that could be in operation."""
+    drawn = len(batch.plants) + batch.rejected
+    if 2 * batch.rejected <= drawn:
+        return ()
+    return (
+        f"{batch.rejected} of {drawn} draws were unstable, or no plants, and were drawn again: what is said "
+        "of the plants is said of the others alone; state what the plant can be in operation (uncertainty), "
+        "or check the controller",
+    )
 
 
 def _binding(done: Designed, shares: Array) -> list[int]:
