@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
+_MODERATE = 1e100  # quotients up to this are no overflow
+
+
 def unit_circle(w: ArrayLike) -> ComplexArray:
     """q^-1 at normalised frequencies `w` (rad/sample), same shape.
 
@@ -42,7 +45,7 @@ def roots_in_z(coefficients: ArrayLike) -> ComplexArray:
     if there.size < 2:
         return np.zeros(0, dtype=complex)
     first, last = int(there[0]), int(there[-1])
-    if last == first + 1:  # by far the most are of first order
+    if last == first + 1 and abs(c[last]) <= _MODERATE * abs(c[first]):  # by far the most are of first order
         return np.asarray(-c[last : last + 1] / c[first], dtype=complex)
     return np.asarray(np.roots(c[first : last + 1]), dtype=complex)
 

@@ -73,7 +73,10 @@ def _shortest(values: Array) -> list[str]:
         return [repr(value).removesuffix(".0") for value in values.tolist()]
     if not values.size:
         return []
-    text = orjson.dumps(np.ascontiguousarray(values), option=orjson.OPT_SERIALIZE_NUMPY).decode()[1:-1]
+    native = np.ascontiguousarray(
+        values, dtype=float if values.dtype.kind == "f" else values.dtype.newbyteorder("=")
+    )
+    text = orjson.dumps(native, option=orjson.OPT_SERIALIZE_NUMPY).decode()[1:-1]
     return f"{text},".replace(".0,", ",").split(",")[:-1]
 
 

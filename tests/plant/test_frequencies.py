@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.plant import graded_grid, local_maxima, logarithmic_distance
+from inputdesign_cli.plant.polynomial import roots_in_z
 
 
 def test_grid_resolves_a_lightly_damped_pole():
@@ -82,3 +83,19 @@ def test_maxima_between_which_a_function_falls_little_are_kept():
     w, _ = local_maxima(function, grid, function(grid))
     exact = [*(np.pi / 10 * k for k in range(7)), 2.5]
     np.testing.assert_allclose(w, exact, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "roots"),
+    [
+        ([1.0], []),
+        ([0.0, 0.0], []),
+        ([1.0, -0.7], [0.7]),
+        ([0.0, 2.0, 1.0, 0.0], [-0.5]),
+        ([1.0, -1.5, 0.56], [0.7, 0.8]),
+    ],
+)
+def test_roots_without_delays(coefficients, roots):
+    found = roots_in_z(coefficients)
+    np.testing.assert_allclose(np.sort(found.real), roots, rtol=1e-12)
+    np.testing.assert_array_equal(found.imag, 0.0)

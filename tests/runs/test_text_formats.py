@@ -31,6 +31,14 @@ def test_csv_writes_the_fewest_digits_that_give_back_every_bit():
     assert csv_text(table) == "x_m\n0.1\n0.3333333333333333\n2\n-1e+22\n"
 
 
+@pytest.mark.parametrize("kind", [">f8", "<f4", ">f4", "<f2", ">i4", "<u8"])
+def test_csv_of_columns_of_any_width_and_byte_order(kind):
+    values = np.array([0, 1, 3, 1000]).astype(kind)
+    values = values / values.dtype.type(8) if values.dtype.kind == "f" else values
+    lines = csv_text(Table({"u1": values.astype(kind)})).split()[1:]
+    assert [float(line) for line in lines] == [float(value) for value in values]
+
+
 def test_read_csv_returns_the_columns(tmp_path):
     table = Table({"time_s": np.arange(3.0), "u1": np.array([0.1, -1e-300, 5e-324])})
     (tmp_path / "signal.csv").write_text(csv_text(table))
