@@ -24,8 +24,9 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     axes.set_xlim(_LEFT, _RIGHT)
     axes.set_ylim(-_HALF, _HALF)
     L, radius = curves.loop, curves.radius
-    shown = (L.real > _LEFT) & (L.real < _RIGHT) & (np.abs(L.imag) < _HALF)
-    at = np.union1d(_along(np.where(shown, L, np.nan)), np.searchsorted(curves.frequency, curves.limiting))
+    at = np.union1d(
+        _along(np.where(_shown(L), L, np.nan)), np.searchsorted(curves.frequency, curves.limiting)
+    )
     at = at[at < L.size]
     widths = 2.0 * radius[at]
     discs = EllipseCollection(
@@ -50,12 +51,10 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
         )
         label = f"to be kept off: |S| up to {1.0 / curves.circle:.3g}"
         handles.append(Patch(facecolor="#FDF1E9", edgecolor=ORANGE, linestyle=DASHED, label=label))
-    if curves.limiting.size:
-        places = (
-            np.interp(curves.limiting, curves.frequency, L.real),
-            np.interp(curves.limiting, curves.frequency, L.imag),
-        )
-        handles += marked(axes, *places, color=BLUE, label="limiting frequency")
+    limiting = np.interp(curves.limiting, curves.frequency, L)
+    limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
+    if limiting.size:
+        handles += marked(axes, limiting.real, limiting.imag, color=BLUE, label="limiting frequency")
     axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)
     axes.annotate("−1", (-1.0, 0.0), (4, 5), textcoords="offset points")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
@@ -63,6 +62,11 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     axes.set_xlabel("real part of C G")
     axes.set_ylabel("imaginary part of C G")
     legend_over_all(page, handles)
+
+
+def _shown(L: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Which points of L (n,) are within the axes."""
+    return (L.real > _LEFT) & (L.real < _RIGHT) & (np.abs(L.imag) < _HALF)
 
 
 def _along(L: NDArray[np.complex128]) -> NDArray[np.int_]:

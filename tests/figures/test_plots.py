@@ -10,7 +10,7 @@ import pytest
 from matplotlib.text import Text
 
 from inputdesign_cli.figures.plots import draw, draw_all
-from inputdesign_cli.runs.curves import BoundPanel, FitCurves, SignalCurves
+from inputdesign_cli.runs.curves import BoundPanel, FitCurves, NyquistCurves, SignalCurves
 from inputdesign_cli.runs.results import Results
 from tests.support.curves import CURVES, FIT, G, T, W, bound
 
@@ -78,3 +78,11 @@ def test_figures_come_in_the_format_that_is_asked_for_and_the_same_each_time(kin
     assert list(drawn) == [f"bound.{kind}"]
     assert drawn[f"bound.{kind}"].startswith(begins)
     assert draw_all(results, kind) == drawn
+
+
+def test_a_limiting_frequency_far_outside_does_not_push_the_axes_aside():
+    """Integral action takes C G to infinity at frequency zero; a warning would be an error here."""
+    frequency = np.geomspace(1e-3, np.pi, 300)
+    L = 0.05 / (1j * frequency)
+    curves = NyquistCurves(frequency, L, 0.1 * np.abs(L), limiting=frequency[[0, 200]], circle=0.5)
+    assert draw(curves).startswith(b"\x89PNG")
