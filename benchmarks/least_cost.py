@@ -99,8 +99,8 @@ def ours(problem: Problem, power: float) -> ExchangeResult:
 
 def anywhere(problem: Problem, power: float) -> ExchangeResult:
     """The optimum over every spectrum, with its proof."""
-    lines = LinesBasis.anywhere(problem.gradients.grid)
-    return exchange(replace(problem, basis=lines), power * lines.flat, tolerance=1e-6)
+    lines = LinesBasis.anywhere(*problem.experiment.band, problem.experiment.inputs)
+    return exchange(replace(problem, basis=lines), power * lines.even, tolerance=1e-6)
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
