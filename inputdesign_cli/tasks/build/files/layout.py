@@ -109,10 +109,19 @@ def rows_of(text: str, separator: str | None) -> Rows:
         found = [(number, line.split()) for number, line in enumerate(text.splitlines(), start=1)]
     else:
         found = list(_quoted(text, separator))
+    full = [any(map(str.strip, row)) for _, row in found]
+    last = max((i for i, filled in enumerate(full) if filled), default=-1)
+    # Between rows of numbers a row of empty cells is a sample that is missing; elsewhere it is nothing.
+    numbers = [
+        filled and all(is_plain(cell, comma=separator != ",") for cell in row if cell.strip())
+        for filled, (_, row) in zip(full, found, strict=True)
+    ]
+    first = next((i for i, of_numbers in enumerate(numbers) if of_numbers), len(found))
     return [
         (line, row)
-        for line, row in found
-        if any(map(str.strip, row)) and not row[0].lstrip().startswith(COMMENTS)
+        for i, (line, row) in enumerate(found)
+        if (full[i] or (len(row) > 1 and first < i < last))
+        and not (row and row[0].lstrip().startswith(COMMENTS))
     ]
 
 

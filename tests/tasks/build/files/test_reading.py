@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.files.layout import rows_of
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, read_columns
@@ -294,3 +295,8 @@ def test_a_file_that_ends_its_reader_is_refused(tmp_path):
     path.write_bytes(broken)
     with pytest.raises(DataError, match=r"no \.mat file that can be read"):
         read_sheet(path, key="")
+
+
+def test_a_row_of_empty_cells_between_numbers_is_a_sample_that_is_missing():
+    text = "u1,y1\n,\n1,2\n,\n3,4\n,\n"
+    assert [row for _, row in rows_of(text, ",")] == [["u1", "y1"], ["1", "2"], ["", ""], ["3", "4"]]
