@@ -4,8 +4,9 @@
 
 The admissible error is drawn so that r_u reaches 50 to 100 % of it: every model would be called met if no
 test spoke against it. It is a constant, or relative to |G| as far as |G| stays above a tenth of its gain.
-Wrong models lack a lag or have another delay, or their data drift or have coloured noise that the model takes
-for another kind. Half of the records begin in the middle of things, about a level.
+Wrong models lack a lag or have another delay, or their data drift, have coloured noise that the model takes
+for another kind, or come from a plant whose gain changes during the record, or whose actuator saturates or
+has a dead zone. Half of the records begin in the middle of things, about a level.
 
 With --designed the records are the cheapest binary ones for a relative error of a first-order plant in a
 narrow band, at one to two times the amplitude that they need. Nothing there excites what the model lacks more
@@ -26,11 +27,11 @@ import scipy.special
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification import Estimate, identify
+from inputdesign_cli.identification import Estimate, identify, that_matter
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
-FAULTS = ("lag", "delay", "drift", "noise")
+FAULTS = ("lag", "delay", "drift", "noise", "change", "nonlinear")
 _FREQUENCIES = np.linspace(1e-3, np.pi, 800)
 _BEFORE = 300
 _DESIGNS = 30
@@ -101,7 +102,16 @@ def trial(fault: str | None, rng: np.random.Generator) -> Trial:
         model = structure(model.B[0][0], F) if rng.random() < 0.5 else structure(model.B[0][0], F, A=1)
     total = samples + _BEFORE
     u = excitation(total, rng)
-    clean = scipy.signal.lfilter(B, F, u)
+    applied = u
+    if fault == "change":
+        late = np.arange(total) > _BEFORE + rng.uniform(0.15, 0.85) * samples
+        gain = 1.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-1.5, -0.3)
+        applied = np.where(late, gain, 1.0) * u
+    if fault == "nonlinear":
+        while np.unique(u).size <= 2:  # two levels have a gain, whatever lies between
+            u = excitation(total, rng)
+        applied = distorted(u, rng)
+    clean = scipy.signal.lfilter(B, F, applied)
     noise = scipy.signal.lfilter(top, below, rng.standard_normal(total))
     y = clean + noise * clean.std() / noise.std() * 10 ** rng.uniform(-1.5, -0.3)
     if fault == "drift":
@@ -110,9 +120,18 @@ def trial(fault: str | None, rng: np.random.Generator) -> Trial:
         y = y + (y - clean).std() * rng.uniform(2.0, 20.0) * wander
     if rng.random() < 0.5:
         return Trial(model, u[_BEFORE:], y[_BEFORE:] + rng.uniform(-50.0, 50.0), (B, F))
-    u, y = np.where(np.arange(total) < _BEFORE, 0.0, u), y - clean
-    y = y + scipy.signal.lfilter(B, F, u)
+    begun = np.arange(total) >= _BEFORE
+    u, y = np.where(begun, u, 0.0), y - clean + scipy.signal.lfilter(B, F, np.where(begun, applied, 0.0))
     return Trial(model, u[_BEFORE:], y[_BEFORE:], (B, F))
+
+
+def distorted(u: Array, rng: np.random.Generator) -> Array:
+    """A saturating actuator, or one with a dead zone; its gain is one in the middle, or beyond the zone."""
+    if rng.random() < 0.5:
+        limit = rng.uniform(1.0, 2.5) * u.std()
+        return np.clip(u, -limit, limit)
+    zone = 10 ** rng.uniform(-1.3, -0.3) * u.std()
+    return u - np.clip(u, -zone, zone)
 
 
 @dataclass(frozen=True)
@@ -188,13 +207,12 @@ def judged(made: Trial, rng: np.random.Generator) -> Judged:
     else:
         admissible = made.relative * size
     _, true = scipy.signal.freqz(*made.true, w)
-    moves = [np.max(np.abs(one.moves(model, w[asked])[:, 0, 0]) / admissible) for one in found.directed]
-    among = sum(ratio > 1.0 for ratio in moves)
+    moves = [np.max(np.abs(one.moves(model, w[asked])[..., 0, 0]) / admissible) for one in found.directed]
     return Judged(
         found,
         bool(np.all(alpha * np.sqrt(spread[asked]) <= admissible * (1.0 + 1e-9))),
         bool(np.any(np.abs(G - true)[asked] > admissible)),
-        any(one.matters(float(ratio), among) for one, ratio in zip(found.directed, moves, strict=True)),
+        bool(that_matter(found.directed, moves)),
     )
 
 

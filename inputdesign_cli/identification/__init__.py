@@ -1,7 +1,11 @@
 """From samples to models: prediction-error estimates with their covariance, and tests of the residuals."""
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
-from inputdesign_cli.identification.directed import Directed as Directed
+from inputdesign_cli.identification.directed import (
+    Alternative as Alternative,
+    Directed as Directed,
+    that_matter as that_matter,
+)
 from inputdesign_cli.identification.earlier import Earlier as Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
 from inputdesign_cli.identification.estimators import (
@@ -9,7 +13,6 @@ from inputdesign_cli.identification.estimators import (
     identify as identify,
     information_of_data as information_of_data,
 )
-from inputdesign_cli.identification.extensions import Extension as Extension
 from inputdesign_cli.identification.frequency_response import (
     FrequencyResponse as FrequencyResponse,
     frequency_response as frequency_response,

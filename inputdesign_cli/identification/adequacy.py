@@ -33,7 +33,7 @@ _TRENDS, _WAVES = 3, 4
 _SAMPLES_A_DIRECTION = 8
 _DEPENDENT = 1e-6
 
-Fault = Literal["plant", "noise", "drift"]
+Fault = Literal["plant", "noise", "drift", "change", "nonlinear"]
 Echo = Callable[[Array], Array]
 """What past errors (N, p) add to the gradient of a parameter."""
 Echoes = Sequence[tuple[int, Echo]]

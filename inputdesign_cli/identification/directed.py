@@ -1,4 +1,4 @@
-"""Is one parameter missing? The score test of each, and the likelihood ratio where that leaves it open.
+"""Is one parameter missing, or a gain not always the same? Score tests, then likelihood ratios.
 
 A test of one degree of freedom sees a neglected pole or sample of delay where tests of many lags share
 their power among all ([engle-1984]). It also tells how far G would move, which the residuals need not show: a
@@ -7,23 +7,24 @@ narrow band of excitation hardly contradicts a model that is wrong at its edge.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.adequacy import Echoes, Fault, ScoreTest, White
-from inputdesign_cli.identification.extensions import Extension
+from inputdesign_cli.identification.adequacy import Echo, Echoes, Fault, ScoreTest, White
 from inputdesign_cli.identification.record_problem import Point
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
-# A parameter that would move G by more than is admitted counts as missing with a probability below this,
-# shared among all that would (Bonferroni).
-BEYOND_CHANCE = 0.05
+# What would move G by more than is admitted counts as missing with a probability below this, shared among all
+# that would (Bonferroni). A change of gain often has a large effect that the record hardly shows.
+_BEYOND = {"plant": 0.05, "noise": 0.05, "change": 0.01, "nonlinear": 0.01}
 # A score of a larger probability is the last word.
 _OPEN = 0.3
 # A parameter of whose effect the estimate explains all but this share is not tried.
@@ -34,51 +35,78 @@ _LITTLE = 0.1
 _SAME = 0.99
 
 
+class Alternative(Protocol):
+    """The model with one parameter more, which is zero in the model."""
+
+    @property
+    def name(self) -> str:
+        """Of the parameter."""
+
+    @property
+    def phrase(self) -> str:
+        """What it is, for a sentence."""
+
+    @property
+    def fault(self) -> Fault:
+        """What is wrong where it is missing."""
+
+    def column(self, records: Records) -> NDArray[np.float64]:
+        """(N, p): minus the derivative of the prediction errors with respect to it."""
+
+    def slopes(self, model: Model, w: ArrayLike) -> ComplexArray:
+        """(states, n, p, r): the derivative of G with respect to it, in each state that a plant may be in."""
+
+    def echo(self, lengths: Sequence[int]) -> Echo | None:
+        """What past errors add to `column` in records of these lengths; None where they add nothing."""
+
+    def estimated(self, records: Records) -> tuple[Model, float, float] | None:
+        """The model with it, estimated, the cost of that and the cost without it; None: not to be had."""
+
+
 @dataclass(frozen=True)
 class Directed:
     """One parameter more than the model has.
 
     Attributes:
         test: whether these data ask for it.
-        extensions: the parameters that act alike on these data where they are small, the likeliest first.
+        alternatives: the parameters that act alike on these data where they are small, the likeliest first.
         deviation: the standard deviation of the first one.
         following: (k,), how the parameters of the model change with it, to first order.
         size: what it is to first order; `larger`, the estimate of the larger model where there is one.
     """
 
     test: ScoreTest
-    extensions: tuple[Extension, ...]
+    alternatives: tuple[Alternative, ...]
     deviation: float
     following: Array
     size: float
     larger: Model | None
 
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """(n, p, r): how G of the estimated `model` changes if the parameter is estimated along."""
+        """(states, n, p, r): how G of the estimated `model` changes if the parameter is estimated along."""
         if self.larger is not None:
-            return np.asarray(self.larger.plant_at(w) - model.plant_at(w))
+            return np.asarray(self.larger.plant_at(w) - model.plant_at(w))[None]
         return self.size * self.slope(model, w)
 
     def slope(self, model: Model, w: ArrayLike) -> ComplexArray:
-        """(n, p, r): the derivative of G with respect to the parameter, the others following."""
-        extension = self.extensions[0]
-        own = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
-        return np.asarray(own + extension.model.plant_gradient(w)[:, extension.index])
+        """(states, n, p, r): the derivative of G with respect to the parameter, the others following."""
+        others = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
+        return np.asarray(others + self.alternatives[0].slopes(model, w))
 
-    def matters(self, moves: float, among: int) -> bool:
-        """Whether it speaks against a verdict that G `moves` by so many times what is admitted.
 
-        Args:
-            among: how many parameters would move it by more than is admitted.
-        """
-        return moves > 1.0 and self.test.probability * among < BEYOND_CHANCE
+def that_matter(tried: Sequence[Directed], moves: Sequence[float]) -> list[int]:
+    """The numbers of those that speak against a verdict; each moves G by so many times what is admitted."""
+    beyond = [i for i, move in enumerate(moves) if move > 1.0]
+    levels = {i: _BEYOND[tried[i].test.fault] for i in beyond}
+    among = Counter(levels.values())
+    return [i for i, level in levels.items() if tried[i].test.probability * among[level] < level]
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """An extension and its gradient (N p,) in white units; what the estimate leaves of it; the mean score."""
+    """An alternative, its gradient (N p,) in white units, what the estimate leaves of it, the mean score."""
 
-    extension: Extension
+    alternative: Alternative
     column: Array
     left: Array
     mean: float
@@ -92,18 +120,17 @@ class _Tried:
 
 
 def directed_tests(
-    records: Records, point: Point, extensions: Sequence[Extension], echoes: Echoes | None = None
+    records: Records, point: Point, alternatives: Sequence[Alternative], echoes: Echoes | None = None
 ) -> tuple[Directed, ...]:
-    """The test of every extension; those that these data cannot tell apart share one."""
+    """The test of every alternative; those that these data cannot tell apart share one."""
     white = White.of(point, echoes)
     groups: list[list[_Tried]] = []
-    for extension in extensions:
-        column = (extension.column(records) @ white.root.T).ravel()
-        known = extension.echo is not None and echoes is not None
-        through = extension.echo(records.lengths) if known and extension.echo else None
+    for alternative in alternatives:
+        column = (alternative.column(records) @ white.root.T).ravel()
+        through = None if echoes is None else alternative.echo(records.lengths)
         own = np.array([0.0 if through is None else white.echoes(through)])
         mean = float(white.mean_left(column[:, None], own)[0])
-        tried = _Tried(extension, column, white.unexplained(column), mean)
+        tried = _Tried(alternative, column, white.unexplained(column), mean)
         if tried.size > _EXPLAINED * np.linalg.norm(column):
             alike = next((group for group in groups if tried.like(group[0])), None)
             groups.append([tried]) if alike is None else alike.append(tried)
@@ -114,24 +141,26 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
     statistic = float(group[0].left @ white.residuals - group[0].mean) ** 2
     statistic /= group[0].size ** 2 * white.variance
     larger: Model | None = None
-    if _probability(statistic) < _OPEN and group[0].extension.nested and records.earlier is None:
-        ends = [tried.extension.estimated(records) for tried in group]
-        costs = np.array([cost for _, cost, _ in ends])
-        group = [group[i] for i in np.argsort(costs)]
-        best = int(np.argmin(costs))
-        # A likelihood ratio has no mean to be compared with.
-        if abs(group[0].mean) <= _LITTLE * group[0].size:
-            statistic = max(statistic, _ratio(records, ends[best][2], costs[best]) / white.variance)
-        larger = group[0].extension.model.at(ends[best][0])
+    if _probability(statistic) < _OPEN and records.earlier is None:
+        ends = [(tried.alternative.estimated(records), tried) for tried in group]
+        known = [(end, tried) for end, tried in ends if end is not None]
+        if known:
+            known.sort(key=lambda each: each[0][1])
+            (larger, cost, without), best = known[0]
+            group = [tried for _, tried in known] + [tried for end, tried in ends if end is None]
+            # A likelihood ratio has no mean to be compared with.
+            if abs(best.mean) <= _LITTLE * best.size:
+                statistic = max(statistic, _ratio(records, without, cost) / white.variance)
     first = group[0]
     scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
     explained = np.linalg.lstsq(white.explained / scale, first.column, rcond=1e-12)[0] / scale
-    extensions = tuple(tried.extension for tried in group)
-    name = " or ".join(sorted(extension.name for extension in extensions))
-    fault: Fault = "plant" if any(extension.in_plant for extension in extensions) else "noise"
+    alternatives = tuple(tried.alternative for tried in group)
+    name = " or ".join(sorted(alternative.name for alternative in alternatives))
+    faults = [alternative.fault for alternative in alternatives]
+    fault: Fault = "plant" if "plant" in faults else faults[0]
     return Directed(
         ScoreTest(name, fault, statistic, 1, _probability(statistic), None),
-        extensions,
+        alternatives,
         deviation=1.0 / first.size,
         following=-explained[explained.size - point.theta.size :],
         size=float(first.left @ white.residuals - first.mean) / first.size**2,

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.adequacy import Echoes, ScoreTest, failed, score_tests
 from inputdesign_cli.identification.checks import check_apart, check_noisy, factor_of_data, fit_percent
-from inputdesign_cli.identification.directed import Directed, directed_tests
-from inputdesign_cli.identification.extensions import Extension
+from inputdesign_cli.identification.directed import Alternative, Directed, directed_tests
 from inputdesign_cli.identification.one_system import of_one_system
 from inputdesign_cli.identification.problem import inverses
 from inputdesign_cli.identification.record_problem import Point, rounding
@@ -128,7 +127,7 @@ def concluded(
     in_noise: int,
     in_plant: int,
     recent: int,
-    extensions: Sequence[Extension],
+    alternatives: Sequence[Alternative],
     experiments: Sequence[int],
     feedback: bool,
     echoes: Echoes | None,
@@ -144,7 +143,7 @@ def concluded(
         in_noise: number of parameters that make residuals look whiter: those of A, C and D.
         in_plant: number of parameters that take directions of past inputs away: those of B and F.
         recent: the lag up to which the structure looks at the inputs.
-        extensions: the parameters that might be missing.
+        alternatives: the parameters that might be missing.
         experiments: the samples of each experiment.
         feedback: whether u(t) answers y(t).
         echoes: what past errors add to the gradients of parameters.
@@ -183,7 +182,7 @@ def concluded(
             point.errors, records.u, fitted=in_plant, feedback=feedback, lengths=lengths
         ),
         tests=score_tests(records, point, recent=recent, feedback=feedback, echoes=echoes),
-        directed=directed_tests(records, point, extensions, echoes),
+        directed=directed_tests(records, point, alternatives, echoes),
         alike=of_one_system(point, noise, experiments),
         rivals=found.rivals,
         repeated=repetition(point.errors),

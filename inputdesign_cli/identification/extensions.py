@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from inputdesign_cli.identification.adequacy import Echo
+from inputdesign_cli.identification.adequacy import Echo, Fault
 from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
 from inputdesign_cli.identification.records import Record, Records, shifted
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import Listed
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.polynomial_model import Rows
 
 
@@ -26,10 +26,10 @@ class Extension:
     Attributes:
         model: the larger model, whose new parameter is zero; of a model in other parameters than its
             coefficients, that of the coefficients.
-        name: of the new parameter; `what` it is.
+        name: of the new parameter; `what` it is, `phrase` in a sentence.
         record: makes the record of samples u (N, r), y (N, p) that the larger structure is to explain.
         nested: whether that structure has no further freedom than the one parameter.
-        echo: made for the lengths of records, T of errors (N, p), what they add to `column`; None where
+        through: made for the lengths of records, T of errors (N, p), what they add to `column`; None where
             they add nothing.
     """
 
@@ -38,7 +38,7 @@ class Extension:
     what: str
     record: Callable[[Array, Array], Record]
     nested: bool = True
-    echo: Callable[[Sequence[int]], Echo | None] | None = None
+    through: Callable[[Sequence[int]], Echo | None] | None = None
 
     @property
     def index(self) -> int:
@@ -46,9 +46,18 @@ class Extension:
         return self.model.names.index(self.name)
 
     @property
-    def in_plant(self) -> bool:
-        """Whether G depends on it."""
-        return bool(self.model.in_plant[self.index])
+    def phrase(self) -> str:
+        """It, for a sentence."""
+        return f"one more {self.what} ({self.name})"
+
+    @property
+    def fault(self) -> Fault:
+        """What is wrong where it is missing."""
+        return "plant" if self.model.in_plant[self.index] else "noise"
+
+    def slopes(self, model: Model, w: ArrayLike) -> ComplexArray:
+        """(1, n, p, r): the derivative of G with respect to the new parameter."""
+        return self.model.plant_gradient(w)[None, :, self.index]
 
     def column(self, records: Records) -> NDArray[np.float64]:
         """(N, p): minus the derivative of the prediction errors with respect to the new parameter."""
@@ -56,18 +65,24 @@ class Extension:
         gradients = [part.errors_and_gradient(theta)[1] for part in self.records(records).parts]
         return np.concatenate([gradient[self.index] for gradient in gradients])
 
-    def estimated(self, records: Records) -> tuple[Array, float, float]:
-        """The larger structure's theta where a search ends that begins here, its cost, and that without it.
+    def echo(self, lengths: Sequence[int]) -> Echo | None:
+        """What past errors add to `column` in records of these lengths; None where they add nothing."""
+        return None if self.through is None else self.through(lengths)
+
+    def estimated(self, records: Records) -> tuple[Model, float, float] | None:
+        """The larger model where a search ends that begins here, its cost, and that without the parameter.
 
         Both costs are with the unknown starts of the larger structure, which may be more in every record; the
-        second is by one step of Gauss and Newton from here.
+        second is by one step of Gauss and Newton from here. None where the structure is not nested.
         """
+        if not self.nested:
+            return None
         larger, theta = self.records(records), self.model.theta
         found = minimise(RecordProblem((larger,)), theta[None])
         point, others = evaluate(larger, theta), np.arange(theta.size) != self.index
         slope, hessian = point.slope[others], point.hessian[np.ix_(others, others)]
         gain = float(slope @ np.linalg.lstsq(hessian, slope, rcond=1e-12)[0])
-        return found.theta[0], float(found.cost[0]), point.cost - gain
+        return self.model.at(found.theta[0]), float(found.cost[0]), point.cost - gain
 
     def records(self, records: Records) -> Records:
         """The same samples against the larger structure."""

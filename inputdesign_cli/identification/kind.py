@@ -23,6 +23,7 @@ from inputdesign_cli.identification.gauss_newton import minimise
 from inputdesign_cli.identification.record_problem import RecordProblem, evaluate
 from inputdesign_cli.identification.records import Record, Records, centred, longest, split
 from inputdesign_cli.identification.search import Search, from_rest_or_free, search
+from inputdesign_cli.identification.variations import variations
 from inputdesign_cli.plant.polynomial import Array
 
 Part = tuple[Array, Array]
@@ -151,7 +152,10 @@ def identify_records(
         in_noise=int(np.sum(kind.whitening)),
         in_plant=int(np.sum(kind.explaining)),
         recent=kind.recent,
-        extensions=kind.extensions(best.point.theta, feedback=feedback),
+        alternatives=(
+            *kind.extensions(best.point.theta, feedback=feedback),
+            *variations(kind.record, best.point.theta, best.records.u, best.records.lengths),
+        ),
         experiments=experiments or (len(y),),
         feedback=feedback,
         echoes=kind.echoes(best.point.theta, best.records.lengths),

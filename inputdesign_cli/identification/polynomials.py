@@ -77,7 +77,7 @@ class PolynomialKind(OfModel):
         found = []
         for larger, what in larger_polynomials(self.model.at(theta), feedback=feedback):
             name, record = new_name(larger, self.model), partial(PolynomialRecord, Structure.of(larger))
-            found.append(Extension(larger, name, what, record, echo=partial(echo_of, larger, name)))
+            found.append(Extension(larger, name, what, record, through=partial(echo_of, larger, name)))
         return tuple(found)
 
     def echoes(self, theta: Array, lengths: Sequence[int]) -> Echoes | None:

@@ -140,7 +140,9 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
         assessment["undecided"] = reasons
         assessment["causes"] = [cause for cause, told_of in causes.items() if told_of]
     if without:
-        assessment["neglected"] = [one.entry(task.header.units) for one in without]
+        entries = [(one.of_structure, one.entry(task.header.units)) for one in without]
+        assessment["neglected"] = [entry for of_structure, entry in entries if of_structure]
+        assessment["variations"] = [entry for of_structure, entry in entries if not of_structure]
     if found.question is not None:
         assessment["nominal"], told_apart = _from_nominal(task, found, found.question)
         notes += [] if broken else told_apart

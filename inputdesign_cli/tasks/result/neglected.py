@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
-from inputdesign_cli.identification import Directed, Estimate
+from inputdesign_cli.identification import Directed, Estimate, that_matter
 from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.result.refutations import chance
+from inputdesign_cli.tasks.result.refutations import REMEDY, chance
 
 # Two-sided 95 % of the normal distribution.
 _ALLOWED = 1.959963984540054
@@ -37,8 +37,13 @@ class Neglected:
     may_move: float
     frequency: float
 
+    @property
+    def of_structure(self) -> bool:
+        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        return self.directed.test.fault in ("plant", "noise")
+
     def entry(self, units: Units) -> dict[str, Json]:
-        """One of `assessment.neglected`."""
+        """One of `assessment.neglected` or `assessment.variations`."""
         return {
             "parameter": self.directed.test.name,
             "probability": self.directed.test.probability,
@@ -61,8 +66,8 @@ def neglected(model: Model, estimate: Estimate, errors: Sequence[OnModelError]) 
 def _largest(model: Model, directed: Directed, error: OnModelError) -> Neglected:
     w = error.grid
     moves, slope = (
-        np.linalg.norm(error.concerned(G), axis=1) / error.admissible.at(w)
-        for G in (directed.moves(model, w), directed.slope(model, w))
+        np.max([np.linalg.norm(error.concerned(G), axis=1) for G in states], axis=0) / error.admissible.at(w)
+        for states in (directed.moves(model, w), directed.slope(model, w))
     )
     at = int(np.argmax(moves + _ALLOWED * directed.deviation * slope))
     may_move = moves[at] + _ALLOWED * directed.deviation * slope[at]
@@ -71,23 +76,22 @@ def _largest(model: Model, directed: Directed, error: OnModelError) -> Neglected
 
 def objections(units: Units, found: Sequence[Neglected]) -> list[str]:
     """What to say of those that matter."""
-    among = sum(one.moves > 1.0 for one in found)
+    matter = that_matter([one.directed for one in found], [one.moves for one in found])
     return [
-        f"one more {one.directed.extensions[0].what} ({one.directed.test.name}) would move G by "
+        f"{one.directed.alternatives[0].phrase} would move G by "
         f"{one.moves:.3g} times the admissible error about {units.named(one.frequency)} (probability "
-        f"{chance(one.directed.test.probability)}): estimate it along"
-        for one in found
-        if one.directed.matters(one.moves, among)
+        f"{chance(one.directed.test.probability)} without it): {REMEDY[one.directed.test.fault]}"
+        for one in (found[i] for i in matter)
     ]
 
 
 def unseen(units: Units, found: Sequence[Neglected]) -> list[str]:
     """What the record leaves open of the structure, where that is more than is admitted."""
-    worst = max(found, key=lambda one: one.may_move, default=None)
+    worst = max((one for one in found if one.of_structure), key=lambda one: one.may_move, default=None)
     if worst is None or worst.may_move <= 1.0:
         return []
     return [
-        f"the verdict rests on the structure of the model: one more {worst.directed.extensions[0].what} "
-        f"({worst.directed.test.name}) that these data do not rule out would move G by up to "
-        f"{worst.may_move:.3g} times the admissible error, at {units.named(worst.frequency)} (95 %)"
+        f"the verdict rests on the structure of the model: {worst.directed.alternatives[0].phrase} that "
+        f"these data do not rule out would move G by up to {worst.may_move:.3g} times the admissible error, "
+        f"at {units.named(worst.frequency)} (95 %)"
     ]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from inputdesign_cli.identification import Estimate, Extension, ScoreTest
+from inputdesign_cli.identification import Alternative, Estimate, ScoreTest
 from inputdesign_cli.plant import Model
 from inputdesign_cli.tasks.result.remedies import remedies_of
 
@@ -21,7 +21,21 @@ FOUND = {
 }
 # What drifts makes other tests fail, and what is missing in G those of the noise.
 _FIRST = ("drift", "plant", "noise")
-_MISSING = "one parameter is missing (probability {p} without it): one more {what} ({name})"
+_MISSING = {
+    "plant": "one parameter is missing (probability {p} without it): {phrase}",
+    "noise": "one parameter is missing (probability {p} without it): {phrase}",
+    "change": "the plant did not stay the same: {phrase} explains the data better (probability {p} without "
+    "it); {remedy}",
+    "nonlinear": "the plant is not linear: {phrase} explains the data better (probability {p} without it); "
+    "{remedy}",
+}
+REMEDY = {
+    "plant": "estimate it along",
+    "noise": "estimate it along",
+    "change": "assess the parts of the record one by one (--range), and look for what changed between them",
+    "nonlinear": "a linear model holds for one range of the input only: use the range that the model is for, "
+    "or give as u what the actuator really does",
+}
 # The prior and the data of one system differ as much with this probability.
 _ONE_SYSTEM = 1e-3
 _LEAST = 1e-300
@@ -94,7 +108,7 @@ def repetitions(estimate: Estimate, files: Sequence[tuple[str, int]]) -> list[st
 def refutations(model: Model, estimate: Estimate) -> list[str]:
     """What the strongest test of every kind of fault says, and which single parameters are missing."""
     strongest: dict[str, ScoreTest] = {}
-    directed = {one.test: one.extensions for one in estimate.directed}
+    directed = {one.test: one.alternatives for one in estimate.directed}
     for test in estimate.failed:
         if test in directed:
             continue
@@ -112,7 +126,9 @@ def refutations(model: Model, estimate: Estimate) -> list[str]:
         if fault in strongest
     ]
     of_one = [
-        _MISSING.format(p=chance(test.probability), what=directed[test][0].what, name=directed[test][0].name)
+        _MISSING[test.fault].format(
+            p=chance(test.probability), phrase=directed[test][0].phrase, remedy=REMEDY[test.fault]
+        )
         + _or_else(directed[test][1:])
         for test in sorted(directed, key=lambda test: test.probability)
         if test in estimate.failed
@@ -131,7 +147,7 @@ def _where(model: Model, test: ScoreTest) -> str:
     return f", those of {output} most" if own else f", those of {output} after those of y{source} most"
 
 
-def _or_else(others: Sequence[Extension]) -> str:
+def _or_else(others: Sequence[Alternative]) -> str:
     """What these data hardly tell from it."""
-    listed = ", ".join(f"one more {other.what} ({other.name})" for other in others)
+    listed = ", ".join(other.phrase for other in others)
     return f"; nearly the same on these data: {listed}" if others else ""

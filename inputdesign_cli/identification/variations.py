@@ -1,0 +1,141 @@
+"""What a plant that is linear and stays the same does without: an input whose gain changes.
+
+In place of G u stands G (u + x f), with a signal f that is made of the same input: the input itself after a
+part of the record, a power of it, its sign, the direction of its last move. Prediction errors are linear in
+u, so that those of f alone are the gradient with respect to x, whatever the structure. Where x is not zero
+there is no single G: small changes of u see another one in each state of the plant, such as early and late,
+or near the middle of the range and far from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from inputdesign_cli.identification.adequacy import Echo, Fault
+from inputdesign_cli.identification.records import Record, Records
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+
+# A signal that lies on a straight line but for this share is the input itself.
+_STRAIGHT = 1e-6
+_PARTS = {"a quarter": 0.25, "half": 0.5, "three quarters": 0.75}
+
+_Tried = tuple[str, str, Fault, Array, tuple[float, ...]]
+"""Name, phrase, fault, f and its slopes in each state, of an input of size one."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A gain of one input that is not always the same; an `Alternative`.
+
+    Attributes:
+        channel: of the input.
+        signal: f (N,), of the samples of all records one after the other, in the unit of the input.
+        gains: df/du, one for each state of the plant.
+        record: makes the record of samples u (N, r), y (N, p) that the structure is to explain.
+        theta: (k,), the estimate.
+    """
+
+    name: str
+    phrase: str
+    fault: Fault
+    channel: int
+    signal: Array
+    gains: tuple[float, ...]
+    record: Callable[[Array, Array], Record]
+    theta: Array
+
+    def column(self, records: Records) -> NDArray[np.float64]:
+        """(N, p): minus the derivative of the prediction errors with respect to x."""
+        only = np.zeros_like(records.u)
+        only[:, self.channel] = self.signal
+        pieces = np.split(only, np.cumsum(records.lengths)[:-1])
+        outputs = records.y.shape[1]
+        parts = (self.record(piece, np.zeros((len(piece), outputs))) for piece in pieces)
+        return -np.concatenate([part.errors_and_gradient(self.theta)[0] for part in parts])
+
+    def slopes(self, model: Model, w: ArrayLike) -> NDArray[np.complex128]:
+        """(states, n, p, r): the derivative of G with respect to x in each state."""
+        G = model.plant_at(w)
+        own = np.zeros_like(G)
+        own[..., self.channel] = G[..., self.channel]
+        return np.asarray(np.multiply.outer(np.array(self.gains), own))
+
+    def echo(self, lengths: Sequence[int]) -> Echo | None:
+        """None: f is made of inputs."""
+        return None
+
+    def estimated(self, records: Records) -> None:
+        """None: no model of a linear plant has x."""
+        return
+
+
+def variations(
+    record: Callable[[Array, Array], Record], theta: Array, u: Array, lengths: Sequence[int]
+) -> tuple[Variation, ...]:
+    """What is tried of each input.
+
+    Of an input with two values powers and sign are the input itself about a level: they say nothing.
+
+    Args:
+        record: makes the record of samples (N, r), (N, p) that the structure is to explain.
+        theta: (k,), the estimate.
+        u: (N, r), of all records one after the other.
+        lengths: of the records.
+    """
+    found = []
+    for channel, samples in enumerate(u.T):
+        name, size = "u" if u.shape[1] == 1 else f"u{channel + 1}", float(np.std(samples))
+        x = (samples - np.mean(samples)) / max(size, 1e-300)
+        found += [
+            Variation(of, phrase, fault, channel, size * f, gains, record, theta)
+            for of, phrase, fault, f, gains in (*_changes(name, x), *_curves(name, x, lengths))
+        ]
+    return tuple(found)
+
+
+def _changes(name: str, x: Array) -> Iterator[_Tried]:
+    """The gain of samples x (N,) is another after a part of the record."""
+    time = np.arange(x.size) / x.size
+    for part, share in _PARTS.items():
+        phrase = f"another gain of {name} after {part} of the record"
+        yield f"{name} after {part}", phrase, "change", np.where(time >= share, x, 0.0), (0.0, 1.0)
+
+
+def _curves(name: str, x: Array, lengths: Sequence[int]) -> Iterator[_Tried]:
+    """The gain of samples x (N,), of mean zero and size one, depends on them."""
+    level, amplitude = (f"a gain of {name} that depends on its {what}" for what in ("level", "amplitude"))
+    moves = np.concatenate([_last_moves(own) for own in np.split(x, np.cumsum(lengths)[:-1])])
+    for of, phrase, f, gains in (
+        (f"{name}^2", level, x**2, (-2.0, 2.0)),  # one deviation below and above the middle
+        (f"{name}^3", amplitude, x**3, (0.0,)),
+        (f"sign of {name}", f"a dead zone or friction at {name}", np.sign(x), (0.0,)),
+        (f"last move of {name}", f"play or hysteresis at {name}", moves, (0.0,)),
+    ):
+        bent, slope = _bent(f, x, lengths)
+        if np.linalg.norm(bent) > _STRAIGHT * np.linalg.norm(f):
+            yield of, phrase, "nonlinear", bent, tuple(gain - slope for gain in gains)
+
+
+def _bent(f: Array, x: Array, lengths: Sequence[int]) -> tuple[Array, float]:
+    """What no straight line in x explains of f (N,) in each record, and the mean slope of these lines."""
+    ends = np.cumsum(lengths)[:-1]
+    bent, slopes = [], []
+    for own, by in zip(np.split(f, ends), np.split(x, ends), strict=True):
+        line = np.column_stack([np.ones_like(by), by])
+        coefficients = np.linalg.lstsq(line, own, rcond=None)[0]
+        bent.append(own - line @ coefficients)
+        slopes.append(coefficients[1])
+    return np.concatenate(bent), float(np.average(slopes, weights=lengths))
+
+
+def _last_moves(x: Array) -> Array:
+    """(N,): the direction in which x last moved; before it first does, the other one."""
+    moves = np.sign(np.diff(x, prepend=x[:1]))
+    first = np.flatnonzero(moves)[:1]
+    moves[0] = -moves[first[0]] if first.size else 0.0
+    return np.asarray(moves[np.maximum.accumulate(np.where(moves != 0.0, np.arange(x.size), 0))])

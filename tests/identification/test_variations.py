@@ -1,0 +1,142 @@
+"""Gains that are not always the same: regressions on the altered input, and plants that do change."""
+
+import numpy as np
+import pytest
+import scipy.signal
+import scipy.stats
+
+from inputdesign_cli.identification import identify, that_matter
+from tests.support.identification_systems import SYSTEMS, data, one_channel
+from tests.support.plants import arx
+from tests.support.records import shifted, simulated
+
+
+def varying(found):
+    return {one.test.name: one for one in found.directed if one.test.fault in ("change", "nonlinear")}
+
+
+def through(u, *, samples=800, noise=0.05, seed=2):
+    """A first-order plant of gain one on which `u` acts, and its record about a level."""
+    rng = np.random.default_rng(seed)
+    y = scipy.signal.lfilter([0, 0.2], [1, -0.8], u)
+    return 7.0 + y + scipy.signal.lfilter([1], [1, -0.7], noise * rng.standard_normal(samples))
+
+
+def estimated(u, y):
+    return identify(one_channel([0, 0.2], F=[1, -0.8], D=[1, -0.7]), u[:, None], y[:, None])
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("u after half", lambda u: np.where(np.arange(u.size) >= u.size / 2, u, 0.0)),
+        ("u^2", np.square),
+        ("u^3", lambda u: u**3),
+        ("sign of u", np.sign),
+        ("last move of u", lambda u: np.sign(np.diff(u, prepend=u[1]))),
+    ],
+)
+def test_of_arx_it_is_the_score_test_of_a_regression(name, signal):
+    """A y = B (u + x f) + e: to first order x b_k f(t - k) joins, with x alone unknown."""
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(400)
+    u = (u - u.mean()) / u.std()
+    e = rng.standard_normal(400)
+    y = scipy.signal.lfilter([0, 1.0, 0.5], [1, -1.5, 0.7], u) + scipy.signal.lfilter([1], [1, -1.5, 0.7], e)
+    found = identify(SYSTEMS["arx"], u[:, None], y[:, None], rest=True)
+    f = signal(u)
+    if "after" not in name:
+        f = f - np.polyval(np.polyfit(u, f, 1), u)
+    own = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
+    b1, b2 = found.theta[2:]
+    column = b1 * shifted(f, 1) + b2 * shifted(f, 2)
+    left = column - own @ np.linalg.lstsq(own, column, rcond=None)[0]
+    score = left @ found.errors[:, 0] / (np.linalg.norm(left) * np.sqrt(np.mean(found.errors**2)))
+    test = varying(found)[name].test
+    assert test.statistic == pytest.approx(score**2, rel=1e-6)
+    assert test.probability == pytest.approx(scipy.stats.chi2.sf(score**2, 1), rel=1e-6)
+    assert varying(found)[name].size == pytest.approx(left @ found.errors[:, 0] / (left @ left), rel=1e-6)
+
+
+def test_a_gain_that_doubles_half_way_is_found_with_both_values():
+    u = np.random.default_rng(1).standard_normal(800)
+    late = np.arange(800) >= 400
+    found = estimated(u, through(np.where(late, 1.3, 1.0) * u))
+    one = varying(found)["u after half"]
+    assert one.test in found.failed
+    model = one_channel([0, 0.2], F=[1, -0.8], D=[1, -0.7]).at(found.theta)
+    w = np.array([0.01, 0.1])
+    before, after = (model.plant_at(w) + one.moves(model, w))[..., 0, 0]
+    true = scipy.signal.freqz([0, 0.2], [1, -0.8], w)[1]
+    assert np.abs(before / true) == pytest.approx([1.0, 1.0], abs=0.04)
+    assert np.abs(after / true) == pytest.approx([1.3, 1.3], abs=0.04)
+
+
+def backlash(u, width):
+    at, out = 0.0, np.empty_like(u)
+    for t, now in enumerate(u):
+        out[t] = at = min(max(at, now - width), now + width)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("names", "distort"),
+    [
+        ({"u^3", "sign of u"}, lambda u: np.clip(u, -1.0, 1.0)),
+        ({"u^3", "sign of u"}, lambda u: u - np.clip(u, -0.3, 0.3)),
+        ({"u^2"}, lambda u: np.where(u > 0.0, 1.0, 0.7) * u),
+        ({"last move of u"}, lambda u: backlash(u, 0.2)),
+    ],
+    ids=["saturation", "dead zone", "two gains", "backlash"],
+)
+def test_actuators_that_are_not_linear_are_found(names, distort):
+    u = scipy.signal.lfilter([0.6], [1, -0.8], np.random.default_rng(1).standard_normal(800))
+    found = estimated(u, through(distort(u)))
+    failing = {one.test.name for one in varying(found).values() if one.test in found.failed}
+    assert names <= failing
+
+
+def test_an_input_of_two_values_has_no_powers():
+    """Joined records have levels of their own, which make four values of two."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 4)
+    y = through(u)
+    y[400:] += 3.0
+    model = one_channel([0, 0.2], F=[1, -0.8], D=[1, -0.7])
+    u[400:] += 0.5
+    found = identify(model, u[:, None], y[:, None], lengths=(400, 400))
+    assert {name for name in varying(found) if "after" not in name} == set()
+    assert not found.failed
+
+
+def test_the_unit_of_the_input_does_not_matter():
+    u = np.random.default_rng(3).standard_normal(800)
+    y = through(np.clip(u, -2.0, 2.0))
+    one, other = (varying(estimated(scale * u + level, y)) for scale, level in ((1.0, 0.0), (1e-4, 40.0)))
+    for name, found in one.items():
+        assert other[name].test.probability == pytest.approx(found.test.probability, rel=1e-3)
+        assert other[name].size == pytest.approx(found.size, rel=1e-3)
+
+
+def test_probabilities_of_right_models_are_uniform():
+    rng = np.random.default_rng(4)
+    u, y = data("bj", 300, rng, runs=12)
+    found = [identify(SYSTEMS["bj"], u[i], y[i], start=SYSTEMS["bj"].theta, rest=True) for i in range(12)]
+    for name in varying(found[0]):
+        assert scipy.stats.kstest([varying(f)[name].test.probability for f in found], "uniform").pvalue > 1e-3
+    u, y = simulated(arx(), 300, rng, 8)
+    found = [identify(arx(), u[i], y[i], start=arx().theta, rest=True) for i in range(8)]
+    below = [one.test.probability < 0.05 for f in found for one in varying(f).values()]
+    assert scipy.stats.binomtest(sum(below), len(below), 0.05).pvalue > 1e-3
+
+
+def test_what_matters_shares_a_level_among_its_like():
+    u = np.random.default_rng(5).standard_normal(800)
+    found = estimated(u, through(np.clip(u, -1.0, 1.0)))
+    tried = list(found.directed)
+    far = [2.0] * len(tried)
+    changes = [i for i in that_matter(tried, far) if tried[i].test.fault in ("change", "nonlinear")]
+    among = sum(one.test.fault in ("change", "nonlinear") for one in tried)
+    assert [tried[i].test.probability * among < 0.01 for i in changes] == [True] * len(changes)
+    assert changes
+    assert that_matter(tried, [0.9] * len(tried)) == []
