@@ -1,6 +1,6 @@
 """How often right models are called undecided, and wrong ones met: random systems, one record each.
 
-    python benchmarks/verdicts.py [RUNS] [FIRST_SEED] [--designed]
+    python benchmarks/verdicts.py [RUNS] [FIRST_SEED] [--designed | --actuators]
 
 The admissible error is drawn so that r_u reaches 50 to 100 % of it: every model would be called met if no
 test spoke against it. It is a constant, or relative to |G| as far as |G| stays above a tenth of its gain.
@@ -11,6 +11,8 @@ has a dead zone. Half of the records begin in the middle of things, about a leve
 With --designed the records are the cheapest binary ones for a relative error of a first-order plant in a
 narrow band, at one to two times the amplitude that they need. Nothing there excites what the model lacks more
 than the design has to. Wrong models lack a pole.
+
+With --actuators RUNS plants of each kind have an actuator that is not linear.
 """
 
 from __future__ import annotations
@@ -107,10 +109,10 @@ def trial(fault: str | None, rng: np.random.Generator) -> Trial:
         late = np.arange(total) > _BEFORE + rng.uniform(0.15, 0.85) * samples
         gain = 1.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-1.5, -0.3)
         applied = np.where(late, gain, 1.0) * u
-    if fault == "nonlinear":
+    if fault in ACTUATORS:
         while np.unique(u).size <= 2:  # two levels have a gain, whatever lies between
             u = excitation(total, rng)
-        applied = distorted(u, rng)
+        applied = ACTUATORS[fault](u, rng)
     clean = scipy.signal.lfilter(B, F, applied)
     noise = scipy.signal.lfilter(top, below, rng.standard_normal(total))
     y = clean + noise * clean.std() / noise.std() * 10 ** rng.uniform(-1.5, -0.3)
@@ -125,13 +127,61 @@ def trial(fault: str | None, rng: np.random.Generator) -> Trial:
     return Trial(model, u[_BEFORE:], y[_BEFORE:], (B, F))
 
 
-def distorted(u: Array, rng: np.random.Generator) -> Array:
-    """A saturating actuator, or one with a dead zone; its gain is one in the middle, or beyond the zone."""
-    if rng.random() < 0.5:
-        limit = rng.uniform(1.0, 2.5) * u.std()
-        return np.clip(u, -limit, limit)
-    zone = 10 ** rng.uniform(-1.3, -0.3) * u.std()
+def saturating(u: Array, rng: np.random.Generator) -> Array:
+    """Limits at 1 to 2.5 standard deviations."""
+    limit = rng.uniform(1.0, 2.5) * u.std()
+    return np.clip(u, -limit, limit)
+
+
+def dead_zone(u: Array, rng: np.random.Generator) -> Array:
+    """Nothing happens within 0.05 to 0.5 standard deviations of the middle."""
+    zone = _share(rng, -1.3) * u.std()
     return u - np.clip(u, -zone, zone)
+
+
+def with_play(u: Array, rng: np.random.Generator) -> Array:
+    """The actuator follows at a distance of 0.05 to 0.5 standard deviations."""
+    width, at, out = _share(rng, -1.3) * u.std(), 0.0, np.empty_like(u)
+    for t, now in enumerate(u):
+        out[t] = at = min(max(at, now - width), now + width)
+    return out
+
+
+def of_limited_speed(u: Array, rng: np.random.Generator) -> Array:
+    """No step is larger than 0.5 to 2.5 times their rms."""
+    most, at, out = rng.uniform(0.5, 2.5) * np.std(np.diff(u)), 0.0, np.empty_like(u)
+    for t, now in enumerate(u):
+        out[t] = at = at + np.clip(now - at, -most, most)
+    return out
+
+
+def of_two_gains(u: Array, rng: np.random.Generator) -> Array:
+    """The gain above the middle is another by 5 to 50 %."""
+    return np.where(u > 0.0, 1.0 + rng.choice([-1.0, 1.0]) * _share(rng, -1.3), 1.0) * u
+
+
+def cubic(u: Array, rng: np.random.Generator) -> Array:
+    """A cubic term of 1 to 20 % at one standard deviation."""
+    return np.asarray(u + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-2.0, -0.7) * u**3 / u.std() ** 2)
+
+
+def _share(rng: np.random.Generator, least: float) -> float:
+    return float(10 ** rng.uniform(least, -0.3))
+
+
+def saturating_or_dead(u: Array, rng: np.random.Generator) -> Array:
+    """One of the two."""
+    return saturating(u, rng) if rng.random() < 0.5 else dead_zone(u, rng)
+
+
+# The gain is one in the middle, or beyond the zone or the play.
+ACTUATORS = {
+    "nonlinear": saturating_or_dead,
+    "play": with_play,
+    "speed": of_limited_speed,
+    "two gains": of_two_gains,
+    "cubic": cubic,
+}
 
 
 @dataclass(frozen=True)
@@ -238,7 +288,8 @@ def counted(trials: Iterable[tuple[Trial, np.random.Generator]]) -> Counter[str]
 
 def study(fault: str | None, seeds: range) -> Counter[str]:
     """The verdicts on random systems."""
-    generators = [np.random.default_rng([s, 0 if fault is None else 1 + FAULTS.index(fault)]) for s in seeds]
+    number = [None, *dict.fromkeys([*FAULTS, *ACTUATORS])].index(fault)
+    generators = [np.random.default_rng([seed, number]) for seed in seeds]
     return counted((trial(fault, rng), rng) for rng in generators)
 
 
@@ -254,11 +305,16 @@ def main() -> None:
     parser.add_argument("runs", type=int, nargs="?", default=500)
     parser.add_argument("first", type=int, nargs="?", default=0)
     parser.add_argument("--designed", action="store_true")
+    parser.add_argument("--actuators", action="store_true")
     asked = parser.parse_args()
     every = range(asked.first, asked.first + asked.runs)
     if asked.designed:
         for name, wrong in (("right", False), ("wrong", True)):
             print(f"{name} ({asked.runs})", dict(designed_study(every, wrong=wrong)), flush=True)
+        return
+    if asked.actuators:
+        for kind in ACTUATORS:
+            print(f"{kind} ({asked.runs})", dict(study(kind, every)), flush=True)
         return
     print(f"right ({asked.runs})", dict(study(None, every)), flush=True)
     wrong_ones: Counter[str] = Counter()

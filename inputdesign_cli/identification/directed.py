@@ -24,7 +24,7 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # What would move G by more than is admitted counts as missing with a probability below this, shared among all
 # that would (Bonferroni). A change of gain often has a large effect that the record hardly shows.
-_BEYOND = {"plant": 0.05, "noise": 0.05, "change": 0.01, "nonlinear": 0.01}
+_BEYOND = {"plant": 0.05, "noise": 0.05, "change": 0.005, "nonlinear": 0.005}
 # A score of a larger probability is the last word.
 _OPEN = 0.3
 # A parameter of whose effect the estimate explains all but this share is not tried.
