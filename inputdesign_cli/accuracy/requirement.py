@@ -92,7 +92,7 @@ class OneCondition(Requirement):
 
 
 def inverse_factor(information: Array) -> Array:
-    """K (k, k) with K^T K = M^-1.
+    """K (.., k, k) with K^T K = M^-1.
 
     Raises:
         LinAlgError: M is singular, that is, some parameter is not excited.

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
+from inputdesign_cli.information.noise import noise_informations
 from inputdesign_cli.information.products import WeightedProducts
-from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, band_quadrature, integrate
+from inputdesign_cli.information.quadrature import band_quadrature
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -99,7 +100,7 @@ class Experiment(Coordinates):
         if self.factor is None:
             return gradient
         if gradient.shape[2:] == (1, 1):
-            return (gradient[:, :, 0, 0] @ self._inverse_factor.T)[:, :, None, None]
+            return (self._inverse_factor @ gradient[:, :, 0, 0].T).T[:, :, None, None]
         return np.tensordot(gradient, self._inverse_factor, axes=(1, 1)).transpose(0, 3, 1, 2)
 
     def information_density(self, w: ArrayLike) -> NDArray:
@@ -178,14 +179,7 @@ class Experiment(Coordinates):
     @cached_property
     def noise_information(self) -> Array:
         """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
-        if self.model.continuous or np.all(self._silent):
-            return np.zeros((self.size, self.size))
-
-        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            rows = _rows(values, rule.weights)
-            return rows.T @ rows
-
-        return self.samples * integrate(self.noise_gradient, sums, self.singularities, at_once=NODES_AT_ONCE)
+        return noise_informations([self])[0]
 
     @property
     def baseline_information(self) -> Array:
@@ -193,29 +187,32 @@ class Experiment(Coordinates):
         return self.noise_information + self.prior_information
 
     @cached_property
-    def _silent(self) -> NDArray[np.bool_]:
-        """(k,): the parameters of which noise alone says nothing."""
-        probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
-        return ~np.any(probe > 0, axis=(0, 2, 3))
+    def told_by_noise(self) -> bool:
+        """Whether noise alone tells of any parameter."""
+        if self.model.continuous:
+            return False
+        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
 
-    def whitened(self, power: float | Array) -> Experiment:
+    def whitened(self, power: float | Array, *, near: ComplexArray | None = None) -> Experiment:
         """The same experiment in coordinates where M = I by this power, flat over the band.
 
         Args:
             power: of all channels together, which share it evenly, or (r,) of each.
+            near: singularities that the nodes are laid out for, its own among them; like plants share nodes.
 
         Raises:
             SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
         """
-        rule = band_quadrature(self.singularities, self.band)
+        near = self.singularities if near is None else near
+        rule = band_quadrature(near, self.band)
         raw = replace(self, factor=None)
         width = (self.band[1] - self.band[0]) / np.pi
         total = float(np.sum(power))
         shares = np.sqrt(np.asarray(power) * self.inputs / total) if np.ndim(power) else 1.0
         level = total * self.samples / (self.inputs * width)
         rows = [_rows(raw.excitation_gradient(rule.nodes) * shares, rule.weights * level)]
-        if not self.model.continuous and not np.all(self._silent):
-            around = band_quadrature(self.singularities, (0.0, np.pi))
+        if self.told_by_noise:
+            around = band_quadrature(near, (0.0, np.pi))
             rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))
         if self.prior is not None:
             eigenvalues, vectors = np.linalg.eigh(self.prior)
@@ -227,6 +224,12 @@ class Experiment(Coordinates):
 
 def _real_products(F: ComplexArray) -> NDArray[np.float64]:
     """Re sum over channels of F_l F_m^*: (n, k, p, r) -> (n, k, k)."""
+    if F.shape[2:] == (1, 1):
+        columns = F[:, :, 0, 0].T
+        real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
+        products = real[:, None] * real
+        products += imaginary[:, None] * imaginary
+        return products.transpose(2, 0, 1)
     flat = F.reshape(*F.shape[:2], -1)
     real = np.concatenate([flat.real, flat.imag], axis=2)
     return real @ real.swapaxes(1, 2)

@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
+_latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
 _MODERATE = 1e100  # quotients up to this are no overflow
 
 
@@ -19,7 +20,25 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
     With w - j rho it is on a circle of radius e^-rho: the transform of signals weighted with e^(-rho t).
     """
-    return np.exp(-1j * np.asarray(w))
+    at = np.asarray(w)
+    asked, known = _latest[0]
+    # G, H and their gradients are asked for at the same frequencies in turn, and so are those of like plants.
+    if at.size > 1 and at.shape == asked.shape and np.array_equal(at, asked):
+        return known
+    q = np.asarray(np.exp(-1j * at))
+    q.setflags(write=False)
+    _latest[0] = (at.copy(), q)
+    return q
+
+
+def power(q: ComplexArray, exponent: int) -> ComplexArray:
+    """`q` to a whole power; by far the most parameters are first or second coefficients."""
+    return q if exponent == 1 else q**exponent
+
+
+def frequencies_last(*shape: int) -> ComplexArray:
+    """Zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
+    return np.moveaxis(np.zeros((*shape[1:], shape[0]), dtype=complex), -1, 0)
 
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:

@@ -19,7 +19,9 @@ from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
     evaluate,
+    frequencies_last,
     join_roots,
+    power,
     roots_in_z,
     unit_circle,
 )
@@ -189,7 +191,7 @@ class PolynomialModel(Parametrised):
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf" and (output, input) in parameter.places:
                 gradient = above if parameter.letter == "b" else below
-                gradient[:, index] = q**parameter.power
+                gradient[:, index] = power(q, parameter.power)
         numerator = evaluate(self.B[output][input], q)
         return Fraction(numerator, self._denominator(q, output, input), above, below)
 
@@ -199,7 +201,7 @@ class PolynomialModel(Parametrised):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
         q = unit_circle(w)
-        gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:
             A, B, F = (evaluate(p, q) for p in (self._row(self.A, i), self.B[i][j], self.F[i][j]))
@@ -207,7 +209,7 @@ class PolynomialModel(Parametrised):
             factors |= {("a", i, j): -B / (A * AF), ("b", i, j): 1.0 / AF, ("f", i, j): -B / (F * AF)}
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf":
-                shift = q**parameter.power
+                shift = power(q, parameter.power)
                 for i, j in parameter.places:
                     if (parameter.letter, i, j) in factors:
                         gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
@@ -239,7 +241,7 @@ class PolynomialModel(Parametrised):
     ) -> ComplexArray:
         """`prediction_gradient` with the polynomials of the predictor alone; None stands for nothing."""
         q = unit_circle(w)
-        gradient = np.zeros((q.size, len(self.parameters), self.outputs, sources), dtype=complex)
+        gradient = frequencies_last(q.size, len(self.parameters), self.outputs, sources)
         C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
         letters = {parameter.letter for parameter in self.parameters}
         noise: dict[tuple[str, int], ComplexArray] = {}
@@ -263,11 +265,11 @@ class PolynomialModel(Parametrised):
             if parameter.letter in "bf":
                 i, j = parameter.places[0]
                 if (parameter.letter, i, j) in plant:
-                    gradient[:, index, i] = (q**parameter.power)[:, None] * plant[parameter.letter, i, j]
+                    gradient[:, index, i] = power(q, parameter.power)[:, None] * plant[parameter.letter, i, j]
                 continue
             for i in {place[0] for place in parameter.places}:
                 if (parameter.letter, i) in noise:
-                    gradient[:, index, i] = (q**parameter.power)[:, None] * noise[parameter.letter, i]
+                    gradient[:, index, i] = power(q, parameter.power)[:, None] * noise[parameter.letter, i]
         return gradient
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialModel:

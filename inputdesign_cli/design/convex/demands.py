@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, worst
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, inverse_factor, worst
+from inputdesign_cli.information import Experiment, joint_noise
 from inputdesign_cli.plant.polynomial import Array
 
 RequirementFactory = Callable[[Experiment], Requirement]
@@ -40,14 +40,14 @@ class Asked:
 
 @dataclass
 class _Seen:
-    """The ratios (S,) that scenarios had at most, and K (S, k, k) with K M K^T = I there.
+    """The ratios (S,) that scenarios had at most, and with which information (S, k, k) that was.
 
     Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
     what it was. Most of many scenarios need not be looked at again.
     """
 
     ratios: Array
-    roots: NDArray[np.float64] | None = None
+    informations: NDArray[np.float64] | None = None
 
     @classmethod
     def none(cls, number: int) -> _Seen:
@@ -56,23 +56,22 @@ class _Seen:
 
     def most(self, informations: NDArray[np.float64]) -> Array:
         """(S,): the largest ratios that are possible with these M_s (S, k, k)."""
-        if self.roots is None:
+        if self.informations is None:
+            self.informations = np.broadcast_to(np.eye(informations.shape[1]), informations.shape).copy()
             return self.ratios.copy()
-        share = np.linalg.eigvalsh(self.roots @ informations @ self.roots.swapaxes(1, 2))[:, 0]
+        try:
+            roots = inverse_factor(self.informations)
+        except np.linalg.LinAlgError:  # nothing follows from a matrix that is singular
+            return np.full(self.ratios.size, np.inf)
+        share = np.linalg.eigvalsh(roots @ informations @ roots.swapaxes(1, 2))[:, 0]
         with np.errstate(divide="ignore"):
             return np.where(share > 0.0, self.ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
 
     def note(self, number: int, information: Array, ratio: float) -> None:
-        """What a scenario was found to have, at most."""
-        if self.roots is None:
-            self.roots = np.broadcast_to(
-                np.eye(len(information)), (self.ratios.size, *information.shape)
-            ).copy()
-        try:
-            self.roots[number] = np.linalg.inv(np.linalg.cholesky(information))
-            self.ratios[number] = ratio
-        except np.linalg.LinAlgError:
-            self.ratios[number] = np.inf
+        """What a scenario was found to have, at most, once `most` has been asked."""
+        assert self.informations is not None
+        self.informations[number] = information
+        self.ratios[number] = ratio
 
 
 @dataclass(frozen=True)
@@ -90,6 +89,11 @@ class Demands:
             for side, listed in ((False, scenario.requirements), (True, scenario.side))
             for requirement in listed
         )
+
+    @cached_property
+    def noise_informations(self) -> NDArray[np.float64]:
+        """(S, k, k): what the noise alone tells of each scenario, whatever is asked."""
+        return joint_noise([scenario.experiment for scenario in self.scenarios])
 
     def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
         """Whether just this is asked of the same nominal plant, and the rest of the same other plants."""

@@ -29,7 +29,7 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind, joint_information
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import Basis, Functional, weighted_mean
@@ -145,17 +145,11 @@ class Problem:
     @cached_property
     def information_maps(self) -> NDArray[np.float64]:
         """(size, S, k, k): M_si, the information of each basis function at each scenario."""
-
-        def integrals(basis: Basis) -> NDArray[np.float64]:
-            found = np.empty((basis.size, len(self.scenarios), *2 * (self.experiment.size,)))
-            for number, scenario in enumerate(self.scenarios):
-                at = scenario.experiment
-                found[:, number] = basis.integrals(
-                    at.information_density, at.singularities, at.information_factor
-                )
-            return found
-
-        return self._along(lambda problem: problem.information_maps, integrals)
+        experiments = [scenario.experiment for scenario in self.scenarios]
+        return self._along(
+            lambda problem: problem.information_maps,
+            lambda basis: joint_information(experiments, basis.integrals),
+        )
 
     @property
     def information_map(self) -> NDArray[np.float64]:
@@ -165,12 +159,16 @@ class Problem:
     @cached_property
     def baselines(self) -> NDArray[np.float64]:
         """(S, k, k): M0_s, what is known of each scenario without excitation."""
-        return np.array([scenario.experiment.baseline_information for scenario in self.scenarios])
+        return self.demands.noise_informations + self._priors
+
+    @property
+    def _priors(self) -> NDArray[np.float64]:
+        return np.array([scenario.experiment.prior_information for scenario in self.scenarios])
 
     @property
     def baseline_information(self) -> Array:
         """(k, k): M0 of the nominal plant."""
-        return self.experiment.baseline_information
+        return self.baselines[0]
 
     def informations(self, x: Array) -> NDArray[np.float64]:
         """(S, k, k): M_s(x)."""
@@ -190,7 +188,7 @@ class Problem:
         if self.goal == "cost":
             return self.baselines
         if self.goal == "samples":
-            return np.array([scenario.experiment.prior_information for scenario in self.scenarios])
+            return self._priors
         return np.zeros_like(self.baselines)
 
     @cached_property
@@ -199,7 +197,7 @@ class Problem:
         if self.goal == "cost":
             return np.zeros_like(self.baselines)
         if self.goal == "samples":
-            return np.array([scenario.experiment.noise_information for scenario in self.scenarios])
+            return self.demands.noise_informations
         return self.baselines
 
     @cached_property

@@ -1,0 +1,72 @@
+"""The information that several plants give under the same spectra: their integrals share all they can.
+
+Much of the time of an integral goes into its nodes and into what the spectra are there. The poles of plants that
+are alike hardly change either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.information.experiment import Experiment
+from inputdesign_cli.information.noise import noise_informations
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+# Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
+_AT_A_NODE = 256
+
+Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array], NDArray] | None], NDArray]
+"""The integrals (size, ...) of a density with these singularities and this factor, see `Basis.integrals`."""
+
+
+def jointly_whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
+    """Each in coordinates where M = I by this power, see `Experiment.whitened`."""
+    return [
+        experiment.whitened(power, near=_singularities(group))
+        for group in _groups(experiments)
+        for experiment in group
+    ]
+
+
+def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
+    """(S, k, k): `noise_information` of each."""
+    return np.concatenate(
+        [
+            noise_informations(group) if len(group) > 1 else group[0].noise_information[None]
+            for group in _groups(experiments)
+        ]
+    )
+
+
+def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
+    """(size, S, k, k): what each of the basis functions tells of each."""
+    return np.concatenate([_together(group, integrals) for group in _groups(experiments)], axis=1)
+
+
+def _groups(experiments: Sequence[Experiment]) -> list[Sequence[Experiment]]:
+    """Experiments whose integrals are one: those of several channels are large enough each by itself."""
+    first = experiments[0]
+    channels = first.model.outputs * first.inputs
+    number = max(_AT_A_NODE // first.size**2, 1) if channels == 1 else 1
+    return [experiments[start : start + number] for start in range(0, len(experiments), number)]
+
+
+def _singularities(experiments: Sequence[Experiment]) -> ComplexArray:
+    return np.concatenate([experiment.singularities for experiment in experiments])
+
+
+def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
+    first, k = experiments[0], experiments[0].size
+    if len(experiments) == 1:
+        return integrals(first.information_density, first.singularities, first.information_factor)[:, None]
+
+    def density(w: Array) -> NDArray[np.float64]:
+        products = np.empty((len(experiments), k, k, w.size))
+        for own, experiment in zip(products, experiments, strict=True):
+            own[:] = np.moveaxis(experiment.information_density(w), 0, -1)
+        return np.moveaxis(products, -1, 0)
+
+    return integrals(density, _singularities(experiments), None)
