@@ -237,7 +237,7 @@ def _real_products(F: ComplexArray) -> NDArray[np.float64]:
 
 def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
     """sqrt(weight) F as real rows: (n, k, p, r) -> (2 n p r, k)."""
-    flat = np.moveaxis(F, 1, -1) * np.sqrt(weights)[:, None, None, None]
+    flat = F.transpose(0, 2, 3, 1) * np.sqrt(weights)[:, None, None, None]
     flat = flat.reshape(-1, F.shape[1])
     return np.concatenate([flat.real, flat.imag])
 

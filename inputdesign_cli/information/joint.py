@@ -1,7 +1,7 @@
 """The information that several plants give under the same spectra: their integrals share all they can.
 
-Much of the time of an integral goes into its nodes and into what the spectra are there. The poles of plants that
-are alike hardly change either.
+Much of the time of an integral goes into its nodes and into what the spectra are there. Both are nearly the same
+for plants that are alike.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
     def density(w: Array) -> NDArray[np.float64]:
         products = np.empty((len(experiments), k, k, w.size))
         for own, experiment in zip(products, experiments, strict=True):
-            own[:] = np.moveaxis(experiment.information_density(w), 0, -1)
+            own[:] = experiment.information_density(w).transpose(1, 2, 0)
         return np.moveaxis(products, -1, 0)
 
     return integrals(density, _singularities(experiments), None)

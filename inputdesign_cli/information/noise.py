@@ -1,4 +1,4 @@
-"""What the noise alone tells of plants, that of a loop or that of a plant with past outputs in its prediction."""
+"""What the noise alone tells: around a loop, or of a plant with past outputs in its prediction."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def power(q: ComplexArray, exponent: int) -> ComplexArray:
 
 def frequencies_last(*shape: int) -> ComplexArray:
     """Zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
-    return np.moveaxis(np.zeros((*shape[1:], shape[0]), dtype=complex), -1, 0)
+    return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))
 
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:

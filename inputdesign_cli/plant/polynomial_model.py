@@ -218,19 +218,24 @@ class PolynomialModel(Parametrised):
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
         G = self.plant_at(w) if self._outputs_count else None
-        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
+        u = np.eye(self.inputs, dtype=complex)[None]
         return self._gradient(w, self.inputs, G, u, None)
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""
         H = self.noise_at(w) if self._outputs_count else None
-        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
+        e = np.eye(self.outputs, dtype=complex)[None]
         return self._gradient(w, self.outputs, H, None, e)
 
     @property
     def _outputs_count(self) -> bool:
         """Whether the gradient of the prediction depends on past outputs: by coefficients of A alone."""
-        return any(parameter.letter == "a" for parameter in self.parameters)
+        return "a" in self._letters
+
+    @cached_property
+    def _letters(self) -> frozenset[str]:
+        """The polynomials that have free coefficients."""
+        return frozenset(parameter.letter for parameter in self.parameters)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
         """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
@@ -239,18 +244,20 @@ class PolynomialModel(Parametrised):
     def _gradient(
         self, w: ArrayLike, sources: int, y: NDArray | None, u: NDArray | None, e: NDArray | None
     ) -> ComplexArray:
-        """`prediction_gradient` with the polynomials of the predictor alone; None stands for nothing."""
+        """`prediction_gradient` with the polynomials of the predictor alone; None stands for nothing.
+
+        Sources that are the same at every frequency may be (1, .., m).
+        """
         q = unit_circle(w)
         gradient = frequencies_last(q.size, len(self.parameters), self.outputs, sources)
         C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
-        letters = {parameter.letter for parameter in self.parameters}
         noise: dict[tuple[str, int], ComplexArray] = {}
         for i in range(self.outputs):
-            if y is not None and "a" in letters:
+            if y is not None and "a" in self._letters:
                 noise["a", i] = (-D[i] / C[i])[:, None] * y[:, i]
-            if e is not None and "c" in letters:
+            if e is not None and "c" in self._letters:
                 noise["c", i] = e[:, i] / C[i][:, None]
-            if e is not None and "d" in letters:
+            if e is not None and "d" in self._letters:
                 noise["d", i] = -e[:, i] / D[i][:, None]
         plant: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:
@@ -259,7 +266,7 @@ class PolynomialModel(Parametrised):
             F = evaluate(self.F[i][j], q)
             filtered = D[i] / (C[i] * F)
             plant["b", i, j] = filtered[:, None] * u[:, j]
-            if "f" in letters:
+            if "f" in self._letters:
                 plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "bf":

@@ -133,9 +133,7 @@ class Demands:
         if len(self.scenarios) == 1:
             return list(self._violated(0, informations[0], above, side))
         found, bad = list[tuple[int, Violation]](), 0
-        for number in self._by_most(informations, side):
-            if not self._seen[int(side)].ratios[number] > above:
-                break
+        for number in self._by_most(informations, side, above):
             own = list(self._violated(number, informations[number], above, side))
             found += own
             bad += bool(own)
@@ -146,14 +144,14 @@ class Demands:
     def largest(self, informations: NDArray[np.float64], *, default: float) -> float:
         """The largest ratio of the requirements, side ones left out; the default without any."""
         found: list[float] = []
-        for number in self._by_most(informations, False) if len(self.scenarios) > 1 else [0]:
+        for number in self._by_most(informations, False, -np.inf) if len(self.scenarios) > 1 else [0]:
             if found and self._seen[0].ratios[number] <= max(found):
                 break  # the next ones are no larger
             found += [v.ratio for _, v in self._violated(number, informations[number], -np.inf, False)]
         return max(found, default=default)
 
-    def _by_most(self, informations: NDArray[np.float64], side: bool) -> Iterator[int]:
-        """The scenarios, those that may have the largest ratios first; what they may have at most is noted.
+    def _by_most(self, informations: NDArray[np.float64], side: bool, above: float) -> Iterator[int]:
+        """The scenarios that may have ratios above `above`, the largest first; what is possible is noted.
 
         A scenario is looked at when no other may have more, so that most of them never are.
         """
@@ -161,7 +159,9 @@ class Demands:
         waiting = [(-most, number, False) for number, most in enumerate(seen.most(informations).tolist())]
         heapq.heapify(waiting)
         while waiting:
-            _, number, looked_at = heapq.heappop(waiting)
+            most, number, looked_at = heapq.heappop(waiting)
+            if not -most > above:
+                return
             if looked_at:
                 yield number
                 continue
