@@ -43,35 +43,42 @@ class _Seen:
     """The ratios (S,) that scenarios had at most, and with which information (S, k, k) that was.
 
     Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
-    what it was. Most of many scenarios need not be looked at again.
+    what it was. Most of many scenarios need not be looked at again. `looked` are bounds by a look at each
+    scenario, `searched` nearer ones where its maxima have been searched too.
     """
 
-    ratios: Array
+    looked: Array
+    searched: Array
     informations: NDArray[np.float64] | None = None
 
     @classmethod
     def none(cls, number: int) -> _Seen:
         """Nothing is known yet."""
-        return cls(np.full(number, np.inf))
+        return cls(np.full(number, np.inf), np.full(number, np.inf))
 
-    def most(self, informations: NDArray[np.float64]) -> Array:
-        """(S,): the largest ratios that are possible with these M_s (S, k, k)."""
+    def most(self, informations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(2, S): the largest ratios that are possible with these M_s (S, k, k), looked and searched."""
+        ratios = np.stack([self.looked, self.searched])
         if self.informations is None:
             self.informations = np.broadcast_to(np.eye(informations.shape[1]), informations.shape).copy()
-            return self.ratios.copy()
+            return ratios
         try:
             roots = inverse_factor(self.informations)
         except np.linalg.LinAlgError:  # nothing follows from a matrix that is singular
-            return np.full(self.ratios.size, np.inf)
+            return np.full_like(ratios, np.inf)
         share = np.linalg.eigvalsh(roots @ informations @ roots.swapaxes(1, 2))[:, 0]
         with np.errstate(divide="ignore"):
-            return np.where(share > 0.0, self.ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
+            return np.where(share > 0.0, ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
 
-    def note(self, number: int, information: Array, ratio: float) -> None:
+    def look(self, number: int, information: Array, ratio: float) -> None:
         """What a scenario was found to have, at most, once `most` has been asked."""
         assert self.informations is not None
         self.informations[number] = information
-        self.ratios[number] = ratio
+        self.looked[number] = self.searched[number] = ratio
+
+    def search(self, number: int, ratio: float) -> None:
+        """What the search for the maxima of the same scenario has found at most."""
+        self.searched[number] = min(self.searched[number], ratio)
 
 
 @dataclass(frozen=True)
@@ -135,6 +142,7 @@ class Demands:
         found, bad = list[tuple[int, Violation]](), 0
         for number in self._by_most(informations, side, above):
             own = list(self._violated(number, informations[number], above, side))
+            self._seen[int(side)].search(number, max([above, *(v.ratio for _, v in own)]))
             found += own
             bad += bool(own)
             if few is not None and bad >= few:
@@ -145,7 +153,7 @@ class Demands:
         """The largest ratio of the requirements, side ones left out; the default without any."""
         found: list[float] = []
         for number in self._by_most(informations, False, -np.inf) if len(self.scenarios) > 1 else [0]:
-            if found and self._seen[0].ratios[number] <= max(found):
+            if found and self._seen[0].looked[number] <= max(found):
                 break  # the next ones are no larger
             found += [v.ratio for _, v in self._violated(number, informations[number], -np.inf, False)]
         return max(found, default=default)
@@ -156,7 +164,8 @@ class Demands:
         A scenario is looked at when no other may have more, so that most of them never are.
         """
         seen = self._seen[int(side)]
-        waiting = [(-most, number, False) for number, most in enumerate(seen.most(informations).tolist())]
+        looked, searched = seen.most(informations)
+        waiting = [(-float(looked[n]), n, False) for n in np.flatnonzero(searched > above).tolist()]
         heapq.heapify(waiting)
         while waiting:
             most, number, looked_at = heapq.heappop(waiting)
@@ -167,8 +176,8 @@ class Demands:
                 continue
             asked = [self.asked[index] for index in self._asked_of[number]]
             own = [a.requirement.most(informations[number]) for a in asked if a.side == side]
-            seen.note(number, informations[number], max(own, default=0.0))
-            heapq.heappush(waiting, (-float(seen.ratios[number]), number, True))
+            seen.look(number, informations[number], max(own, default=0.0))
+            heapq.heappush(waiting, (-float(seen.looked[number]), number, True))
 
     def _violated(
         self, number: int, information: Array, above: float, side: bool
