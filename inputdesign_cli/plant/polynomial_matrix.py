@@ -23,12 +23,13 @@ def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
 
 
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
-    """(K, rows, columns): the values at `q` (K,), which stands for q^-1."""
-    value = np.full((q.size, *matrix.shape[:-1]), matrix[..., -1], dtype=complex)
+    """(K, rows, columns): the values at `q` (K,), which stands for q^-1; side by side in memory for each entry."""
+    value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
+    value[:] = matrix[..., -1:]
     for lag in range(matrix.shape[-1] - 2, -1, -1):
-        value *= q[:, None, None]
-        value += matrix[..., lag]
-    return value
+        value *= q
+        value += matrix[..., lag, None]
+    return value.transpose(2, 0, 1)
 
 
 def multiply(left: Array, right: Array) -> Array:
