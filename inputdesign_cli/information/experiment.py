@@ -8,7 +8,6 @@ Criteria do not depend on the measure, as long as powers and information share i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -128,7 +127,7 @@ class Experiment(Coordinates):
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
         """`value_density` where the products are at hand."""
-        return self._squeezed(self.samples * products.at(weight))
+        return self.squeezed(self.samples * products.at(weight))
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
         """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x, x or moves, of all channels or of one."""
@@ -137,22 +136,10 @@ class Experiment(Coordinates):
             density = self.power_density("input", w, channel)
             return density * moving.reshape(-1, *(1,) * (density.ndim - 1))
         if self.depends_on_plant(kind):
-            rows = _channel(self.response(kind, w), channel)
-            return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
+            rows = of_channel(self.response(kind, w), channel)
+            return self.squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
-        return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
-
-    def cost_density(self, weights: Sequence[tuple[PowerKind, int | None, float]], w: ArrayLike) -> NDArray:
-        """(n,) or (n, r, r): that of a weighted sum of powers, each of a kind and of a channel or all."""
-        caused = None if self.loop is None else self.loop.excited(w)
-        total: NDArray | float = 0.0
-        for kind, channel, weight in weights:
-            if caused is None or not self.depends_on_plant(kind):
-                total = total + weight * self.power_density(kind, w, channel)
-                continue
-            rows = _channel(caused[0 if kind == "output" else 1], channel)
-            total = total + weight * self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
-        return np.asarray(total)
+        return self.squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
 
     def depends_on_plant(self, kind: PowerKind) -> bool:
         """Whether a power is that of a signal that the plant takes part in, not of x itself."""
@@ -173,7 +160,8 @@ class Experiment(Coordinates):
         """(n,): 1 - q^-1, of samples that are held."""
         return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
-    def _squeezed(self, density: NDArray) -> NDArray:
+    def squeezed(self, density: NDArray) -> NDArray:
+        """A density (n, r, r) as it is told: (n,) for one input."""
         return density[:, 0, 0].real if self.inputs == 1 else density
 
     @cached_property
@@ -242,9 +230,10 @@ def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
     return np.concatenate([flat.real, flat.imag])
 
 
-def _channel(response: ComplexArray, channel: int | None) -> ComplexArray:
-    """(n, 1, r): what x causes at one channel, without what rounding leaves of nothing; all for None."""
+def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
+    """(.., n, 1, r): what x causes at one channel, without what rounding leaves of nothing; all for None."""
     if channel is None:
         return response
-    row = response[:, channel : channel + 1]
-    return np.where(np.abs(row) > _NOTHING * np.abs(response).max(initial=0.0), row, 0.0)
+    row = response[..., channel : channel + 1, :]
+    largest = np.abs(response).max(axis=(-3, -2, -1), keepdims=True, initial=0.0)
+    return np.where(np.abs(row) > _NOTHING * largest, row, 0.0)

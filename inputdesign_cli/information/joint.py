@@ -1,7 +1,7 @@
-"""The information that several plants give under the same spectra: their integrals share all they can.
+"""What several plants tell, and cost, under the same spectra: they share nodes and what is the same there.
 
-Much of the time of an integral goes into its nodes and into what the spectra are there. Both are nearly the same
-for plants that are alike.
+Much of the time of an integral goes into its nodes and into what the spectra are there. Both are nearly the
+same for plants that are alike.
 """
 
 from __future__ import annotations
@@ -11,12 +11,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.information.experiment import Experiment
+from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
 from inputdesign_cli.information.noise import noise_informations
+from inputdesign_cli.plant import excited
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
 _AT_A_NODE = 256
+# Frequencies of all plants that are looked at in one go, for the same reason.
+_AT_ONCE = 2**13
 
 Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array], NDArray] | None], NDArray]
 """The integrals (size, ...) of a density with these singularities and this factor, see `Basis.integrals`."""
@@ -44,6 +47,38 @@ def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
 def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
     """(size, S, k, k): what each of the basis functions tells of each."""
     return np.concatenate([_together(group, integrals) for group in _groups(experiments)], axis=1)
+
+
+def mean_cost(
+    experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
+) -> NDArray:
+    """(n,) or (n, r, r): the mean over plants of one structure of the density of a weighted sum of powers.
+
+    Args:
+        weights: each of a kind and of a channel or all.
+    """
+    number = max(_AT_ONCE // max(w.size, 1), 1)
+    parts = [experiments[start : start + number] for start in range(0, len(experiments), number)]
+    return np.asarray(sum(_cost(part, weights, w) for part in parts) / len(experiments))
+
+
+def _cost(
+    experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
+) -> NDArray:
+    """The sum over the plants."""
+    first, total = experiments[0], np.zeros(())
+    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
+    y, u = excited(loops, w) if loops else (None, None)
+    for kind, channel, weight in weights:
+        caused = y if kind == "output" else u
+        if not first.depends_on_plant(kind):
+            total = total + weight * len(experiments) * first.power_density(kind, w, channel)
+        elif caused is None:
+            total = total + weight * sum(one.power_density(kind, w, channel) for one in experiments)
+        else:
+            rows = of_channel(caused, channel)
+            total = total + weight * first.squeezed(np.einsum("snpa,snpb->nab", rows.conj(), rows))
+    return total
 
 
 def _groups(experiments: Sequence[Experiment]) -> list[Sequence[Experiment]]:

@@ -23,13 +23,17 @@ def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
 
 
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
-    """(K, rows, columns): the values at `q` (K,), which stands for q^-1; side by side in memory for each entry."""
+    """(.., K, rows, columns): the values of (.., rows, columns, l) at `q` (K,), which stands for q^-1.
+
+    In memory those of an entry stand side by side.
+    """
     value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
     value[:] = matrix[..., -1:]
     for lag in range(matrix.shape[-1] - 2, -1, -1):
         value *= q
         value += matrix[..., lag, None]
-    return value.transpose(2, 0, 1)
+    *leading, rows, columns, last = range(value.ndim)
+    return value.transpose(*leading, last, rows, columns)
 
 
 def multiply(left: Array, right: Array) -> Array:

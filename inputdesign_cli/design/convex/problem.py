@@ -29,10 +29,10 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import Experiment, PowerKind, joint_information
+from inputdesign_cli.information import Experiment, PowerKind, joint_information, mean_cost
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, Functional, weighted_mean
+from inputdesign_cli.spectrum import Basis, Functional
 
 Goal = Literal["cost", "factor", "samples"]
 
@@ -117,8 +117,8 @@ class Problem:
         _ = grown.demands, grown.gradients, grown.information_maps
         for key in self._powers:
             grown.power(*key)
-        for number in self._costs:
-            grown._cost_of(number)
+        for plants in self._costs:
+            grown._cost_of(plants)
         grown._before.clear()
         return grown
 
@@ -204,7 +204,7 @@ class Problem:
     def price(self) -> Functional:
         """What x is measured by: the mean of the costs, or where none is sought powers over limits."""
         if self.goal == "cost":
-            return self.costs[0] if len(self.costs) == 1 else self._mean(self.costs)
+            return self.costs[0] if len(self.costs) == 1 else self._cost_of(self.paying)
         parts = [self._limited(limit) * (1.0 / limit.bound) for limit in self.limits if limit.upper]
         return sum(parts[1:], start=parts[0])
 
@@ -215,18 +215,15 @@ class Problem:
         if self.paid == "nominal" or not self._others_pay:
             parts = [self.power(kind, channel) * weight for kind, channel, weight in weights]
             return (sum(parts[1:], start=parts[0]),)
-        each = tuple(self._cost_of(number) for number in self.paying)
-        return each if self.paid == "worst" else (self._mean(each),)
+        if self.paid == "worst":
+            return tuple(self._cost_of(range(number, number + 1)) for number in self.paying)
+        return (self._cost_of(self.paying),)
 
     @property
     def _others_pay(self) -> bool:
         """Whether there are other plants at which the cost may be another."""
         kinds = (kind for kind, _, _ in weights_of(self.cost))
         return bool(self.others) and any(self.experiment.depends_on_plant(kind) for kind in kinds)
-
-    @staticmethod
-    def _mean(costs: tuple[Functional, ...]) -> Functional:
-        return weighted_mean(costs, np.full(len(costs), 1.0 / len(costs)))
 
     @property
     def paying(self) -> range:
@@ -237,25 +234,25 @@ class Problem:
         """What a spectrum costs (goal "cost")."""
         return max(cost.at(x) for cost in self.costs)
 
-    def _cost_of(self, scenario: int) -> Functional:
-        """The cost at one plant."""
-        known = self._costs.get(scenario)
+    def _cost_of(self, scenarios: range) -> Functional:
+        """The mean of the costs at these plants."""
+        known = self._costs.get(scenarios)
         if known is not None:
             return known
-        plant, weights = self.scenarios[scenario].experiment, weights_of(self.cost)
+        plants, weights = [self.scenarios[n].experiment for n in scenarios], weights_of(self.cost)
 
         def density(w: Array) -> NDArray:
-            return plant.cost_density(weights, w)
+            return mean_cost(plants, weights, w)
 
+        near = np.concatenate([plant.singularities for plant in plants])
         vector = self._along(
-            lambda problem: problem._cost_of(scenario).vector,
-            lambda basis: basis.integrals(density, plant.singularities),
+            lambda problem: problem._cost_of(scenarios).vector, lambda basis: basis.integrals(density, near)
         )
-        self._costs[scenario] = Functional(vector, density)
-        return self._costs[scenario]
+        self._costs[scenarios] = Functional(vector, density)
+        return self._costs[scenarios]
 
     @cached_property
-    def _costs(self) -> dict[int, Functional]:
+    def _costs(self) -> dict[range, Functional]:
         return {}
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:
