@@ -9,11 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, integrate
+from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+_NUMBERS_AT_ONCE = 2**16
 
 
 class Disturbed(Protocol):
     """An experiment, as far as its noise goes; see `Experiment`."""
+
+    @property
+    def model(self) -> Model:
+        """What the noise disturbs."""
 
     @property
     def samples(self) -> int:
@@ -41,7 +48,7 @@ def noise_informations(experiments: Sequence[Disturbed]) -> NDArray[np.float64]:
     The S plants are of one structure, and their integrals share nodes.
     """
     first = experiments[0]
-    if not any(experiment.told_by_noise for experiment in experiments):
+    if not first.told_by_noise:
         return np.zeros((len(experiments), first.size, first.size))
 
     def gradients(w: Array) -> NDArray:
@@ -54,5 +61,6 @@ def noise_informations(experiments: Sequence[Disturbed]) -> NDArray[np.float64]:
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
     near = np.concatenate([experiment.singularities for experiment in experiments])
-    told = integrate(gradients, sums, near, at_once=NODES_AT_ONCE)
+    numbers = len(experiments) * first.size * first.model.outputs**2
+    told = integrate(gradients, sums, near, at_once=max(_NUMBERS_AT_ONCE // numbers, NODES_AT_ONCE))
     return told * np.array([experiment.samples for experiment in experiments])[:, None, None]

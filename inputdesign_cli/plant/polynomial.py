@@ -12,6 +12,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 _latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
+_WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared
 _MODERATE = 1e100  # quotients up to this are no overflow
 
 
@@ -23,9 +24,11 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
     at = np.asarray(w)
     asked, known = _latest[0]
     # G, H and their gradients are asked for at the same frequencies in turn, and so are those of like plants.
-    if at.size > 1 and at.shape == asked.shape and np.array_equal(at, asked):
+    if at.shape == asked.shape and np.array_equal(at, asked):
         return known
     q = np.asarray(np.exp(-1j * at))
+    if at.size < _WORTH_KEEPING:
+        return q
     q.setflags(write=False)
     _latest[0] = (at.copy(), q)
     return q
