@@ -89,6 +89,8 @@ class OverFrequency(Requirement):
         """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
         grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
         # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
+        if self.poles_on_the_circle.size == 0:
+            return grid
         clear = np.all(np.abs(grid[:, None] - self.poles_on_the_circle) > _HIDDEN * self.band[1], axis=1)
         return grid[clear]
 

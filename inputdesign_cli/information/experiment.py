@@ -95,6 +95,15 @@ class Experiment(Coordinates):
         """dG/dtheta (n, k, p, r), in these coordinates."""
         return self._whiten(self.model.plant_gradient(w))
 
+    @property
+    def whitener(self) -> Array:
+        """(k, k): what takes the gradient of one output to these coordinates, with noise of variance 1/N.
+
+        Its products are then the information of all N samples.
+        """
+        unit = np.eye(self.size) if self.factor is None else self._inverse_factor
+        return np.sqrt(self.samples) * self._noise_whitener[0, 0] * unit
+
     def _whiten(self, gradient: ComplexArray) -> ComplexArray:
         if self.factor is None:
             return gradient

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
 from inputdesign_cli.information.noise import noise_informations
-from inputdesign_cli.plant import excited
+from inputdesign_cli.plant import excited, input_gradients
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
@@ -94,14 +94,26 @@ def _singularities(experiments: Sequence[Experiment]) -> ComplexArray:
 
 
 def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
-    first, k = experiments[0], experiments[0].size
+    first = experiments[0]
     if len(experiments) == 1:
         return integrals(first.information_density, first.singularities, first.information_factor)[:, None]
 
+    whiteners = np.array([experiment.whitener for experiment in experiments])
+
     def density(w: Array) -> NDArray[np.float64]:
-        products = np.empty((len(experiments), k, k, w.size))
-        for own, experiment in zip(products, experiments, strict=True):
-            own[:] = experiment.information_density(w).transpose(1, 2, 0)
-        return np.moveaxis(products, -1, 0)
+        columns = whiteners @ _excitation_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
+        real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
+        products = real[:, :, None] * real[:, None]
+        products += imaginary[:, :, None] * imaginary[:, None]
+        return products.transpose(3, 0, 1, 2)
 
     return integrals(density, _singularities(experiments), None)
+
+
+def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
+    """(S, n, k, p, r): what x contributes to the gradients of the predictions, in raw parameters."""
+    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
+    if loops:
+        return np.stack([loop.excitation_gradient(w) for loop in loops])
+    models = [experiment.model for experiment in experiments]
+    return input_gradients(models[0], models, w)

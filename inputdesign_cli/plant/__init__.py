@@ -16,6 +16,7 @@ from inputdesign_cli.plant.model import (
     Listed as Listed,
     Model as Model,
     Parameter as Parameter,
+    input_gradients as input_gradients,
 )
 from inputdesign_cli.plant.parametrisation import Parametrisation as Parametrisation
 from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop

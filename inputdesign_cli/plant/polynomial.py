@@ -45,8 +45,22 @@ def frequencies_last(*shape: int) -> ComplexArray:
 
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
-    """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    c = np.asarray(coefficients, dtype=float).tolist()
+    """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
+
+    Several polynomials (S, l) have values (S, ..).
+    """
+    stated = np.asarray(coefficients, dtype=float)
+    if stated.ndim == 2 and len(stated) > 1:
+        columns = stated.T.reshape(stated.shape[1], len(stated), *(1 for _ in np.shape(q)))
+        several = np.zeros((len(stated), *np.shape(q)), dtype=complex)
+        several += columns[-1]
+        for column in columns[-2::-1]:
+            several *= q
+            several += column
+        return several
+    if stated.ndim == 2:
+        return evaluate(stated[0], q)[None]
+    c = stated.tolist()
     if len(c) == 1:
         return np.full(np.shape(q), c[0], dtype=complex)
     value: ComplexArray = c[-1] * q
