@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
-from inputdesign_cli.information.noise import noise_informations
+from inputdesign_cli.information.noise import told_by_noise
 from inputdesign_cli.information.products import WeightedProducts
-from inputdesign_cli.information.quadrature import band_quadrature
+from inputdesign_cli.information.quadrature import Quadrature, band_quadrature
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -68,7 +68,7 @@ class Experiment(Coordinates):
         return self.model if self.loop is None else self.loop
 
     @cached_property
-    def _noise_whitener(self) -> Array:
+    def noise_whitener(self) -> Array:
         """K (p, p) with K^T K the inverse of the noise covariance."""
         return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
 
@@ -79,13 +79,13 @@ class Experiment(Coordinates):
         ([bombois-least-costly], below (4) and (15), for one channel).
         """
         gradient = self.model.input_gradient(w) if self.loop is None else self.loop.excitation_gradient(w)
-        if len(self._noise_whitener) == 1:
-            return self._whiten(self._noise_whitener[0, 0] * gradient)
-        return self._whiten(np.einsum("pq,nkqr->nkpr", self._noise_whitener, gradient))
+        if len(self.noise_whitener) == 1:
+            return self._whiten(self.noise_whitener[0, 0] * gradient)
+        return self._whiten(np.einsum("pq,nkqr->nkpr", self.noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
-        K = self._noise_whitener
+        K = self.noise_whitener
         gradient = self._source.noise_gradient(w)
         if len(K) == 1:
             return self._whiten(gradient)
@@ -94,15 +94,6 @@ class Experiment(Coordinates):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r), in these coordinates."""
         return self._whiten(self.model.plant_gradient(w))
-
-    @property
-    def whitener(self) -> Array:
-        """(k, k): what takes the gradient of one output to these coordinates, with noise of variance 1/N.
-
-        Its products are then the information of all N samples.
-        """
-        unit = np.eye(self.size) if self.factor is None else self._inverse_factor
-        return np.sqrt(self.samples) * self._noise_whitener[0, 0] * unit
 
     def _whiten(self, gradient: ComplexArray) -> ComplexArray:
         if self.factor is None:
@@ -176,7 +167,11 @@ class Experiment(Coordinates):
     @cached_property
     def noise_information(self) -> Array:
         """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
-        return noise_informations([self])[0]
+        if not self.told_by_noise:
+            return np.zeros((self.size, self.size))
+        numbers = self.size * self.model.outputs**2
+        told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities, numbers)
+        return self.samples * told[0]
 
     @property
     def baseline_information(self) -> Array:
@@ -190,27 +185,44 @@ class Experiment(Coordinates):
             return False
         return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
 
-    def whitened(self, power: float | Array, *, near: ComplexArray | None = None) -> Experiment:
+    def whitened(self, power: float | Array) -> Experiment:
         """The same experiment in coordinates where M = I by this power, flat over the band.
 
         Args:
             power: of all channels together, which share it evenly, or (r,) of each.
-            near: singularities that the nodes are laid out for, its own among them; like plants share nodes.
 
         Raises:
             SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
         """
-        near = self.singularities if near is None else near
-        rule = band_quadrature(near, self.band)
-        raw = replace(self, factor=None)
+        raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
+        noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
+        return self.whitened_by(power, (excited, raw.excitation_gradient(excited.nodes)), (around, noise))
+
+    def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
+        """Nodes for excitation that is flat over the band, and for the noise, with these singularities."""
+        return band_quadrature(near, self.band), band_quadrature(near, (0.0, np.pi))
+
+    def whitened_by(
+        self,
+        power: float | Array,
+        excited: tuple[Quadrature, ComplexArray],
+        noise: tuple[Quadrature, ComplexArray | None],
+    ) -> Experiment:
+        """`whitened`, where the gradients of raw parameters at the nodes of the `flat_rules` are at hand.
+
+        Args:
+            excited: with `excitation_gradient`.
+            noise: with `noise_gradient`, None where the noise tells nothing.
+        """
         width = (self.band[1] - self.band[0]) / np.pi
         total = float(np.sum(power))
         shares = np.sqrt(np.asarray(power) * self.inputs / total) if np.ndim(power) else 1.0
         level = total * self.samples / (self.inputs * width)
-        rows = [_rows(raw.excitation_gradient(rule.nodes) * shares, rule.weights * level)]
-        if self.told_by_noise:
-            around = band_quadrature(near, (0.0, np.pi))
-            rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))
+        rule, gradient = excited
+        rows = [_rows(gradient * shares, rule.weights * level)]
+        around, disturbed = noise
+        if disturbed is not None:
+            rows.append(_rows(disturbed, around.weights * self.samples))
         if self.prior is not None:
             eigenvalues, vectors = np.linalg.eigh(self.prior)
             rows.append(np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
-from inputdesign_cli.information.noise import noise_informations
-from inputdesign_cli.plant import excited, input_gradients
+from inputdesign_cli.information.noise import told_by_noise
+from inputdesign_cli.plant import excited, input_gradients, noise_gradients
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
@@ -27,21 +27,41 @@ Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array]
 
 def jointly_whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
     """Each in coordinates where M = I by this power, see `Experiment.whitened`."""
+    return [whitened for group in _groups(experiments) for whitened in _whitened(group, power)]
+
+
+def _whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
+    first = experiments[0]
+    if len(experiments) == 1:
+        return [first.whitened(power)]
+    excited, around = first.flat_rules(_singularities(experiments))
+    F = _excitation_gradients(experiments, excited.nodes)
+    V = _noise_gradients(experiments, around.nodes) if first.told_by_noise else None
     return [
-        experiment.whitened(power, near=_singularities(group))
-        for group in _groups(experiments)
-        for experiment in group
+        experiment.whitened_by(
+            power, (excited, experiment.noise_whitener[0, 0] * F[s]), (around, None if V is None else V[s])
+        )
+        for s, experiment in enumerate(experiments)
     ]
 
 
 def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
     """(S, k, k): `noise_information` of each."""
-    return np.concatenate(
-        [
-            noise_informations(group) if len(group) > 1 else group[0].noise_information[None]
-            for group in _groups(experiments)
-        ]
-    )
+    return np.concatenate([_noise(group) for group in _groups(experiments)])
+
+
+def _noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
+    first, number = experiments[0], len(experiments)
+    if number == 1 or not first.told_by_noise:
+        return np.stack([experiment.noise_information for experiment in experiments])
+    whiteners = np.array([experiment.from_raw for experiment in experiments])
+
+    def gradients(w: Array) -> ComplexArray:
+        columns = whiteners @ _noise_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
+        return columns.transpose(2, 0, 1)[..., None, None]
+
+    told = told_by_noise(gradients, _singularities(experiments), number * first.size)
+    return np.asarray(first.samples * told)
 
 
 def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
@@ -98,7 +118,7 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
     if len(experiments) == 1:
         return integrals(first.information_density, first.singularities, first.information_factor)[:, None]
 
-    whiteners = np.array([experiment.whitener for experiment in experiments])
+    whiteners = np.array([np.sqrt(e.samples) * e.noise_whitener[0, 0] * e.from_raw for e in experiments])
 
     def density(w: Array) -> NDArray[np.float64]:
         columns = whiteners @ _excitation_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
@@ -117,3 +137,12 @@ def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> Comple
         return np.stack([loop.excitation_gradient(w) for loop in loops])
     models = [experiment.model for experiment in experiments]
     return input_gradients(models[0], models, w)
+
+
+def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
+    """(S, n, k, p, p): what e contributes."""
+    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
+    if loops:
+        return np.stack([loop.noise_gradient(w) for loop in loops])
+    models = [experiment.model for experiment in experiments]
+    return noise_gradients(models[0], models, w)

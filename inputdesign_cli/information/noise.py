@@ -2,57 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, integrate
-from inputdesign_cli.plant import Model
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, Values, integrate
+from inputdesign_cli.plant.polynomial import ComplexArray
 
 _NUMBERS_AT_ONCE = 2**16
 
 
-class Disturbed(Protocol):
-    """An experiment, as far as its noise goes; see `Experiment`."""
+def told_by_noise(gradients: Values, singularities: ComplexArray, numbers: int) -> NDArray[np.float64]:
+    """(S, k, k): what a sample of each of S plants tells without any excitation.
 
-    @property
-    def model(self) -> Model:
-        """What the noise disturbs."""
-
-    @property
-    def samples(self) -> int:
-        """N."""
-
-    @property
-    def size(self) -> int:
-        """Number of parameters k."""
-
-    @property
-    def singularities(self) -> ComplexArray:
-        """Poles of the gradient, as points of the frequency plane."""
-
-    @property
-    def told_by_noise(self) -> bool:
-        """Whether the noise tells of any parameter at all."""
-
-    def noise_gradient(self, w: ArrayLike) -> ComplexArray:
-        """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
-
-
-def noise_informations(experiments: Sequence[Disturbed]) -> NDArray[np.float64]:
-    """(S, k, k): what N samples of each tell without any excitation, by the noise alone (in the loop).
-
-    The S plants are of one structure, and their integrals share nodes.
+    Args:
+        gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.
+        singularities: of all of them.
+        numbers: S k p^2.
     """
-    first = experiments[0]
-    if not first.told_by_noise:
-        return np.zeros((len(experiments), first.size, first.size))
-
-    def gradients(w: Array) -> NDArray:
-        return np.stack([experiment.noise_gradient(w) for experiment in experiments], axis=1)
 
     def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
         weighted = np.moveaxis(values, 0, -1) * np.sqrt(rule.weights)
@@ -60,7 +26,5 @@ def noise_informations(experiments: Sequence[Disturbed]) -> NDArray[np.float64]:
         rows = np.concatenate([flat.real, flat.imag], axis=2)
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
-    near = np.concatenate([experiment.singularities for experiment in experiments])
-    numbers = len(experiments) * first.size * first.model.outputs**2
-    told = integrate(gradients, sums, near, at_once=max(_NUMBERS_AT_ONCE // numbers, NODES_AT_ONCE))
-    return told * np.array([experiment.samples for experiment in experiments])[:, None, None]
+    at_once = max(_NUMBERS_AT_ONCE // numbers, NODES_AT_ONCE)
+    return integrate(gradients, sums, singularities, at_once=at_once)

@@ -17,6 +17,7 @@ from inputdesign_cli.plant.model import (
     Model as Model,
     Parameter as Parameter,
     input_gradients as input_gradients,
+    noise_gradients as noise_gradients,
 )
 from inputdesign_cli.plant.parametrisation import Parametrisation as Parametrisation
 from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop

@@ -174,6 +174,12 @@ def input_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> Comp
     return np.stack([each.input_gradient(w) for each in models])
 
 
+@singledispatch
+def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> ComplexArray:
+    """(S, n, k, p, p): `noise_gradient`, in the same way."""
+    return np.stack([each.noise_gradient(w) for each in models])
+
+
 class Listed(Model, Protocol):
     """A model that knows its parameters one by one."""
 

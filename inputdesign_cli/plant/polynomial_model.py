@@ -20,6 +20,7 @@ from inputdesign_cli.plant.model import (
     Parametrised,
     entry_label,
     input_gradients,
+    noise_gradients,
     row_parameters,
 )
 from inputdesign_cli.plant.polynomial import (
@@ -224,13 +225,11 @@ class PolynomialModel(Parametrised):
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
-        return _input_gradients([self], w)[0]
+        return _input_gradients(self, [self], w)[0]
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""
-        H = self.noise_at(w)[None] if self.outputs_count else None
-        e = np.eye(self.outputs, dtype=complex)[None, None]
-        return _gradients([self], w, self.outputs, H, None, e)[0]
+        return _noise_gradients(self, [self], w)[0]
 
     @property
     def outputs_count(self) -> bool:
@@ -289,16 +288,19 @@ class PolynomialModel(Parametrised):
 
 
 @input_gradients.register
-def _(model: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
-    return _input_gradients(models, w)
-
-
-def _input_gradients(models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
+def _input_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
     """(S, n, k, p, r): those of models of one structure."""
-    first = models[0]
     G = np.stack([model.plant_at(w) for model in models]) if first.outputs_count else None
     u = np.eye(first.inputs, dtype=complex)[None, None]
     return _gradients(models, w, first.inputs, G, u, None)
+
+
+@noise_gradients.register
+def _noise_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
+    """(S, n, k, p, p): those of models of one structure."""
+    H = np.stack([model.noise_at(w) for model in models]) if first.outputs_count else None
+    e = np.eye(first.outputs, dtype=complex)[None, None]
+    return _gradients(models, w, first.outputs, H, None, e)
 
 
 def _gradients(
@@ -320,10 +322,8 @@ def _gradients(
     def values(polynomials: Iterable[Array]) -> ComplexArray:
         return evaluate(np.array(list(polynomials)), q)[:, None]
 
-    C, D = (
-        [values(m.per_output(rows(m))[i] for m in models) for i in range(first.outputs)]
-        for rows in (lambda m: m.C, lambda m: m.D)
-    )
+    C = [values(m.per_output(m.C)[i] for m in models) for i in range(first.outputs)]
+    D = [values(m.per_output(m.D)[i] for m in models) for i in range(first.outputs)]
     y, u, e = (x if x is None else x.transpose(0, 2, 3, 1) for x in (y, u, e))
     noise: dict[tuple[str, int], ComplexArray] = {}
     for i in range(first.outputs):
