@@ -194,7 +194,7 @@ def test_what_was_seen_belongs_to_the_plants_that_it_was_seen_of(first_order):
 
 @pytest.mark.parametrize("above", [0.3, 1.0, -np.inf])
 def test_what_was_seen_before_hides_no_violation(first_order, above):
-    """Spectra one after the other, stronger and weaker: the violations of each scenario looked at by itself."""
+    """Spectra one after the other, stronger and weaker: the violations of each scenario by itself."""
     others = alternatives(first_order, around(first_order, 12, 0.05, seed=1), 0.1)
     problem = solve_design(question(first_order, others), tolerance=1e-4).problem
     demands, rng = Demands(problem.scenarios), np.random.default_rng(2)
