@@ -30,6 +30,7 @@ from inputdesign_cli.accuracy.requirement import (
     Entry as Entry,
     Requirement as Requirement,
     Violation as Violation,
+    inverse_factor as inverse_factor,
     worst as worst,
 )
 from inputdesign_cli.accuracy.weighted_variance import WeightedVariance as WeightedVariance

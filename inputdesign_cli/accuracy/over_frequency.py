@@ -89,6 +89,8 @@ class OverFrequency(Requirement):
         """Frequencies of the band that see every resonance of G, of the requirement and of the loop."""
         grid = graded_grid(self.grid_singularities, *self.band, knots=self.knots)
         # A pole that a weight cancels leaves 0/0 there, and rounding next to it.
+        if self.poles_on_the_circle.size == 0:
+            return grid
         clear = np.all(np.abs(grid[:, None] - self.poles_on_the_circle) > _HIDDEN * self.band[1], axis=1)
         return grid[clear]
 
@@ -165,13 +167,19 @@ class OverFrequency(Requirement):
 
 
 def turned(rows: NDArray[np.float64], turn: Array) -> NDArray[np.float64]:
-    """(n, q, k) rows @ turn as one product: stacks of small matrices are multiplied one by one."""
-    return np.asarray((rows.reshape(-1, rows.shape[2]) @ turn).reshape(*rows.shape[:2], turn.shape[1]))
+    """(n, q, k) rows @ turn as one product, since stacks of small matrices are multiplied one by one.
+
+    In memory the frequencies stand side by side: few sums over many of them are then sums of long vectors.
+    """
+    n, q, k = rows.shape
+    return np.asarray((turn.T @ rows.T.reshape(k, q * n)).reshape(-1, q, n).T)
 
 
 def real_rows(gradient: ComplexArray) -> NDArray[np.float64]:
-    """(n, k) complex -> (n, 2, k): real and imaginary parts."""
-    return np.stack([gradient.real, gradient.imag], axis=1)
+    """(n, k) complex -> (n, 2, k): real and imaginary parts, in memory as `turned` has them."""
+    rows = np.empty((gradient.shape[1], 2, gradient.shape[0]))
+    rows[:, 0], rows[:, 1] = gradient.real.T, gradient.imag.T
+    return rows.T
 
 
 def largest_singular(half: NDArray[np.float64]) -> Array:

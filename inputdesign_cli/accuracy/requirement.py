@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from inputdesign_cli.accuracy.cut import Cut
 from inputdesign_cli.plant.polynomial import Array
@@ -92,12 +93,18 @@ class OneCondition(Requirement):
 
 
 def inverse_factor(information: Array) -> Array:
-    """K (k, k) with K^T K = M^-1.
+    """K (.., k, k) with K^T K = M^-1.
 
     Raises:
         LinAlgError: M is singular, that is, some parameter is not excited.
     """
-    return np.linalg.inv(np.linalg.cholesky(information))
+    if information.ndim > 2:
+        return np.linalg.inv(np.linalg.cholesky(information))
+    factor, flaw = scipy.linalg.lapack.dpotrf(information, lower=1)
+    if flaw:
+        raise np.linalg.LinAlgError("the information matrix is not positive definite")
+    inverse, _ = scipy.linalg.lapack.dtrtri(factor, lower=1)
+    return np.asarray(inverse)
 
 
 def worst(violations: list[Violation]) -> Violation:

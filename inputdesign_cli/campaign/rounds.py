@@ -54,20 +54,22 @@ def advanced(
 
     Args:
         given: the file of the user, and what was read of it.
-        unlike: whether to take a record that is not at the scale of its plan.
+        unlike: whether to take a record that is not at the scale of its plan, or like another plan.
 
     Raises:
-        DataError: `campaign-over`; `record-too-long`, `record-other-scale`; what is wrong with a record.
+        DataError: `campaign-over`; `data-repeated`, `record-too-long`, `record-other-part`,
+            `record-other-scale`; what is wrong with a record.
     """
     records, files, notes = memory.records, dict(memory.files), list[str]()
     if given is not None and part is not None:
-        entry = _accepted(memory, given, part, unlike=unlike)
         name, text = f"record_{len(records) + 1:02d}", csv_text(part.table)
+        _check_going_on(memory)
         _check_new(records, files, given, text)
+        entry, of_the_plan = _accepted(memory, given, part, unlike=unlike)
         files[f"{name}.csv"] = text.encode()
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
         records.append({"file": f"{name}.csv", "given": given.name, **entry})
-        notes = [*part.notes, *_unlike(entry)]
+        notes = [*part.notes, *of_the_plan]
     decided = _again(decide, memory, records, files)
     if not notes:
         return decided
@@ -153,19 +155,14 @@ def _of_the_campaign(diagnostic: Diagnostic, folder: Path) -> Diagnostic:
     return replace(diagnostic, location=replace(place, file=Path(place.file).name))
 
 
-def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> dict[str, Json]:
-    """What is noted of a record, compared with its plan.
+def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[dict[str, Json], list[str]]:
+    """What is kept of a record, compared with its plan, and what is to be said of it.
 
     Raises:
-        DataError: `campaign-over`, `record-too-long`, `record-other-scale`.
+        DataError: `record-too-long`, `record-other-part`, `record-other-scale`.
     """
     plan = memory.plan
-    if memory.state != "running" or plan is None:
-        raise DataError.because(
-            "campaign-over",
-            f"the campaign in {memory.directory} has ended: {memory.state}",
-            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign",
-        )
+    assert plan is not None
     if part.samples > plan["samples"]:
         raise DataError.because(
             "record-too-long",
@@ -174,15 +171,18 @@ def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> dict[
         )
     entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
     if part.excitation is None:
-        return entry | {"energy": part.samples * plan["power"]}
-    offset = np.array(plan["offset"], dtype=float)
-    path = memory.directory / plan["file"]
-    whole = np.stack(list(read_csv(path).values())[1:], axis=1) - offset
-    applied = part.excitation - offset
-    begins = _begins(whole, applied, part.rows)
-    scale, likeness = _compared(whole[begins + part.rows], applied)
+        return entry | {"energy": part.samples * plan["power"]}, []
+    applied, begins, scale, likeness = _matched(memory, plan, part, part.excitation)
     samples = begins + part.samples
     entry |= {"samples": samples}
+    other = _of_another(memory, plan, part, part.excitation, abs(likeness))
+    if other is not None and not unlike:
+        raise DataError.because(
+            "record-other-part",
+            f"what was applied in {given.name} is {other}, not {plan['file']}, which is due",
+            hint=f"give the record of {plan['file']}; if {other} was really applied once more, say "
+            "--as-applied: the estimate goes by what was recorded",
+        )
     if abs(likeness) > _LIKE and abs(scale - 1.0) > _OFF and not unlike:
         raise DataError.because(
             "record-other-scale",
@@ -192,7 +192,52 @@ def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> dict[
         )
     entry |= {"scale": scale} if abs(likeness) > _LIKE else {}
     energy = float(np.sum(applied**2)) * samples / len(part.rows)
-    return entry | {"energy": energy, "likeness": likeness}
+    entry |= {"energy": energy, "likeness": likeness}
+    return entry, [_once_more(entry, other)] if other is not None else _unlike(entry)
+
+
+def _check_going_on(memory: Memory) -> None:
+    """Raise `DataError` (`campaign-over`) where no part is due."""
+    if memory.state != "running" or memory.plan is None:
+        raise DataError.because(
+            "campaign-over",
+            f"the campaign in {memory.directory} has ended: {memory.state}",
+            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign",
+        )
+
+
+def _once_more(entry: Mapping[str, Json], other: str) -> str:
+    """That a record is that of another plan."""
+    return (
+        f"what was applied is {other} once more, not {entry['plan']} (correlation {entry['likeness']:.2f}): "
+        "withdraw the record with --withdraw if it was given by mistake, else samples count twice"
+    )
+
+
+def _matched(
+    memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array
+) -> tuple[Array, int, float, float]:
+    """What was applied about the levels of a plan (m, r), where in the plan it begins, scale and likeness."""
+    offset = np.array(plan["offset"], dtype=float)
+    whole = np.stack(list(read_csv(memory.directory / plan["file"]).values())[1:], axis=1) - offset
+    applied = excitation - offset
+    begins = _begins(whole, applied, part.rows)
+    return applied, begins, *_compared(whole[begins + part.rows], applied)
+
+
+def _of_another(
+    memory: Memory, due: Mapping[str, Json], part: Part, excitation: Array, likeness: float
+) -> str | None:
+    """The file of another plan that what was applied is, where that is nearer than the one that is due."""
+    rounds = memory.campaign["rounds"]
+    plans = {entry["plan"]["file"]: entry["plan"] for entry in rounds if entry.get("plan")}
+    found = {
+        file: abs(_matched(memory, plan, part, excitation)[3])
+        for file, plan in plans.items()
+        if file != due["file"] and len(memory.files.get(file, b"").splitlines()) > part.samples
+    }
+    likest = max(found, key=found.__getitem__, default=None)
+    return likest if likest is not None and found[likest] > max(_LIKE, likeness) else None
 
 
 def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:

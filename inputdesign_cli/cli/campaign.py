@@ -73,7 +73,10 @@ def proceed(
     ] = None,
     as_applied: Annotated[
         bool,
-        typer.Option("--as-applied", help="Take a record that was applied at another scale than planned."),
+        typer.Option(
+            "--as-applied",
+            help="Take a record that was applied at another scale than planned, or of an earlier plan.",
+        ),
     ] = False,
     columns: Columns = "",
     operating_point: OperatingPoint = "",

@@ -41,6 +41,7 @@ class Estimate:
             explains; None where the model is unstable and cannot be simulated.
         simulated: (samples, p), what the inputs and the start of each record cause in the model.
         free: whether unknown starts and levels were estimated along with theta.
+        rest_refuted: whether the records say that they do not begin at rest about zero.
         first: (records, p), the first residuals if each record began at rest about zero.
         agreement: the probability that an earlier estimate differs as much as the one that counts along; None
             where there is none.
@@ -64,6 +65,7 @@ class Estimate:
     fit: tuple[float | None, ...]
     simulated: Array
     free: bool
+    rest_refuted: bool
     first: Array
     agreement: float | None
     lengths: tuple[int, ...]
@@ -174,6 +176,7 @@ def concluded(
         ),
         simulated=simulated,
         free=records.free,
+        rest_refuted=found.rest_refuted,
         first=found.first,
         agreement=None if earlier is None else earlier.agreement(point.theta, factor),
         lengths=lengths,

@@ -41,6 +41,8 @@ class Search:
     Attributes:
         first: (parts, p), the first residuals if each record began at rest about zero.
         rivals: other minima that explain the records nearly as well.
+        rest_refuted: whether the records say that they do not begin at rest about zero; where only noise from
+            before them matters to the model, the start is unknown although nothing says so.
     """
 
     records: Records
@@ -50,6 +52,7 @@ class Search:
     starts: int
     first: Array
     rivals: tuple[Rival, ...]
+    rest_refuted: bool = False
 
 
 def search(
@@ -202,4 +205,5 @@ def from_rest_or_free(
     if not noisy and probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
         return at_rest
     begun = begun_free(at_rest.point.theta, late)
-    return begun if noisy or probability(begun.point.cost) < _MISTAKEN else at_rest
+    refuted = probability(begun.point.cost) < _MISTAKEN
+    return replace(begun, rest_refuted=refuted) if noisy or refuted else at_rest

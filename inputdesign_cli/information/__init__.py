@@ -10,6 +10,12 @@ from inputdesign_cli.information.finite_record import (
     FiniteRecord as FiniteRecord,
     FiniteRecords as FiniteRecords,
 )
+from inputdesign_cli.information.joint import (
+    joint_information as joint_information,
+    joint_noise as joint_noise,
+    jointly_whitened as jointly_whitened,
+    mean_cost as mean_cost,
+)
 from inputdesign_cli.information.products import WeightedProducts as WeightedProducts
 from inputdesign_cli.information.quadrature import (
     NODES_AT_ONCE as NODES_AT_ONCE,

@@ -52,6 +52,11 @@ class Coordinates:
         """An information matrix (k, k) of raw parameters in these coordinates."""
         return self.whiten_rows(self.whiten_rows(information).T)
 
+    @property
+    def from_raw(self) -> Array:
+        """(k, k): what takes the gradient with respect to raw parameters to these coordinates."""
+        return np.eye(self.size) if self.factor is None else self._inverse_factor
+
     @cached_property
     def _inverse_factor(self) -> Array:
         inverse, _ = scipy.linalg.lapack.dtrtri(self.factor, lower=1)

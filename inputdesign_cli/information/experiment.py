@@ -8,7 +8,6 @@ Criteria do not depend on the measure, as long as powers and information share i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -17,8 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.information.coordinates import Coordinates, factor_of
+from inputdesign_cli.information.noise import told_by_noise
 from inputdesign_cli.information.products import WeightedProducts
-from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, band_quadrature, integrate
+from inputdesign_cli.information.quadrature import Quadrature, band_quadrature
 from inputdesign_cli.plant import Loop, Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
@@ -68,7 +68,7 @@ class Experiment(Coordinates):
         return self.model if self.loop is None else self.loop
 
     @cached_property
-    def _noise_whitener(self) -> Array:
+    def noise_whitener(self) -> Array:
         """K (p, p) with K^T K the inverse of the noise covariance."""
         return np.linalg.inv(np.linalg.cholesky(self.model.covariance))
 
@@ -79,13 +79,13 @@ class Experiment(Coordinates):
         ([bombois-least-costly], below (4) and (15), for one channel).
         """
         gradient = self.model.input_gradient(w) if self.loop is None else self.loop.excitation_gradient(w)
-        if len(self._noise_whitener) == 1:
-            return self._whiten(self._noise_whitener[0, 0] * gradient)
-        return self._whiten(np.einsum("pq,nkqr->nkpr", self._noise_whitener, gradient))
+        if len(self.noise_whitener) == 1:
+            return self._whiten(self.noise_whitener[0, 0] * gradient)
+        return self._whiten(np.einsum("pq,nkqr->nkpr", self.noise_whitener, gradient))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what white e of covariance I contributes, noise whitened to I."""
-        K = self._noise_whitener
+        K = self.noise_whitener
         gradient = self._source.noise_gradient(w)
         if len(K) == 1:
             return self._whiten(gradient)
@@ -99,7 +99,7 @@ class Experiment(Coordinates):
         if self.factor is None:
             return gradient
         if gradient.shape[2:] == (1, 1):
-            return (gradient[:, :, 0, 0] @ self._inverse_factor.T)[:, :, None, None]
+            return (self._inverse_factor @ gradient[:, :, 0, 0].T).T[:, :, None, None]
         return np.tensordot(gradient, self._inverse_factor, axes=(1, 1)).transpose(0, 3, 1, 2)
 
     def information_density(self, w: ArrayLike) -> NDArray:
@@ -127,7 +127,7 @@ class Experiment(Coordinates):
 
     def valued(self, products: WeightedProducts, weight: Array) -> NDArray:
         """`value_density` where the products are at hand."""
-        return self._squeezed(self.samples * products.at(weight))
+        return self.squeezed(self.samples * products.at(weight))
 
     def power_density(self, kind: PowerKind, w: ArrayLike, channel: int | None = None) -> NDArray:
         """(n,) or (n, r, r): tr(D Phi) is the power of u_x, y_x, x or moves, of all channels or of one."""
@@ -136,22 +136,10 @@ class Experiment(Coordinates):
             density = self.power_density("input", w, channel)
             return density * moving.reshape(-1, *(1,) * (density.ndim - 1))
         if self.depends_on_plant(kind):
-            rows = _channel(self.response(kind, w), channel)
-            return self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
+            rows = of_channel(self.response(kind, w), channel)
+            return self.squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
         unit = np.eye(self.inputs) if channel is None else np.diag(np.eye(self.inputs)[channel])
-        return self._squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
-
-    def cost_density(self, weights: Sequence[tuple[PowerKind, int | None, float]], w: ArrayLike) -> NDArray:
-        """(n,) or (n, r, r): that of a weighted sum of powers, each of a kind and of a channel or all."""
-        caused = None if self.loop is None else self.loop.excited(w)
-        total: NDArray | float = 0.0
-        for kind, channel, weight in weights:
-            if caused is None or not self.depends_on_plant(kind):
-                total = total + weight * self.power_density(kind, w, channel)
-                continue
-            rows = _channel(caused[0 if kind == "output" else 1], channel)
-            total = total + weight * self._squeezed(np.einsum("npa,npb->nab", rows.conj(), rows))
-        return np.asarray(total)
+        return self.squeezed(np.broadcast_to(unit, (np.size(w), *unit.shape)))
 
     def depends_on_plant(self, kind: PowerKind) -> bool:
         """Whether a power is that of a signal that the plant takes part in, not of x itself."""
@@ -172,20 +160,18 @@ class Experiment(Coordinates):
         """(n,): 1 - q^-1, of samples that are held."""
         return np.asarray(1.0 - np.exp(-1j * np.atleast_1d(np.asarray(w, dtype=float))))
 
-    def _squeezed(self, density: NDArray) -> NDArray:
+    def squeezed(self, density: NDArray) -> NDArray:
+        """A density (n, r, r) as it is told: (n,) for one input."""
         return density[:, 0, 0].real if self.inputs == 1 else density
 
     @cached_property
     def noise_information(self) -> Array:
         """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
-        if self.model.continuous or np.all(self._silent):
+        if not self.told_by_noise:
             return np.zeros((self.size, self.size))
-
-        def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
-            rows = _rows(values, rule.weights)
-            return rows.T @ rows
-
-        return self.samples * integrate(self.noise_gradient, sums, self.singularities, at_once=NODES_AT_ONCE)
+        numbers = self.size * self.model.outputs**2
+        told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities, numbers)
+        return self.samples * told[0]
 
     @property
     def baseline_information(self) -> Array:
@@ -193,10 +179,11 @@ class Experiment(Coordinates):
         return self.noise_information + self.prior_information
 
     @cached_property
-    def _silent(self) -> NDArray[np.bool_]:
-        """(k,): the parameters of which noise alone says nothing."""
-        probe = np.abs(self._source.noise_gradient(np.array([0.3, 1.1, 2.3])))
-        return ~np.any(probe > 0, axis=(0, 2, 3))
+    def told_by_noise(self) -> bool:
+        """Whether noise alone tells of any parameter."""
+        if self.model.continuous:
+            return False
+        return bool(np.any(self._source.noise_gradient(np.array([0.3, 1.1, 2.3]))))
 
     def whitened(self, power: float | Array) -> Experiment:
         """The same experiment in coordinates where M = I by this power, flat over the band.
@@ -207,16 +194,35 @@ class Experiment(Coordinates):
         Raises:
             SpecError: `not-identifiable` when even that excitation cannot tell parameters apart.
         """
-        rule = band_quadrature(self.singularities, self.band)
-        raw = replace(self, factor=None)
+        raw, excited, around = replace(self, factor=None), *self.flat_rules(self.singularities)
+        noise = raw.noise_gradient(around.nodes) if self.told_by_noise else None
+        return self.whitened_by(power, (excited, raw.excitation_gradient(excited.nodes)), (around, noise))
+
+    def flat_rules(self, near: ComplexArray) -> tuple[Quadrature, Quadrature]:
+        """Nodes for excitation that is flat over the band, and for the noise, with these singularities."""
+        return band_quadrature(near, self.band), band_quadrature(near, (0.0, np.pi))
+
+    def whitened_by(
+        self,
+        power: float | Array,
+        excited: tuple[Quadrature, ComplexArray],
+        noise: tuple[Quadrature, ComplexArray | None],
+    ) -> Experiment:
+        """`whitened`, where the gradients of raw parameters at the nodes of the `flat_rules` are at hand.
+
+        Args:
+            excited: with `excitation_gradient`.
+            noise: with `noise_gradient`, None where the noise tells nothing.
+        """
         width = (self.band[1] - self.band[0]) / np.pi
         total = float(np.sum(power))
         shares = np.sqrt(np.asarray(power) * self.inputs / total) if np.ndim(power) else 1.0
         level = total * self.samples / (self.inputs * width)
-        rows = [_rows(raw.excitation_gradient(rule.nodes) * shares, rule.weights * level)]
-        if not self.model.continuous and not np.all(self._silent):
-            around = band_quadrature(self.singularities, (0.0, np.pi))
-            rows.append(_rows(raw.noise_gradient(around.nodes), around.weights * self.samples))
+        rule, gradient = excited
+        rows = [_rows(gradient * shares, rule.weights * level)]
+        around, disturbed = noise
+        if disturbed is not None:
+            rows.append(_rows(disturbed, around.weights * self.samples))
         if self.prior is not None:
             eigenvalues, vectors = np.linalg.eigh(self.prior)
             rows.append(np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T)
@@ -227,6 +233,12 @@ class Experiment(Coordinates):
 
 def _real_products(F: ComplexArray) -> NDArray[np.float64]:
     """Re sum over channels of F_l F_m^*: (n, k, p, r) -> (n, k, k)."""
+    if F.shape[2:] == (1, 1):
+        columns = F[:, :, 0, 0].T
+        real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
+        products = real[:, None] * real
+        products += imaginary[:, None] * imaginary
+        return products.transpose(2, 0, 1)
     flat = F.reshape(*F.shape[:2], -1)
     real = np.concatenate([flat.real, flat.imag], axis=2)
     return real @ real.swapaxes(1, 2)
@@ -234,14 +246,15 @@ def _real_products(F: ComplexArray) -> NDArray[np.float64]:
 
 def _rows(F: ComplexArray, weights: Array) -> NDArray[np.float64]:
     """sqrt(weight) F as real rows: (n, k, p, r) -> (2 n p r, k)."""
-    flat = np.moveaxis(F, 1, -1) * np.sqrt(weights)[:, None, None, None]
+    flat = F.transpose(0, 2, 3, 1) * np.sqrt(weights)[:, None, None, None]
     flat = flat.reshape(-1, F.shape[1])
     return np.concatenate([flat.real, flat.imag])
 
 
-def _channel(response: ComplexArray, channel: int | None) -> ComplexArray:
-    """(n, 1, r): what x causes at one channel, without what rounding leaves of nothing; all for None."""
+def of_channel(response: ComplexArray, channel: int | None) -> ComplexArray:
+    """(.., n, 1, r): what x causes at one channel, without what rounding leaves of nothing; all for None."""
     if channel is None:
         return response
-    row = response[:, channel : channel + 1]
-    return np.where(np.abs(row) > _NOTHING * np.abs(response).max(initial=0.0), row, 0.0)
+    row = response[..., channel : channel + 1, :]
+    largest = np.abs(response).max(axis=(-3, -2, -1), keepdims=True, initial=0.0)
+    return np.where(np.abs(row) > _NOTHING * largest, row, 0.0)

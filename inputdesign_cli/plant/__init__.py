@@ -10,12 +10,14 @@ from inputdesign_cli.plant.frequencies import (
     logarithmic_distance as logarithmic_distance,
 )
 from inputdesign_cli.plant.intersample import Intersample as Intersample
-from inputdesign_cli.plant.loop import Loop as Loop, close_loop as close_loop
+from inputdesign_cli.plant.loop import Loop as Loop, close_loop as close_loop, excited as excited
 from inputdesign_cli.plant.model import (
     Fraction as Fraction,
     Listed as Listed,
     Model as Model,
     Parameter as Parameter,
+    input_gradients as input_gradients,
+    noise_gradients as noise_gradients,
 )
 from inputdesign_cli.plant.parametrisation import Parametrisation as Parametrisation
 from inputdesign_cli.plant.polynomial_loop import PolynomialLoop as PolynomialLoop

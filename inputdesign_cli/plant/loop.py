@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,6 +74,11 @@ class Loop(ABC):
     def left_at(self, w: ArrayLike) -> ComplexArray:
         """(n, p + r, p + r): the matrix on the left at normalised frequencies `w`."""
 
+    @classmethod
+    def lefts_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
+        """(S, n, p + r, p + r): `left_at` of loops around plants of one structure, beside zero."""
+        return np.stack([loop.left_at(loop.beside_zero(w)) for loop in loops])
+
     @abstractmethod
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """R H (n, p, p) at normalised frequencies `w`."""
@@ -98,16 +105,16 @@ class Loop(ABC):
         return bool(np.any(np.abs(self.predictor_poles - 1.0) < INTEGRATES))
 
     @cached_property
-    def _nearest(self) -> float:
+    def nearest(self) -> float:
         """The frequency below which all is taken to be as it is there."""
         if not self.integrates:
             return 0.0
         near = np.abs(logarithmic_distance(self.closed_poles))
         return BESIDE * float(np.min(near, initial=1.0))
 
-    def _beside_zero(self, w: ArrayLike) -> ComplexArray | Array:
+    def beside_zero(self, w: ArrayLike) -> ComplexArray | Array:
         """The frequencies `w`, moved off zero where the loop integrates; those off the axis stay."""
-        return beside_zero(w, self._nearest)
+        return beside_zero(w, self.nearest)
 
     @property
     def memory(self) -> float:
@@ -162,20 +169,12 @@ class Loop(ABC):
 
     def excited(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """What r causes at normalised frequencies `w`: G S_i (n, p, r) at y, S_i = (I + C G)^-1 at u."""
-        left, p = self.left_at(self._beside_zero(w)), self.model.outputs
-        r = left.shape[1] - p
-        if p == r == 1:
-            R, minus_N, P, Q = _blocks(left)
-            below = R * Q - minus_N * P
-            return -minus_N * Q / below, R * Q / below
-        right = np.zeros((len(left), p + r, r), dtype=complex)
-        inputs = p + np.arange(r)
-        right[:, inputs, np.arange(r)] = left[:, inputs, inputs]
-        return _split(np.linalg.solve(left, right), p)
+        y, u = excited([self], w)
+        return y[0], u[0]
 
     def disturbed(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """What e causes: S_o H (n, p, p) at y with S_o = (I + G C)^-1, and -C S_o H (n, r, p) at u."""
-        beside = self._beside_zero(w)
+        beside = self.beside_zero(w)
         left, noise, p = self.left_at(beside), self.noise_at(beside), self.model.outputs
         if left.shape[1] == 2:
             R, minus_N, P, Q = _blocks(left)
@@ -187,7 +186,7 @@ class Loop(ABC):
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
-        left, p = self.left_at(self._beside_zero(w)), self.model.outputs
+        left, p = self.left_at(self.beside_zero(w)), self.model.outputs
         if left.shape[1] == 2:
             R, minus_N, P, Q = _blocks(left)
             below = R * Q - minus_N * P
@@ -200,23 +199,37 @@ class Loop(ABC):
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""
         y, u = self.excited(w)
-        return self.model.prediction_gradient(self._beside_zero(w), y, u, np.zeros_like(y))
+        return self.model.prediction_gradient(self.beside_zero(w), y, u, np.zeros_like(y))
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what e contributes, through the noise model and around the loop."""
         y, u = self.disturbed(w)
         e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), y.shape)
-        return self.model.prediction_gradient(self._beside_zero(w), y, u, e)
+        return self.model.prediction_gradient(self.beside_zero(w), y, u, e)
+
+
+def excited(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+    """`Loop.excited` of loops around plants of one structure: (S, n, p, r) at y, (S, n, r, r) at u."""
+    left, p = type(loops[0]).lefts_at(loops, w), loops[0].model.outputs
+    r = left.shape[-1] - p
+    if p == r == 1:
+        R, minus_N, P, Q = _blocks(left)
+        below = R * Q - minus_N * P
+        return -minus_N * Q / below, R * Q / below
+    right = np.zeros((*left.shape[:-1], r), dtype=complex)
+    inputs = p + np.arange(r)
+    right[..., inputs, np.arange(r)] = left[..., inputs, inputs]
+    return _split(np.linalg.solve(left, right), p)
 
 
 def _split(solved: NDArray, outputs: int) -> tuple[ComplexArray, ComplexArray]:
-    """y and u of a solution (n, p + r, ..)."""
-    return solved[:, :outputs].astype(complex), solved[:, outputs:].astype(complex)
+    """y and u of a solution (.., p + r, columns)."""
+    return solved[..., :outputs, :].astype(complex), solved[..., outputs:, :].astype(complex)
 
 
 def _blocks(left: ComplexArray) -> tuple[ComplexArray, ...]:
-    """R, -N, P and Q (n, 1, 1) of the matrix on the left for one input and one output."""
-    return tuple(left[:, i : i + 1, j : j + 1] for i in (0, 1) for j in (0, 1))
+    """R, -N, P and Q (.., 1, 1) of the matrix on the left for one input and one output."""
+    return tuple(left[..., i : i + 1, j : j + 1] for i in (0, 1) for j in (0, 1))
 
 
 @singledispatch

@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
+_latest: list[tuple[NDArray, ComplexArray]] = [(np.zeros(0), np.zeros(0, dtype=complex))]
+_WORTH_KEEPING = 128  # frequencies; fewer are sooner computed than compared
 _MODERATE = 1e100  # quotients up to this are no overflow
 
 
@@ -19,12 +21,46 @@ def unit_circle(w: ArrayLike) -> ComplexArray:
 
     With w - j rho it is on a circle of radius e^-rho: the transform of signals weighted with e^(-rho t).
     """
-    return np.exp(-1j * np.asarray(w))
+    at = np.asarray(w)
+    asked, known = _latest[0]
+    # G, H and their gradients are asked for at the same frequencies in turn, and so are those of like plants.
+    if at.shape == asked.shape and np.array_equal(at, asked):
+        return known
+    q = np.asarray(np.exp(-1j * at))
+    if at.size < _WORTH_KEEPING:
+        return q
+    q.setflags(write=False)
+    _latest[0] = (at.copy(), q)
+    return q
+
+
+def power(q: ComplexArray, exponent: int) -> ComplexArray:
+    """`q` to a whole power; by far the most parameters are first or second coefficients."""
+    return q if exponent == 1 else q**exponent
+
+
+def frequencies_last(*shape: int) -> ComplexArray:
+    """Zeros of this shape, frequencies first, that lie side by side in memory for each of the rest."""
+    return np.zeros((*shape[1:], shape[0]), dtype=complex).transpose(len(shape) - 1, *range(len(shape) - 1))
 
 
 def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
-    """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1)."""
-    c = np.asarray(coefficients, dtype=float).tolist()
+    """Value of sum_i coefficients[i] q^i at each element of `q` (q stands for q^-1).
+
+    Several polynomials (S, l) have values (S, ..).
+    """
+    stated = np.asarray(coefficients, dtype=float)
+    if stated.ndim == 2 and len(stated) > 1:
+        columns = stated.T.reshape(stated.shape[1], len(stated), *(1 for _ in np.shape(q)))
+        several = np.zeros((len(stated), *np.shape(q)), dtype=complex)
+        several += columns[-1]
+        for column in columns[-2::-1]:
+            several *= q
+            several += column
+        return several
+    if stated.ndim == 2:
+        return evaluate(stated[0], q)[None]
+    c = stated.tolist()
     if len(c) == 1:
         return np.full(np.shape(q), c[0], dtype=complex)
     value: ComplexArray = c[-1] * q

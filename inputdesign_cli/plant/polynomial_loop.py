@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -81,6 +83,14 @@ class PolynomialLoop(Loop):
     def left_at(self, w: ArrayLike) -> ComplexArray:
         """(n, p + r, p + r): the matrix on the left of `Loop`."""
         return at(self._left, unit_circle(w))
+
+    @classmethod
+    def lefts_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
+        """(S, n, p + r, p + r): see `Loop`; all at once where they are read off at the same frequencies."""
+        beside = {loop.nearest for loop in loops}
+        if len(beside) > 1:
+            return super().lefts_at(loops, w)
+        return at(np.stack([loop._left for loop in loops]), unit_circle(loops[0].beside_zero(w)))
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """R H (n, p, p)."""

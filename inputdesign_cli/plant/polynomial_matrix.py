@@ -23,12 +23,17 @@ def stack(entries: Sequence[Sequence[Sequence[float]]]) -> Array:
 
 
 def at(matrix: Array, q: ComplexArray) -> ComplexArray:
-    """(K, rows, columns): the values at `q` (K,), which stands for q^-1."""
-    value = np.full((q.size, *matrix.shape[:-1]), matrix[..., -1], dtype=complex)
+    """(.., K, rows, columns): the values of (.., rows, columns, l) at `q` (K,), which stands for q^-1.
+
+    In memory those of an entry stand side by side.
+    """
+    value = np.empty((*matrix.shape[:-1], q.size), dtype=complex)
+    value[:] = matrix[..., -1:]
     for lag in range(matrix.shape[-1] - 2, -1, -1):
-        value *= q[:, None, None]
-        value += matrix[..., lag]
-    return value
+        value *= q
+        value += matrix[..., lag, None]
+    *leading, rows, columns, last = range(value.ndim)
+    return value.transpose(*leading, last, rows, columns)
 
 
 def multiply(left: Array, right: Array) -> Array:

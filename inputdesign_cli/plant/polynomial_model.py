@@ -5,7 +5,7 @@ The five-polynomial form A y = (B/F) u + (C/D) e ([ljung-1999], Section 4.2) wit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,12 +14,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Fraction, Parameter, Parametrised, entry_label, row_parameters
+from inputdesign_cli.plant.model import (
+    Fraction,
+    Parameter,
+    Parametrised,
+    entry_label,
+    input_gradients,
+    noise_gradients,
+    row_parameters,
+)
 from inputdesign_cli.plant.polynomial import (
     Array,
     ComplexArray,
     evaluate,
+    frequencies_last,
     join_roots,
+    power,
     roots_in_z,
     unit_circle,
 )
@@ -189,7 +199,7 @@ class PolynomialModel(Parametrised):
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf" and (output, input) in parameter.places:
                 gradient = above if parameter.letter == "b" else below
-                gradient[:, index] = q**parameter.power
+                gradient[:, index] = power(q, parameter.power)
         numerator = evaluate(self.B[output][input], q)
         return Fraction(numerator, self._denominator(q, output, input), above, below)
 
@@ -199,7 +209,7 @@ class PolynomialModel(Parametrised):
     def plant_gradient(self, w: ArrayLike) -> ComplexArray:
         """dG/dtheta (n, k, p, r)."""
         q = unit_circle(w)
-        gradient = np.zeros((q.size, len(self.parameters), self.outputs, self.inputs), dtype=complex)
+        gradient = frequencies_last(q.size, len(self.parameters), self.outputs, self.inputs)
         factors: dict[tuple[str, int, int], ComplexArray] = {}
         for i, j in self.active:
             A, B, F = (evaluate(p, q) for p in (self._row(self.A, i), self.B[i][j], self.F[i][j]))
@@ -207,7 +217,7 @@ class PolynomialModel(Parametrised):
             factors |= {("a", i, j): -B / (A * AF), ("b", i, j): 1.0 / AF, ("f", i, j): -B / (F * AF)}
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf":
-                shift = q**parameter.power
+                shift = power(q, parameter.power)
                 for i, j in parameter.places:
                     if (parameter.letter, i, j) in factors:
                         gradient[:, index, i, j] = factors[parameter.letter, i, j] * shift
@@ -215,60 +225,25 @@ class PolynomialModel(Parametrised):
 
     def input_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dG/dtheta (n, k, p, r)."""
-        G = self.plant_at(w) if self._outputs_count else None
-        u = np.broadcast_to(np.eye(self.inputs, dtype=complex), (np.size(w), self.inputs, self.inputs))
-        return self._gradient(w, self.inputs, G, u, None)
+        return _input_gradients(self, [self], w)[0]
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """H^-1 dH/dtheta (n, k, p, p)."""
-        H = self.noise_at(w) if self._outputs_count else None
-        e = np.broadcast_to(np.eye(self.outputs, dtype=complex), (np.size(w), self.outputs, self.outputs))
-        return self._gradient(w, self.outputs, H, None, e)
+        return _noise_gradients(self, [self], w)[0]
 
     @property
-    def _outputs_count(self) -> bool:
+    def outputs_count(self) -> bool:
         """Whether the gradient of the prediction depends on past outputs: by coefficients of A alone."""
-        return any(parameter.letter == "a" for parameter in self.parameters)
+        return "a" in self.letters
+
+    @cached_property
+    def letters(self) -> frozenset[str]:
+        """The polynomials that have free coefficients."""
+        return frozenset(parameter.letter for parameter in self.parameters)
 
     def prediction_gradient(self, w: ArrayLike, y: NDArray, u: NDArray, e: NDArray) -> ComplexArray:
         """(n, k, p, m), see `Model`; epsilon_i = (D_i/C_i) (A_i y_i - sum_j (B_ij/F_ij) u_j)."""
-        return self._gradient(w, y.shape[2], y, u, e)
-
-    def _gradient(
-        self, w: ArrayLike, sources: int, y: NDArray | None, u: NDArray | None, e: NDArray | None
-    ) -> ComplexArray:
-        """`prediction_gradient` with the polynomials of the predictor alone; None stands for nothing."""
-        q = unit_circle(w)
-        gradient = np.zeros((q.size, len(self.parameters), self.outputs, sources), dtype=complex)
-        C, D = ([evaluate(row, q) for row in self.per_output(rows)] for rows in (self.C, self.D))
-        letters = {parameter.letter for parameter in self.parameters}
-        noise: dict[tuple[str, int], ComplexArray] = {}
-        for i in range(self.outputs):
-            if y is not None and "a" in letters:
-                noise["a", i] = (-D[i] / C[i])[:, None] * y[:, i]
-            if e is not None and "c" in letters:
-                noise["c", i] = e[:, i] / C[i][:, None]
-            if e is not None and "d" in letters:
-                noise["d", i] = -e[:, i] / D[i][:, None]
-        plant: dict[tuple[str, int, int], ComplexArray] = {}
-        for i, j in self.active:
-            if u is None:
-                break
-            F = evaluate(self.F[i][j], q)
-            filtered = D[i] / (C[i] * F)
-            plant["b", i, j] = filtered[:, None] * u[:, j]
-            if "f" in letters:
-                plant["f", i, j] = (-filtered * evaluate(self.B[i][j], q) / F)[:, None] * u[:, j]
-        for index, parameter in enumerate(self.parameters):
-            if parameter.letter in "bf":
-                i, j = parameter.places[0]
-                if (parameter.letter, i, j) in plant:
-                    gradient[:, index, i] = (q**parameter.power)[:, None] * plant[parameter.letter, i, j]
-                continue
-            for i in {place[0] for place in parameter.places}:
-                if (parameter.letter, i) in noise:
-                    gradient[:, index, i] = (q**parameter.power)[:, None] * noise[parameter.letter, i]
-        return gradient
+        return _gradients([self], w, y.shape[2], y[None], u[None], e[None])[0]
 
     def at(self, theta: ArrayLike, covariance: Array | None = None) -> PolynomialModel:
         """The same structure with parameters (k,) and, if given, noise covariance (p, p) of its own."""
@@ -310,3 +285,70 @@ class PolynomialModel(Parametrised):
             for i, (a, fs) in enumerate(zip(self.per_output(self.A), self.F, strict=True))
         ]
         return tuple(all(np.all(np.abs(roots_in_z(p)) < 1.0) for p in row) for row in rows)
+
+
+@input_gradients.register
+def _input_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
+    """(S, n, k, p, r): those of models of one structure."""
+    G = np.stack([model.plant_at(w) for model in models]) if first.outputs_count else None
+    u = np.eye(first.inputs, dtype=complex)[None, None]
+    return _gradients(models, w, first.inputs, G, u, None)
+
+
+@noise_gradients.register
+def _noise_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], w: ArrayLike) -> ComplexArray:
+    """(S, n, k, p, p): those of models of one structure."""
+    H = np.stack([model.noise_at(w) for model in models]) if first.outputs_count else None
+    e = np.eye(first.outputs, dtype=complex)[None, None]
+    return _gradients(models, w, first.outputs, H, None, e)
+
+
+def _gradients(
+    models: Sequence[PolynomialModel],
+    w: ArrayLike,
+    sources: int,
+    y: NDArray | None,
+    u: NDArray | None,
+    e: NDArray | None,
+) -> ComplexArray:
+    """(S, n, k, p, m): `prediction_gradient` of models of one structure, by the polynomials of the predictor.
+
+    Args:
+        y, u, e: (S, n, p or r, m); None stands for nothing, and a length of one for the same everywhere.
+    """
+    first, q = models[0], unit_circle(w)
+    gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)
+
+    def values(polynomials: Iterable[Array]) -> ComplexArray:
+        return evaluate(np.array(list(polynomials)), q)[:, None]
+
+    C = [values(m.per_output(m.C)[i] for m in models) for i in range(first.outputs)]
+    D = [values(m.per_output(m.D)[i] for m in models) for i in range(first.outputs)]
+    y, u, e = (x if x is None else x.transpose(0, 2, 3, 1) for x in (y, u, e))
+    noise: dict[tuple[str, int], ComplexArray] = {}
+    for i in range(first.outputs):
+        if y is not None and "a" in first.letters:
+            noise["a", i] = (-D[i] / C[i]) * y[:, i]
+        if e is not None and "c" in first.letters:
+            noise["c", i] = e[:, i] / C[i]
+        if e is not None and "d" in first.letters:
+            noise["d", i] = -e[:, i] / D[i]
+    plant: dict[tuple[str, int, int], ComplexArray] = {}
+    for i, j in first.active:
+        if u is None:
+            break
+        F = values(m.F[i][j] for m in models)
+        filtered = D[i] / (C[i] * F)
+        plant["b", i, j] = filtered * u[:, j]
+        if "f" in first.letters:
+            plant["f", i, j] = (-filtered * values(m.B[i][j] for m in models) / F) * u[:, j]
+    for index, parameter in enumerate(first.parameters):
+        if parameter.letter in "bf":
+            i, j = parameter.places[0]
+            if (parameter.letter, i, j) in plant:
+                gradient[:, index, i] = power(q, parameter.power) * plant[parameter.letter, i, j]
+            continue
+        for i in {place[0] for place in parameter.places}:
+            if (parameter.letter, i) in noise:
+                gradient[:, index, i] = power(q, parameter.power) * noise[parameter.letter, i]
+    return gradient.transpose(0, 4, 1, 2, 3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.runs.run_directory import read_run
-from tests.support.campaigns import SPEC, applied, planned, written
+from tests.support.campaigns import SPEC, answered, applied, planned, written
 from tests.support.commands import caller
 
 
@@ -91,6 +91,23 @@ def test_a_record_at_another_scale_is_refused(run, begun, tmp_path, scale):
     assert "record-other-scale" in err
     assert f"{scale:g} times" in err
     assert run("next", "c", record, "--as-applied", "--no-figures")[0] == 0
+
+
+@pytest.mark.parametrize("missing", [0, 4])
+def test_a_record_of_an_earlier_plan_is_refused(run, begun, tmp_path, missing):
+    """The input of the pilot, applied again with other noise, where the second plan is due."""
+    run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")
+    times, u = np.loadtxt(begun / "plan_01.csv", delimiter=",", skiprows=1).T[:, missing:]
+    record = written(tmp_path / "again.csv", times, u, answered(u, seed=11))
+    code, _, err = run("next", "c", record)
+    assert code == 2
+    assert "record-other-part" in err
+    assert "again.csv is plan_01.csv, not plan_02.csv" in err
+    code, out, _ = run("next", "c", record, "--as-applied", "--no-figures", "--json")
+    assert code == 0
+    assert any("plan_01.csv once more, not plan_02.csv" in note for note in json.loads(out)["notes"])
+    # What is due is never taken for something else, with rows missing or not.
+    assert run("next", "c", applied(begun, tmp_path / "r3.csv"), "--no-figures")[0] == 0
 
 
 def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_path):

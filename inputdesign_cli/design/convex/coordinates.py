@@ -12,7 +12,7 @@ from inputdesign_cli.design.convex.limits import implied_power
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.design.convex.white import least_white_power
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import Experiment, jointly_whitened
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.spectrum import LinesBasis, flat_basis
 
@@ -56,7 +56,7 @@ def balanced_powers(question: Question, power: float) -> Array:
 
 def whitened_problem(question: Question, powers: Array) -> Problem:
     """The problem in coordinates where flat excitation of these powers gives M = I, each plant in its own."""
-    whitened = [one.experiment.whitened(powers) for one in question.plants]
+    whitened = jointly_whitened([one.experiment for one in question.plants], powers)
     return _restated(_stated(question, question.experiment), question, whitened)
 
 

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, worst
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.accuracy import Criterion, Requirement, Violation, criterion_of, inverse_factor, worst
+from inputdesign_cli.information import Experiment, joint_noise
 from inputdesign_cli.plant.polynomial import Array
 
 RequirementFactory = Callable[[Experiment], Requirement]
@@ -40,39 +40,45 @@ class Asked:
 
 @dataclass
 class _Seen:
-    """The ratios (S,) that scenarios had at most, and K (S, k, k) with K M K^T = I there.
+    """The ratios (S,) that scenarios had at most, and with which information (S, k, k) that was.
 
     Ratios fall as information grows: where M_s >= c times what it was, the ratio is at most 1 / sqrt(c) of
-    what it was. Most of many scenarios need not be looked at again.
+    what it was. Most of many scenarios need not be looked at again. `looked` are bounds by a look at each
+    scenario, `searched` nearer ones where its maxima have been searched too.
     """
 
-    ratios: Array
-    roots: NDArray[np.float64] | None = None
+    looked: Array
+    searched: Array
+    informations: NDArray[np.float64] | None = None
 
     @classmethod
     def none(cls, number: int) -> _Seen:
         """Nothing is known yet."""
-        return cls(np.full(number, np.inf))
+        return cls(np.full(number, np.inf), np.full(number, np.inf))
 
-    def most(self, informations: NDArray[np.float64]) -> Array:
-        """(S,): the largest ratios that are possible with these M_s (S, k, k)."""
-        if self.roots is None:
-            return self.ratios.copy()
-        share = np.linalg.eigvalsh(self.roots @ informations @ self.roots.swapaxes(1, 2))[:, 0]
-        with np.errstate(divide="ignore"):
-            return np.where(share > 0.0, self.ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
-
-    def note(self, number: int, information: Array, ratio: float) -> None:
-        """What a scenario was found to have, at most."""
-        if self.roots is None:
-            self.roots = np.broadcast_to(
-                np.eye(len(information)), (self.ratios.size, *information.shape)
-            ).copy()
+    def most(self, informations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(2, S): the largest ratios that are possible with these M_s (S, k, k), looked and searched."""
+        ratios = np.stack([self.looked, self.searched])
+        if self.informations is None:
+            self.informations = np.broadcast_to(np.eye(informations.shape[1]), informations.shape).copy()
+            return ratios
         try:
-            self.roots[number] = np.linalg.inv(np.linalg.cholesky(information))
-            self.ratios[number] = ratio
-        except np.linalg.LinAlgError:
-            self.ratios[number] = np.inf
+            roots = inverse_factor(self.informations)
+        except np.linalg.LinAlgError:  # nothing follows from a matrix that is singular
+            return np.full_like(ratios, np.inf)
+        share = np.linalg.eigvalsh(roots @ informations @ roots.swapaxes(1, 2))[:, 0]
+        with np.errstate(divide="ignore"):
+            return np.where(share > 0.0, ratios / np.sqrt(np.maximum(share, 0.0)), np.inf)
+
+    def look(self, number: int, information: Array, ratio: float) -> None:
+        """What a scenario was found to have, at most, once `most` has been asked."""
+        assert self.informations is not None
+        self.informations[number] = information
+        self.looked[number] = self.searched[number] = ratio
+
+    def search(self, number: int, ratio: float) -> None:
+        """What the search for the maxima of the same scenario has found at most."""
+        self.searched[number] = min(self.searched[number], ratio)
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,11 @@ class Demands:
             for side, listed in ((False, scenario.requirements), (True, scenario.side))
             for requirement in listed
         )
+
+    @cached_property
+    def noise_informations(self) -> NDArray[np.float64]:
+        """(S, k, k): what the noise alone tells of each scenario, whatever is asked."""
+        return joint_noise([scenario.experiment for scenario in self.scenarios])
 
     def are_of(self, asked: Scenario, others: Sequence[Scenario]) -> bool:
         """Whether just this is asked of the same nominal plant, and the rest of the same other plants."""
@@ -129,10 +140,9 @@ class Demands:
         if len(self.scenarios) == 1:
             return list(self._violated(0, informations[0], above, side))
         found, bad = list[tuple[int, Violation]](), 0
-        for number in self._by_most(informations, side):
-            if not self._seen[int(side)].ratios[number] > above:
-                break
+        for number in self._by_most(informations, side, above):
             own = list(self._violated(number, informations[number], above, side))
+            self._seen[int(side)].search(number, max([above, *(v.ratio for _, v in own)]))
             found += own
             bad += bool(own)
             if few is not None and bad >= few:
@@ -142,29 +152,32 @@ class Demands:
     def largest(self, informations: NDArray[np.float64], *, default: float) -> float:
         """The largest ratio of the requirements, side ones left out; the default without any."""
         found: list[float] = []
-        for number in self._by_most(informations, False) if len(self.scenarios) > 1 else [0]:
-            if found and self._seen[0].ratios[number] <= max(found):
+        for number in self._by_most(informations, False, -np.inf) if len(self.scenarios) > 1 else [0]:
+            if found and self._seen[0].looked[number] <= max(found):
                 break  # the next ones are no larger
             found += [v.ratio for _, v in self._violated(number, informations[number], -np.inf, False)]
         return max(found, default=default)
 
-    def _by_most(self, informations: NDArray[np.float64], side: bool) -> Iterator[int]:
-        """The scenarios, those that may have the largest ratios first; what they may have at most is noted.
+    def _by_most(self, informations: NDArray[np.float64], side: bool, above: float) -> Iterator[int]:
+        """The scenarios that may have ratios above `above`, the largest first; what is possible is noted.
 
         A scenario is looked at when no other may have more, so that most of them never are.
         """
         seen = self._seen[int(side)]
-        waiting = [(-most, number, False) for number, most in enumerate(seen.most(informations).tolist())]
+        looked, searched = seen.most(informations)
+        waiting = [(-float(looked[n]), n, False) for n in np.flatnonzero(searched > above).tolist()]
         heapq.heapify(waiting)
         while waiting:
-            _, number, looked_at = heapq.heappop(waiting)
+            most, number, looked_at = heapq.heappop(waiting)
+            if not -most > above:
+                return
             if looked_at:
                 yield number
                 continue
             asked = [self.asked[index] for index in self._asked_of[number]]
             own = [a.requirement.most(informations[number]) for a in asked if a.side == side]
-            seen.note(number, informations[number], max(own, default=0.0))
-            heapq.heappush(waiting, (-float(seen.ratios[number]), number, True))
+            seen.look(number, informations[number], max(own, default=0.0))
+            heapq.heappush(waiting, (-float(seen.looked[number]), number, True))
 
     def _violated(
         self, number: int, information: Array, above: float, side: bool

@@ -29,10 +29,10 @@ from inputdesign_cli.design.convex.limits import (
     breach_ratio,
     breaches_at,
 )
-from inputdesign_cli.information import Experiment, PowerKind
+from inputdesign_cli.information import Experiment, PowerKind, joint_information, mean_cost
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, Functional, weighted_mean
+from inputdesign_cli.spectrum import Basis, Functional
 
 Goal = Literal["cost", "factor", "samples"]
 
@@ -117,8 +117,8 @@ class Problem:
         _ = grown.demands, grown.gradients, grown.information_maps
         for key in self._powers:
             grown.power(*key)
-        for number in self._costs:
-            grown._cost_of(number)
+        for plants in self._costs:
+            grown._cost_of(plants)
         grown._before.clear()
         return grown
 
@@ -145,17 +145,11 @@ class Problem:
     @cached_property
     def information_maps(self) -> NDArray[np.float64]:
         """(size, S, k, k): M_si, the information of each basis function at each scenario."""
-
-        def integrals(basis: Basis) -> NDArray[np.float64]:
-            found = np.empty((basis.size, len(self.scenarios), *2 * (self.experiment.size,)))
-            for number, scenario in enumerate(self.scenarios):
-                at = scenario.experiment
-                found[:, number] = basis.integrals(
-                    at.information_density, at.singularities, at.information_factor
-                )
-            return found
-
-        return self._along(lambda problem: problem.information_maps, integrals)
+        experiments = [scenario.experiment for scenario in self.scenarios]
+        return self._along(
+            lambda problem: problem.information_maps,
+            lambda basis: joint_information(experiments, basis.integrals),
+        )
 
     @property
     def information_map(self) -> NDArray[np.float64]:
@@ -165,12 +159,16 @@ class Problem:
     @cached_property
     def baselines(self) -> NDArray[np.float64]:
         """(S, k, k): M0_s, what is known of each scenario without excitation."""
-        return np.array([scenario.experiment.baseline_information for scenario in self.scenarios])
+        return self.demands.noise_informations + self._priors
+
+    @property
+    def _priors(self) -> NDArray[np.float64]:
+        return np.array([scenario.experiment.prior_information for scenario in self.scenarios])
 
     @property
     def baseline_information(self) -> Array:
         """(k, k): M0 of the nominal plant."""
-        return self.experiment.baseline_information
+        return self.baselines[0]
 
     def informations(self, x: Array) -> NDArray[np.float64]:
         """(S, k, k): M_s(x)."""
@@ -190,7 +188,7 @@ class Problem:
         if self.goal == "cost":
             return self.baselines
         if self.goal == "samples":
-            return np.array([scenario.experiment.prior_information for scenario in self.scenarios])
+            return self._priors
         return np.zeros_like(self.baselines)
 
     @cached_property
@@ -199,14 +197,14 @@ class Problem:
         if self.goal == "cost":
             return np.zeros_like(self.baselines)
         if self.goal == "samples":
-            return np.array([scenario.experiment.noise_information for scenario in self.scenarios])
+            return self.demands.noise_informations
         return self.baselines
 
     @cached_property
     def price(self) -> Functional:
         """What x is measured by: the mean of the costs, or where none is sought powers over limits."""
         if self.goal == "cost":
-            return self.costs[0] if len(self.costs) == 1 else self._mean(self.costs)
+            return self.costs[0] if len(self.costs) == 1 else self._cost_of(self.paying)
         parts = [self._limited(limit) * (1.0 / limit.bound) for limit in self.limits if limit.upper]
         return sum(parts[1:], start=parts[0])
 
@@ -217,18 +215,15 @@ class Problem:
         if self.paid == "nominal" or not self._others_pay:
             parts = [self.power(kind, channel) * weight for kind, channel, weight in weights]
             return (sum(parts[1:], start=parts[0]),)
-        each = tuple(self._cost_of(number) for number in self.paying)
-        return each if self.paid == "worst" else (self._mean(each),)
+        if self.paid == "worst":
+            return tuple(self._cost_of(range(number, number + 1)) for number in self.paying)
+        return (self._cost_of(self.paying),)
 
     @property
     def _others_pay(self) -> bool:
         """Whether there are other plants at which the cost may be another."""
         kinds = (kind for kind, _, _ in weights_of(self.cost))
         return bool(self.others) and any(self.experiment.depends_on_plant(kind) for kind in kinds)
-
-    @staticmethod
-    def _mean(costs: tuple[Functional, ...]) -> Functional:
-        return weighted_mean(costs, np.full(len(costs), 1.0 / len(costs)))
 
     @property
     def paying(self) -> range:
@@ -239,25 +234,25 @@ class Problem:
         """What a spectrum costs (goal "cost")."""
         return max(cost.at(x) for cost in self.costs)
 
-    def _cost_of(self, scenario: int) -> Functional:
-        """The cost at one plant."""
-        known = self._costs.get(scenario)
+    def _cost_of(self, scenarios: range) -> Functional:
+        """The mean of the costs at these plants."""
+        known = self._costs.get(scenarios)
         if known is not None:
             return known
-        plant, weights = self.scenarios[scenario].experiment, weights_of(self.cost)
+        plants, weights = [self.scenarios[n].experiment for n in scenarios], weights_of(self.cost)
 
         def density(w: Array) -> NDArray:
-            return plant.cost_density(weights, w)
+            return mean_cost(plants, weights, w)
 
+        near = np.concatenate([plant.singularities for plant in plants])
         vector = self._along(
-            lambda problem: problem._cost_of(scenario).vector,
-            lambda basis: basis.integrals(density, plant.singularities),
+            lambda problem: problem._cost_of(scenarios).vector, lambda basis: basis.integrals(density, near)
         )
-        self._costs[scenario] = Functional(vector, density)
-        return self._costs[scenario]
+        self._costs[scenarios] = Functional(vector, density)
+        return self._costs[scenarios]
 
     @cached_property
-    def _costs(self) -> dict[int, Functional]:
+    def _costs(self) -> dict[range, Functional]:
         return {}
 
     def power(self, kind: PowerKind, channel: int | None = None, scenario: int = 0) -> Functional:

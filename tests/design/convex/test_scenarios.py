@@ -9,6 +9,7 @@ import pytest
 
 from inputdesign_cli import parse_spec
 from inputdesign_cli.accuracy import Criterion
+from inputdesign_cli.design.convex.demands import Demands
 from inputdesign_cli.design.convex.designs import solve_design
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Alternative, Question
@@ -189,3 +190,30 @@ def test_what_was_seen_belongs_to_the_plants_that_it_was_seen_of(first_order):
     elsewhere = dataclasses.replace(problem, experiment=problem.experiment.whitened(1.0))
     assert elsewhere.scenarios[0].experiment is elsewhere.experiment
     assert problem.with_requirements(lambda _: ()).scenarios[0].requirements == ()
+
+
+@pytest.mark.parametrize("above", [0.3, 1.0, -np.inf])
+def test_what_was_seen_before_hides_no_violation(first_order, above):
+    """Spectra one after the other, stronger and weaker: the violations of each scenario by itself."""
+    others = alternatives(first_order, around(first_order, 12, 0.05, seed=1), 0.1)
+    problem = solve_design(question(first_order, others), tolerance=1e-4).problem
+    demands, rng = Demands(problem.scenarios), np.random.default_rng(2)
+    start = problem.basis.even
+    for scale in (0.05, 0.1, 0.101, 0.2, 0.5, 0.1, 0.02, 0.0201):
+        taps = rng.normal(size=9)
+        x = scale * (start + 0.02 * np.correlate(taps, taps, mode="full")[8:])
+        informations = problem.informations(x)
+        found = demands.violations(informations, above=above)
+        alone = [
+            (number, violation)
+            for number, (one, told) in enumerate(zip(problem.scenarios, informations, strict=True))
+            for violation in one.requirements[0].violations(told, above=above)
+        ]
+        assert sorted((n, v.ratio, v.frequency) for n, v in found) == sorted(
+            (n, v.ratio, v.frequency) for n, v in alone
+        )
+        few = demands.violations(informations, above=above, few=2)
+        worst = [max((v.ratio for n, v in alone if n == number), default=0.0) for number, _ in few]
+        assert bool(few) == bool(alone)
+        if few:
+            assert max(worst) == max(v.ratio for _, v in alone)

@@ -1,0 +1,148 @@
+"""What several plants tell, and cost, under the same spectra: they share nodes and what is the same there.
+
+Much of the time of an integral goes into its nodes and into what the spectra are there. Both are nearly the
+same for plants that are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
+from inputdesign_cli.information.noise import told_by_noise
+from inputdesign_cli.plant import excited, input_gradients, noise_gradients
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+# Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
+_AT_A_NODE = 256
+# Frequencies of all plants that are looked at in one go, for the same reason.
+_AT_ONCE = 2**13
+
+Integrals = Callable[[Callable[[Array], NDArray], ComplexArray, Callable[[Array], NDArray] | None], NDArray]
+"""The integrals (size, ...) of a density with these singularities and this factor, see `Basis.integrals`."""
+
+
+def jointly_whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
+    """Each in coordinates where M = I by this power, see `Experiment.whitened`."""
+    return [whitened for group in _groups(experiments) for whitened in _whitened(group, power)]
+
+
+def _whitened(experiments: Sequence[Experiment], power: float | Array) -> list[Experiment]:
+    first = experiments[0]
+    if len(experiments) == 1:
+        return [first.whitened(power)]
+    excited, around = first.flat_rules(_singularities(experiments))
+    F = _excitation_gradients(experiments, excited.nodes)
+    V = _noise_gradients(experiments, around.nodes) if first.told_by_noise else None
+    return [
+        experiment.whitened_by(
+            power, (excited, experiment.noise_whitener[0, 0] * F[s]), (around, None if V is None else V[s])
+        )
+        for s, experiment in enumerate(experiments)
+    ]
+
+
+def joint_noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
+    """(S, k, k): `noise_information` of each."""
+    return np.concatenate([_noise(group) for group in _groups(experiments)])
+
+
+def _noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
+    first, number = experiments[0], len(experiments)
+    if number == 1 or not first.told_by_noise:
+        return np.stack([experiment.noise_information for experiment in experiments])
+    whiteners = np.array([experiment.from_raw for experiment in experiments])
+
+    def gradients(w: Array) -> ComplexArray:
+        columns = whiteners @ _noise_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
+        return columns.transpose(2, 0, 1)[..., None, None]
+
+    told = told_by_noise(gradients, _singularities(experiments), number * first.size)
+    return np.asarray(first.samples * told)
+
+
+def joint_information(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
+    """(size, S, k, k): what each of the basis functions tells of each."""
+    return np.concatenate([_together(group, integrals) for group in _groups(experiments)], axis=1)
+
+
+def mean_cost(
+    experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
+) -> NDArray:
+    """(n,) or (n, r, r): the mean over plants of one structure of the density of a weighted sum of powers.
+
+    Args:
+        weights: each of a kind and of a channel or all.
+    """
+    number = max(_AT_ONCE // max(w.size, 1), 1)
+    parts = [experiments[start : start + number] for start in range(0, len(experiments), number)]
+    return np.asarray(sum(_cost(part, weights, w) for part in parts) / len(experiments))
+
+
+def _cost(
+    experiments: Sequence[Experiment], weights: Sequence[tuple[PowerKind, int | None, float]], w: Array
+) -> NDArray:
+    """The sum over the plants."""
+    first, total = experiments[0], np.zeros(())
+    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
+    y, u = excited(loops, w) if loops else (None, None)
+    for kind, channel, weight in weights:
+        caused = y if kind == "output" else u
+        if not first.depends_on_plant(kind):
+            total = total + weight * len(experiments) * first.power_density(kind, w, channel)
+        elif caused is None:
+            total = total + weight * sum(one.power_density(kind, w, channel) for one in experiments)
+        else:
+            rows = of_channel(caused, channel)
+            total = total + weight * first.squeezed(np.einsum("snpa,snpb->nab", rows.conj(), rows))
+    return total
+
+
+def _groups(experiments: Sequence[Experiment]) -> list[Sequence[Experiment]]:
+    """Experiments whose integrals are one: those of several channels are large enough each by itself."""
+    first = experiments[0]
+    channels = first.model.outputs * first.inputs
+    number = max(_AT_A_NODE // first.size**2, 1) if channels == 1 else 1
+    return [experiments[start : start + number] for start in range(0, len(experiments), number)]
+
+
+def _singularities(experiments: Sequence[Experiment]) -> ComplexArray:
+    return np.concatenate([experiment.singularities for experiment in experiments])
+
+
+def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArray[np.float64]:
+    first = experiments[0]
+    if len(experiments) == 1:
+        return integrals(first.information_density, first.singularities, first.information_factor)[:, None]
+
+    whiteners = np.array([np.sqrt(e.samples) * e.noise_whitener[0, 0] * e.from_raw for e in experiments])
+
+    def density(w: Array) -> NDArray[np.float64]:
+        columns = whiteners @ _excitation_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
+        real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
+        products = real[:, :, None] * real[:, None]
+        products += imaginary[:, :, None] * imaginary[:, None]
+        return products.transpose(3, 0, 1, 2)
+
+    return integrals(density, _singularities(experiments), None)
+
+
+def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
+    """(S, n, k, p, r): what x contributes to the gradients of the predictions, in raw parameters."""
+    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
+    if loops:
+        return np.stack([loop.excitation_gradient(w) for loop in loops])
+    models = [experiment.model for experiment in experiments]
+    return input_gradients(models[0], models, w)
+
+
+def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
+    """(S, n, k, p, p): what e contributes."""
+    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
+    if loops:
+        return np.stack([loop.noise_gradient(w) for loop in loops])
+    models = [experiment.model for experiment in experiments]
+    return noise_gradients(models[0], models, w)
