@@ -79,7 +79,7 @@ def run_page(run: Path, trail: Trail, *, pictures: bool = True) -> dict[str, Jso
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
         raise DataError.because("run-unreadable", message, hint="run the spec again") from error
-    charts = run_charts(run, result, question.time_unit, closed_loop=question.closed_loop) if pictures else {}
+    charts = run_charts(run, result, question.time_unit) if pictures else {}
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
