@@ -39,14 +39,13 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
         (line,) = record.plot(time, values[:shown], color=BLUE, linewidth=0.9, drawstyle=style)
         handles.setdefault("to be applied, held between samples" if curves.held else "to be applied", line)
         _name(record, name, curves.labels.get(name, ""), "")
-        _draw_histogram(histogram, values)
         limits = curves.limits.get(name, ())
         for bound, axes in ((bound, axes) for bound in limits for axes in (record, histogram)):
             handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
         if name in curves.moves:
             record.set_title("largest move {:.4g}, limit {:.4g}".format(*curves.moves[name]), loc="left")
         _frame(record, values, *limits)
-        histogram.set_ylim(record.get_ylim())
+        _draw_histogram(histogram, values, record.get_ylim())
     for panel, (below, beside) in zip(predicted, grid[len(channels) :], strict=True):
         _draw_predicted(below, time, panel, handles)
         beside.set_axis_off()
@@ -90,12 +89,18 @@ def _frame(axes: Axes, *shown: Array | float) -> None:
     """The limits of an axis about what is shown."""
     reached = list(chain.from_iterable((np.min(part), np.max(part)) for part in shown))
     low, high = float(min(reached)), float(max(reached))
-    if high > low:
-        axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
+    if high == low:  # a constant is seen beside zero
+        low, high = (min(low, 0.0), max(high, 0.0)) if high else (-1.0, 1.0)
+    axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
 
 
-def _draw_histogram(axes: Axes, values: Array) -> None:
+def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> None:
     weights = np.full(values.size, 100.0 / values.size)
     bins = min(40, max(10, int(np.sqrt(values.size))))
-    axes.hist(values, bins=bins, weights=weights, orientation="horizontal", color=BLUE, alpha=0.75)
+    ends = (float(values.min()), float(values.max()))
+    ends = ends if ends[1] > ends[0] else shown
+    axes.hist(
+        values, bins=bins, range=ends, weights=weights, orientation="horizontal", color=BLUE, alpha=0.75
+    )
     axes.tick_params(labelleft=False)
+    axes.set_ylim(shown)
