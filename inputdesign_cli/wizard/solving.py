@@ -11,6 +11,7 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.composing import Draft
+from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.phrases import short
 
 _GAP, _MOST_LINES = 0.02, 240
@@ -24,7 +25,8 @@ def enough_lines(draft: Draft, solve: Solve) -> Draft:
     """The draft with as many sinusoids as come within 2 % of every spectrum, at the plant as stated."""
     while draft.lines is not None:
         nominal = draft.spec().with_(uncertainty=None, **{"signal.candidates": 1})
-        objective = solve(nominal)["objective"]
+        with in_their_words(draft.said):
+            objective = solve(nominal)["objective"]
         best = objective.get("any_spectrum_bound")
         if best is None:
             return draft.with_lines(draft.lines, "sinusoids; how near to every spectrum was not computed")
