@@ -47,7 +47,7 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
         _frame(record, values, *limits)
         _draw_histogram(histogram, values, record.get_ylim())
     for panel, (below, beside) in zip(predicted, grid[len(channels) :], strict=True):
-        _draw_predicted(below, time, panel, handles)
+        _draw_predicted(below, time, panel, handles, levels=curves.levels)
         beside.set_axis_off()
     for record, _ in grid[:-1]:
         record.tick_params(labelbottom=False)
@@ -71,17 +71,21 @@ def _name(axes: Axes, name: str, label: str, what: str) -> None:
     axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
 
 
-def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, handles: dict[str, Artist]) -> None:
+def _draw_predicted(
+    axes: Axes, time: Array, panel: PredictedPanel, handles: dict[str, Artist], *, levels: bool
+) -> None:
     y, noise = panel.values[: time.size], _BAND * panel.deviation[: time.size]
     grows = bool(noise[0] < noise[-1])
     band = axes.fill_between(time, y - noise, y + noise, color=GREY, alpha=0.3, linewidth=0)
     since = " since the start" if grows else ""
     handles.setdefault(f"± 2 standard deviations of noise{since}", band)
     (line,) = axes.plot(time, y, color=GREEN, linewidth=1.0)
-    handles.setdefault("predicted output, from rest", line)
+    # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
+    said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
+    handles.setdefault(said, line)
     for bound in panel.limits or ():
         handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
-    _name(axes, panel.name, panel.label, "")
+    _name(axes, panel.name, panel.label, "Δ " if levels else "")
     _frame(axes, y - noise, y + noise, *(panel.limits or ()))
 
 
