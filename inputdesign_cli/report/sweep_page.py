@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -90,7 +91,8 @@ def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str
 
 
 def _answer(table: SweepTable) -> str:
-    statuses = ", ".join(f"{n} {status}" for status, n in table.summary.get("statuses", {}).items())
+    # While the sweep goes on the table is ahead of the summary.
+    statuses = ", ".join(f"{n} {status}" for status, n in sorted(Counter(table.columns["status"]).items()))
     said = f"{table.rows} points: {statuses}."
     found = table.best
     if found is None:
@@ -105,7 +107,7 @@ def _answer(table: SweepTable) -> str:
 
 def _charts(table: SweepTable) -> list[Chart]:
     captions = {
-        "curves": "The result over one key; dashed: the proved bound that no design whatever passes.",
+        "curves": "The result over one key; dashed: the proved bound that no design passes.",
         "map": "The result over both keys; hatched where a point has none.",
         "moments": "The second moments of the regressors over the key.",
     }
