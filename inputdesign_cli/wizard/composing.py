@@ -14,7 +14,7 @@ from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import bad_answer, complete
 from inputdesign_cli.wizard.wishes import wished
 
-_MOST, _LEAST = 5000, 50
+_MOST, LEAST = 5000, 50  # samples
 _PLANTS, _FRESH = 30, 200
 _FIRST = 60  # sinusoids
 
@@ -92,9 +92,9 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     span, there = input_range(said["range"]), seconds(said["time"], "time")
     plant = plant or understand_plant(said["plant"], stem, folder)
     step = plant.sample_time
-    if there < _LEAST * step:
+    if there < LEAST * step:
         why = "as it is recorded" if plant.sampling is not None else "a twentieth of the time constant"
-        told = f"{short(there)} s are less than {_LEAST} samples, one every {short(step)} s ({why})"
+        told = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
         raise bad_answer("time", told)
     duration = min(there, _MOST * step)
     controller = loop_line(said["loop"], plant)
