@@ -54,7 +54,7 @@ def keep(run: Path, **figures: str) -> None:
 def illustration_1(folder: Path) -> None:
     """Estimate, design, experiment, estimate again."""
     spec = str(SPECS / "first_order.yaml")
-    u = np.sqrt(0.1) * np.random.default_rng(7).standard_normal(100)
+    u = np.sqrt(0.1) * np.random.default_rng(7).standard_normal(400)
     initial = record(folder / "initial.csv", u, seed=8)
     idesign("identify", str(initial), "--spec", spec, "-o", str(folder / "initial"))
     blocks = (folder / "initial" / "model.yaml").read_text(encoding="utf-8").split("\n# Covariance")[0]

@@ -58,6 +58,8 @@ def tell_trade(
         write_bytes(directory / "trade.png", rendered(lambda page: draw_trade(found, page)))
     if not quiet:
         typer.echo("\n" + trade_table(found))
+        if not found.criterion:
+            typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")
         typer.echo(f"\nfiles   {directory}: trade.png, sweep.csv, sweep.yaml")
     return found
 

@@ -92,7 +92,6 @@ def _follow_spec(
                 board.show(followed.page)
                 if figures and stamp(files) == before:
                     keep(results, place, figures=True, json_output=False, quiet=True)
-                    followed = solved()
         except IdesignError as error:
             followed = followed.failed(error, lines, str(spec))
         if stamp(files) == before:
@@ -147,5 +146,5 @@ def _follow_directory(directory: Path, board: Board) -> None:
         except IdesignError as error:
             points = sum(1 for _ in (directory / "points").glob("*/result.json"))
             told = f"{points} points have a result so far." if points else error.diagnostics[0].message
-            board.show(message_page(directory.name, told))
+            board.show(message_page(directory.name, told, "shows what comes"))
         wait_for_change(records, before)

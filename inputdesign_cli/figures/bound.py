@@ -32,6 +32,8 @@ from inputdesign_cli.runs.results import Array
 
 # Ratios beyond this many times the limit, or the design, run out of the linear panel.
 _HIGHEST = 4.0
+# A gain below this many times the least error is drawn there.
+_FAR = 1e-2
 
 
 def draw_bound(page: Figure, curves: BoundCurves, time_unit: str) -> None:
@@ -55,7 +57,9 @@ def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
     if curves.r_adm is not None:
         handles += plot_admitted(axes, w, curves.r_adm)
     else:
-        handles += axes.plot(w, positive(curves.G_abs), color=BLACK, linewidth=1.2, label="|G|")
+        least = _FAR * min(float(np.nanmin(positive(error.values))) for error in _drawn(curves))
+        gain = np.maximum(curves.G_abs, least)  # one that vanishes would stretch the axis without end
+        handles += axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
         handles += marked(axes, curves.active, height, color=BLUE, label=_limiting(curves.active))

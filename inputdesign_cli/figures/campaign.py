@@ -37,7 +37,7 @@ def draw_campaign(page: Figure, curves: CampaignCurves, time_unit: str) -> None:
     upper.set_ylabel("worst ratio")
     lower.plot(curves.samples, curves.energy, "o-", color=BLUE, markersize=4)
     lower.set_ylim(bottom=0.0)
-    lower.set_ylabel("energy")
+    lower.set_ylabel("energy applied")
     lower.set_xlabel("samples applied")
     if 2 * curves.samples[-1] > curves.end:
         lower.axvline(curves.end, color=BLACK, linestyle=DASHED)
@@ -101,7 +101,7 @@ def draw_true_ratio(page: Figure, curves: RatioCurves, time_unit: str) -> None:
             else Line2D([], [], color=colour, label=label)
         )
     axes.axvline(1.0, color=BLACK, linestyle=DASHED)
-    axes.set_xlabel("largest r_u / r_adm of the true plant (beyond the last bin: in it)")
+    axes.set_xlabel("largest r_u / r_adm of the true plant\n(beyond the last bin: in it)")
     axes.set_ylabel("share of the runs (%)")
     legend_over_all(page, handles)
 
@@ -120,7 +120,7 @@ def draw_trade(page: Figure, curves: TradeCurves, time_unit: str) -> None:
     handles.append(Line2D([], [], color=BLACK, linestyle=DASHED, label="knows the plant"))
     if max(dear for _, _, dear, *_ in curves.points.values()) > WIDE:
         plain_decades(axes, "x")
-    axes.set_xlabel("cost over that of the design that knows the plant (mean, 5 to 95 %)")
+    axes.set_xlabel("cost over that of the design that knows the plant\n(mean, 5 to 95 %)")
     axes.set_ylabel("runs within r_adm (%), 95 % limits")
     axes.set_ylim(top=101.0)
     legend_over_all(page, handles)

@@ -92,9 +92,10 @@ def draw_residuals(page: Figure, curves: ResidualCurves, time_unit: str) -> None
         grid[0][j].set_title(f"with {name}", color=GREY)
         grid[-1][j].set_xlabel("lag (samples)")
     page.suptitle(
-        f"correlations of the residuals; probabilities {curves.whiteness:.2g} (among each other), "
+        f"correlations of the residuals; probabilities\n{curves.whiteness:.2g} (among each other), "
         f"{curves.independence:.2g} (with inputs)",
-        fontsize=10,
+        x=0.01,
+        ha="left",
     )
 
 

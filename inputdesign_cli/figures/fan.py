@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from inputdesign_cli.figures.style import (
     BLACK,
@@ -29,11 +30,12 @@ def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
     w = curves.frequency
     rows = curves.ratios[:_MOST_LINES]
     width = 0.5 if len(rows) > 20 else 0.8
-    lines = axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
+    axes.plot(w, rows.T, color=GREY, linewidth=width, alpha=0.45)
     handles = []
-    for line in lines[:1]:
-        line.set_label(f"{len(curves.ratios)} plants")
-        handles.append(line)
+    if len(rows):
+        largest = f"largest of {len(curves.ratios)} plants"
+        axes.plot(w, curves.ratios.max(axis=0), color=GREY, linewidth=width, label=largest)
+        handles.append(Line2D([], [], color=GREY, linewidth=0.8, label=f"{len(curves.ratios)} plants"))
     handles += axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
     named = list(curves.active.items())[:_MOST_NAMED]
     for (name, ratio), color in zip(named, PALETTE, strict=False):

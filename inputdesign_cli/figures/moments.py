@@ -6,9 +6,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE, legend_above, log_axes
+from inputdesign_cli.figures.style import (
+    BLACK,
+    BLUE,
+    DASHED,
+    GREY,
+    ORANGE,
+    frequency_label,
+    ink_on,
+    legend_above,
+    log_axes,
+)
 from inputdesign_cli.runs.curves import ErrorCurves, MomentsCurves
 
+_OPAQUE = 0.8
 NUMBERED = 8  # rows up to which the entries are written into the cells
 
 
@@ -19,18 +30,18 @@ def draw_moments(page: Figure, curves: MomentsCurves, time_unit: str) -> None:
         return
     matrix, lines = page.subplots(1, 2, width_ratios=[1, 1])
     _draw_matrix(matrix, curves)
-    lines.vlines(curves.line_frequency, 0.0, curves.line_power, color=ORANGE, linewidth=1.8)
-    lines.plot(curves.line_frequency, curves.line_power, "o", color=ORANGE, markersize=5)
+    lines.vlines(curves.line_frequency, 0.0, curves.line_power, color=BLUE, linewidth=1.8)
+    lines.plot(curves.line_frequency, curves.line_power, "o", color=BLUE, markersize=5)
     lines.set_xlim(-0.03 * curves.nyquist, 1.03 * curves.nyquist)
     lines.set_ylim(0.0, 1.08 * float(curves.line_power.max()))
-    lines.set_xlabel(f"frequency ω (rad/{time_unit})")
+    lines.set_xlabel(frequency_label(time_unit))
     lines.set_ylabel("power of each line (mean square)")
 
 
 def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
     R, n, m = curves.R, len(curves.R), curves.estimated
     largest = float(np.abs(R).max())
-    axes.imshow(R, cmap="RdBu", vmin=-largest, vmax=largest, alpha=0.8)
+    drawn = axes.imshow(R, cmap="RdBu", vmin=-largest, vmax=largest, alpha=_OPAQUE)
     axes.grid(False)
     axes.set_xticks(range(n), [str(i + 1) for i in range(n)])
     axes.set_yticks(range(n), [str(i + 1) for i in range(n)])
@@ -41,8 +52,8 @@ def _draw_matrix(axes: Axes, curves: MomentsCurves) -> None:
     axes.set_ylim(n - 0.5, -0.5)
     if n <= NUMBERED:
         for (i, j), value in np.ndenumerate(R):
-            colour = "w" if abs(value) > 0.6 * largest else BLACK
-            axes.text(j, i, f"{value:.3g}", ha="center", va="center", fontsize=8, color=colour)
+            colour = ink_on(drawn, value, _OPAQUE)
+            axes.text(j, i, f"{value:.3g}", ha="center", va="center", color=colour)
 
 
 def draw_error(page: Figure, curves: ErrorCurves, time_unit: str) -> None:

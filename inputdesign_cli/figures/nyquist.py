@@ -9,7 +9,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 from numpy.typing import NDArray
 
-from inputdesign_cli.figures.style import BLACK, BLUE, DASHED, GREY, ORANGE, legend_over_all, marked
+from inputdesign_cli.figures.readings import Traced
+from inputdesign_cli.figures.style import (
+    BLACK,
+    BLUE,
+    DASHED,
+    GREY,
+    ORANGE,
+    frequency_label,
+    legend_over_all,
+    marked,
+)
 from inputdesign_cli.runs.curves import NyquistCurves
 
 _DISCS = 36
@@ -42,7 +52,16 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
         linewidth=0.5,
     )
     axes.add_collection(discs, autolim=False)
-    handles: list[Artist] = list(axes.plot(L.real, L.imag, color=BLUE, linewidth=1.6, label="C G, nominal"))
+    told = {
+        "real part": L.real,
+        "imaginary part": L.imag,
+        "radius of its disc": radius,
+        "distance of the disc from −1": np.abs(1.0 + L) - radius,
+    }
+    line = Traced(L.real, L.imag, curves.frequency, frequency_label(time_unit), told, color=BLUE)
+    line.set_label("C G, nominal")
+    axes.add_line(line)
+    handles: list[Artist] = [line]
     handles.append(Patch(color=BLUE, alpha=0.3, label="where the data leave it (|C| r_u)"))
     if curves.circle is not None:
         axes.add_patch(Circle((-1.0, 0.0), curves.circle, color=ORANGE, alpha=0.07, linewidth=0))

@@ -71,7 +71,7 @@ def draw_panels(
         frequency_axis(axes, panel.frequency, time_unit)
         if single:
             axes.set_ylabel(magnitude)
-            axes.set_title(panel.names, loc="right", color=GREY)
+            title = ": ".join(filter(None, (title, panel.names)))
         else:
             axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
         if below is not None or any(row > i and column == j for row, column in places):

@@ -1,53 +1,118 @@
-"""What a drawn figure says along its horizontal axes, read back from it: one who points at it sees values."""
+"""What a drawn figure says along its curves, read back from it: one who points at it sees values."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.results import Array, Json
 
-# Fewer points are marks and limits; of more every so many are kept.
+# Fewer points without a line are marks; of more points every so many are kept.
 _FEWEST, _MOST = 20, 400
 
 
-def readings(page: Figure) -> list[dict[str, Json]]:
-    """Of a page that has been laid out: its panels with named curves over an axis.
+class Traced(Line2D):
+    """A curve in the plane along something else, such as a Nyquist plot along frequency.
 
-    `box` is left, top, width and height in shares of the page; `low` and `high` are the ends of the axis.
+    Args:
+        x, y: its points (n,).
+        along: what it goes along (n,), called `name`.
+        told: what is said of every point, (n,) by name.
+    """
+
+    def __init__(
+        self, x: Array, y: Array, along: Array, name: str, told: Mapping[str, Array], **style: Json
+    ) -> None:
+        super().__init__(x, y, **style)
+        self.along, self.name, self.told = along, name, told
+
+
+def readings(page: Figure) -> list[dict[str, Json]]:
+    """Of a page that has been laid out: its panels with named curves over an axis, or along one in the plane.
+
+    `box` is left, top, width and height in shares of the page; `low` and `high` are the ends of the axis. A
+    panel with a curve in the plane has its `path`, in shares of the panel from the left and from the top.
     """
     return [panel for panel in map(_panel, page.axes) if panel["curves"]]
 
 
 def _panel(axes: Axes) -> dict[str, Json]:
     place, (low, high) = axes.get_position(), axes.get_xlim()
-    lowest = next((other for other in reversed(axes.figure.axes) if other.get_xlabel()), axes)
+    lines = axes.get_lines()
+    box = [float(f"{v:.4f}") for v in (place.x0, 1.0 - place.y1, place.width, place.height)]
+    traced = next((line for line in lines if isinstance(line, Traced)), None)
+    if traced is not None:
+        return {"box": box, "log": False, "low": low, "high": high, **_along(axes, traced)}
     return {
-        "box": [float(f"{v:.4f}") for v in (place.x0, 1.0 - place.y1, place.width, place.height)],
+        "box": box,
         "log": axes.get_xscale() == "log",
         "low": float(low),
         "high": float(high),
-        "x": (axes.get_xlabel() or lowest.get_xlabel()).split(";")[0],
-        "y": axes.get_ylabel(),
-        "curves": list(_curves(axes)),
+        "x": _below(axes).split(";")[0],
+        "y": _beside(axes),
+        "curves": [curve for line in lines for curve in _curves(axes, line)],
     }
 
 
-def _curves(axes: Axes) -> Iterator[dict[str, Json]]:
-    for line in axes.get_lines():
-        name = str(line.get_label()).strip()
-        x, y = _points(line)
-        if name and not name.startswith("_") and x.size >= _FEWEST and np.all(np.diff(x) > 0.0):
-            kept = slice(None, None, -(-x.size // _MOST))
-            told = [[float(f"{v:.4g}") for v in values[kept].tolist()] for values in (x, y)]
-            yield {"name": name.split(": ")[0], "x": told[0], "y": told[1]}
+def _below(axes: Axes) -> str:
+    """What the horizontal axis is called: its own label, that of the lowest panel, or that of the page."""
+    page = axes.get_figure(root=True)
+    assert page is not None
+    lowest = next((other for other in reversed(page.axes) if other.get_xlabel()), axes)
+    return axes.get_xlabel() or page.get_supxlabel() or lowest.get_xlabel()
 
 
-def _points(line: Line2D) -> tuple[np.ndarray, np.ndarray]:
+def _beside(axes: Axes) -> str:
+    """What the vertical axis is called, and which panel it is of several."""
+    page = axes.get_figure(root=True)
+    assert page is not None
+    called = axes.get_ylabel() or page.get_supylabel()
+    several = axes.get_title(loc="left") if not axes.get_ylabel() else ""
+    return ", ".join(filter(None, (several, called)))
+
+
+def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, Json]]:
+    """A named curve over the axis; not a limit across it, and no marks."""
+    name = str(line.get_label()).strip()
+    if not name or name.startswith("_") or line.get_transform() != axes.transData:
+        return
+    x, y = _points(line)
+    fewest = _FEWEST if line.get_linestyle() in ("None", "none", "") else 2
+    if x.size >= fewest and np.all(np.diff(x) >= 0.0) and x[-1] > x[0]:
+        kept = _kept(x.size)
+        yield {"name": name.split(": ")[0], "x": _told(x[kept]), "y": _told(y[kept])}
+
+
+def _along(axes: Axes, line: Traced) -> dict[str, Json]:
+    """The points of a curve in the plane that are within the axes."""
+    x, y = (np.asarray(line.get_data()[k], dtype=float) for k in (0, 1))
+    across, down = axes.transAxes.inverted().transform(axes.transData.transform(np.stack([x, y], 1))).T
+    shown = np.flatnonzero((across >= 0.0) & (across <= 1.0) & (down >= 0.0) & (down <= 1.0))
+    shown = shown[_kept(shown.size)]
+    at = _told(line.along[shown])
+    return {
+        "x": line.name,
+        "y": str(line.get_label()),
+        "path": [_told(across[shown]), _told(1.0 - down[shown])],
+        "curves": [{"name": name, "x": at, "y": _told(values[shown])} for name, values in line.told.items()]
+        if shown.size
+        else [],
+    }
+
+
+def _kept(size: int) -> slice:
+    return slice(None, None, max(-(-size // _MOST), 1))
+
+
+def _told(values: Array) -> list[float]:
+    return [float(f"{v:.4g}") for v in values.tolist()]
+
+
+def _points(line: Line2D) -> tuple[Array, Array]:
     """The points (n,) of a curve at which it has a value."""
     x, y = (np.asarray(line.get_data()[k], dtype=float).ravel() for k in (0, 1))
     there = np.isfinite(x) & np.isfinite(y)

@@ -39,16 +39,15 @@ def draw_signal(page: Figure, curves: SignalCurves, time_unit: str) -> None:
         (line,) = record.plot(time, values[:shown], color=BLUE, linewidth=0.9, drawstyle=style)
         handles.setdefault("to be applied, held between samples" if curves.held else "to be applied", line)
         _name(record, name, curves.labels.get(name, ""), "")
-        _draw_histogram(histogram, values)
         limits = curves.limits.get(name, ())
         for bound, axes in ((bound, axes) for bound in limits for axes in (record, histogram)):
             handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
         if name in curves.moves:
             record.set_title("largest move {:.4g}, limit {:.4g}".format(*curves.moves[name]), loc="left")
         _frame(record, values, *limits)
-        histogram.set_ylim(record.get_ylim())
+        _draw_histogram(histogram, values, record.get_ylim())
     for panel, (below, beside) in zip(predicted, grid[len(channels) :], strict=True):
-        _draw_predicted(below, time, panel, handles)
+        _draw_predicted(below, time, panel, handles, levels=curves.levels)
         beside.set_axis_off()
     for record, _ in grid[:-1]:
         record.tick_params(labelbottom=False)
@@ -72,17 +71,21 @@ def _name(axes: Axes, name: str, label: str, what: str) -> None:
     axes.set_ylabel(f"{what}{symbol} {label}".strip() if nameless else f"{what}{label}")
 
 
-def _draw_predicted(axes: Axes, time: Array, panel: PredictedPanel, handles: dict[str, Artist]) -> None:
+def _draw_predicted(
+    axes: Axes, time: Array, panel: PredictedPanel, handles: dict[str, Artist], *, levels: bool
+) -> None:
     y, noise = panel.values[: time.size], _BAND * panel.deviation[: time.size]
     grows = bool(noise[0] < noise[-1])
     band = axes.fill_between(time, y - noise, y + noise, color=GREY, alpha=0.3, linewidth=0)
     since = " since the start" if grows else ""
     handles.setdefault(f"± 2 standard deviations of noise{since}", band)
     (line,) = axes.plot(time, y, color=GREEN, linewidth=1.0)
-    handles.setdefault("predicted output, from rest", line)
+    # The level of the output at rest is not known, that of the input is: one axis has levels, one deviations.
+    said = "predicted output, deviation Δ from rest" if levels else "predicted output, from rest"
+    handles.setdefault(said, line)
     for bound in panel.limits or ():
         handles["limits"] = axes.axhline(bound, color=ORANGE, linewidth=1.2, linestyle=DASHED)
-    _name(axes, panel.name, panel.label, "")
+    _name(axes, panel.name, panel.label, "Δ " if levels else "")
     _frame(axes, y - noise, y + noise, *(panel.limits or ()))
 
 
@@ -90,12 +93,18 @@ def _frame(axes: Axes, *shown: Array | float) -> None:
     """The limits of an axis about what is shown."""
     reached = list(chain.from_iterable((np.min(part), np.max(part)) for part in shown))
     low, high = float(min(reached)), float(max(reached))
-    if high > low:
-        axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
+    if high == low:  # a constant is seen beside zero
+        low, high = (min(low, 0.0), max(high, 0.0)) if high else (-1.0, 1.0)
+    axes.set_ylim(low - MARGIN * (high - low), high + MARGIN * (high - low))
 
 
-def _draw_histogram(axes: Axes, values: Array) -> None:
+def _draw_histogram(axes: Axes, values: Array, shown: tuple[float, float]) -> None:
     weights = np.full(values.size, 100.0 / values.size)
     bins = min(40, max(10, int(np.sqrt(values.size))))
-    axes.hist(values, bins=bins, weights=weights, orientation="horizontal", color=BLUE, alpha=0.75)
+    ends = (float(values.min()), float(values.max()))
+    ends = ends if ends[1] > ends[0] else shown
+    axes.hist(
+        values, bins=bins, range=ends, weights=weights, orientation="horizontal", color=BLUE, alpha=0.75
+    )
     axes.tick_params(labelleft=False)
+    axes.set_ylim(shown)

@@ -34,6 +34,7 @@ DASHES: tuple[LineStyleType, ...] = ("solid", (0, (4, 4)), (4, (4, 4)))
 NOTHING = 1e-9  # of the largest entry: below, and closer to another one, there is rounding only
 MOST = 6  # curves that stay apart in one panel
 FEW = 60  # lines that are drawn bold
+_BESIDE = 1.1
 
 
 def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
@@ -47,8 +48,8 @@ def draw_spectrum(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     axis = w
     if curves.lines:
         handles = _plot_lines(axes, w, power, curves)
-        if curves.band is not None and w.size:
-            axis = np.append(w, [w.min() / 3, curves.band[1]])
+        if w.size:
+            axis = _room(w) if curves.band is None else np.append(w, [w.min() / 3, curves.band[1]])
     else:
         record = None if curves.record is None else curves.record[shown, 0]
         handles = _plot_density(axes, w, power, record, curves)
@@ -82,8 +83,9 @@ def _plot_lines(axes: Axes, w: Array, power: Array, curves: SpectrumCurves) -> l
     total = f"sinusoids, total power {power.sum():.4g}"
     if curves.white is not None:
         total += f" (white: {curves.white:.4g})"
-    stems = axes.vlines(w, 0.0, power, color=ORANGE, linewidth=1.8 if few else 0.8, label=total)
-    axes.plot(w, power, linestyle="none", marker="o", markersize=5 if few else 2.5, color=ORANGE)
+    stems = axes.vlines(w, 0.0, power, color=BLUE, linewidth=1.8 if few else 0.8, label=total)
+    (heads,) = axes.plot(w, power, "o", color=BLUE, markersize=5 if few else 2.5)
+    heads.set_label("power")
     axes.set_ylim(0.0, 1.08 * float(power.max(initial=0.0)) or 1.0)
     axes.set_ylabel(f"power of each sinusoid of {curves.symbol} (mean square)")
     return [stems]
@@ -120,7 +122,13 @@ def _draw_matrix(page: Figure, curves: SpectrumCurves, time_unit: str) -> None:
     _logarithmic(below, values)
     below.set_ylabel("eigenvalues")
     legend_above(below, handles)
-    frequency_axis(below, w, time_unit)
+    frequency_axis(below, _room(w) if curves.lines else w, time_unit)
+
+
+def _room(w: Array) -> Array:
+    """Frequencies of lines with what leaves room beside them: a line on an axis is not seen."""
+    shown = w[w > 0]
+    return np.array([*w, shown.min() / _BESIDE, shown.max() * _BESIDE]) if shown.size else w
 
 
 def _told_apart(entries: Array, pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Array]]:

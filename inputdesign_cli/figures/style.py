@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import TICKDOWN, TICKLEFT
@@ -162,7 +163,12 @@ def frequency_axis(axes: Axes, frequencies: Array, time_unit: str) -> None:
         log_axes(axes, "x")
     if positive.size > 1:
         axes.set_xlim(positive.min(), positive.max())
-    axes.set_xlabel(f"frequency ω (rad/{time_unit})")
+    axes.set_xlabel(frequency_label(time_unit))
+
+
+def frequency_label(time_unit: str) -> str:
+    """What an axis of frequencies is called."""
+    return f"frequency ω (rad/{time_unit})"
 
 
 def log_axes(axes: Axes, which: Literal["x", "y"], nonpositive: Literal["clip", "mask"] = "clip") -> None:
@@ -180,6 +186,16 @@ def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def ink_on(cell: ScalarMappable, value: float, opaque: float = 1.0) -> str:
+    """Black or white, which stands out more on the colour of a value, drawn on white."""
+    colour = cell.to_rgba(np.array(value))
+    light = [float(channel) * opaque + 1.0 - opaque for channel in colour[:3]]
+    # Relative luminance, and where black and white have the same contrast, by WCAG 2.
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in light]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return BLACK if luminance > 0.179 else "#FFFFFF"
 
 
 def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Line2D]:

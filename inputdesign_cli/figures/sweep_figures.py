@@ -6,11 +6,11 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -23,6 +23,7 @@ from inputdesign_cli.figures.style import (
     GREY,
     PALETTE,
     TYPE_SIZE,
+    ink_on,
     legend_above,
     legend_over_all,
     log_axes,
@@ -47,6 +48,7 @@ MOST_CURVES = len(PALETTE)
 MOST_KEYS = 3
 COLUMNS, ROW = 3, 0.6  # of small multiples: beside each other, and what a further row adds to the page
 MOST_LABELLED = 100  # cells of a map that carry their number
+_CELL = 0.6  # inches of the page that a column of a map takes where it has numbers
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
 
 
@@ -142,6 +144,7 @@ def _draw_curves(
     assert y is not None
     groups = list(dict.fromkeys(table.columns[across])) if across else [""]
     bound, whatever = _bound(table, quantity)
+    side = "ceiling" if table.maximised else "floor"
     handles: list[Artist] = []
     everything = [y] if bound is None else [y, bound]
     for group, colour in zip(groups, PALETTE, strict=False):
@@ -151,9 +154,9 @@ def _draw_curves(
         handles += curve(axes, x[member], y[member], color=colour, marker="o", markersize=4, label=name)
         if bound is not None:
             shade = colour if across else BLACK
-            curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1)
+            told = f"{side}, {name}" if across else side
+            curve(axes, x[member], bound[member], color=shade, linestyle=DASHED, linewidth=1.1, label=told)
     if bound is not None:
-        side = "ceiling" if table.maximised else "floor"
         label = f"{side}: {whatever}"
         handles.append(Line2D([], [], color=BLACK, linewidth=1.1, linestyle=DASHED, label=label))
     white = table.numbers(f"baseline.white.{objective(table.kind).white}")
@@ -212,17 +215,16 @@ def _draw_map(table: SweepTable, quantity: str, down: str, along: str, page: Fig
     _ticks(axes.yaxis, rows)
     axes.set_xlabel(key_label(along))
     axes.set_ylabel(key_label(down))
-    if cells.size <= MOST_LABELLED and len(columns) <= 12:
-        _number_cells(axes, cells, norm)
+    if cells.size <= MOST_LABELLED and page.get_figwidth() >= _CELL * len(columns):
+        _number_cells(axes, cells, image)
 
 
-def _number_cells(axes: Axes, cells: Array, norm: Normalize) -> None:
-    size = 8.0 if cells.shape[1] <= 8 else 6.5
+def _number_cells(axes: Axes, cells: Array, image: QuadMesh) -> None:
     for (i, j), value in np.ndenumerate(cells):
-        text = f"{value:.3g}" if np.isfinite(value) else "none"
-        dark = np.isfinite(value) and norm(value) < 0.6
-        colour = "white" if dark else mpl.rcParams["text.color"]
-        axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=size, color=colour)
+        text, colour = "none", BLACK
+        if np.isfinite(value):
+            text, colour = f"{value:.3g}", ink_on(image, value)
+        axes.text(j + 0.5, i + 0.5, text, ha="center", va="center", color=colour)
 
 
 def _ordered(texts: list[str]) -> list[str]:

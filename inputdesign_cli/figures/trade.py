@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above, log_axes
 from inputdesign_cli.figures.sweep_axes import curve, mark_failures, plain_numbers
@@ -38,6 +39,7 @@ def draw_trade(trade: Trade, page: Figure) -> None:
         handles += curve(axes, trade.lengths, row, color=colour, marker="o", markersize=4, label=name)
     log_axes(axes, "x")
     axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"length of the experiment ({trade.unit})")
     mark_failures(axes, trade.lengths[np.all(np.isnan(trade.values), axis=0)])
     if trade.criterion:

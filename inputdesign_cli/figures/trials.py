@@ -113,7 +113,7 @@ def draw_loss(page: Figure, curves: LossCurves, time_unit: str) -> None:
         axes.axvline(float(loss.mean()), color=colour, linewidth=1.8)
         if name in curves.theory:
             axes.axvline(curves.theory[name], color=colour, linewidth=1.4, linestyle=(0, (4, 3)))
-    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²) (solid: mean of the runs, dashed: theory)")
+    axes.set_xlabel("loss of a run, √(Σ |y − y₀|²)\n(solid: mean of the runs, dashed: theory)")
     axes.set_ylabel("share of the runs (%)")
     axes.set_xlim(0.0, top)
     legend_above(axes, handles)

@@ -24,6 +24,7 @@ class Followed:
     told: str = ""
     designs: tuple[dict[str, Json], ...] = ()
     errors: tuple[dict[str, Json], ...] = field(default=())
+    awaits: str = "computes whenever it is saved"
 
     def computing(self) -> Followed:
         """The same while it is computed anew."""
@@ -55,6 +56,7 @@ class Followed:
                 "told": self.told,
                 "errors": self.errors,
                 "designs": self.designs,
+                "awaits": self.awaits,
             },
         )
 
@@ -67,9 +69,9 @@ def followed_page(report: str) -> str:
     )
 
 
-def message_page(name: str, told: str) -> str:
-    """A page that only says something."""
-    return Followed(name, "waiting", told).page
+def message_page(name: str, told: str, awaits: str = "computes whenever it is saved") -> str:
+    """A page that only says something; `awaits` tells what happens next."""
+    return Followed(name, "waiting", told, awaits=awaits).page
 
 
 def _placed(diagnostic: Diagnostic, lines: Sequence[str], file: str) -> dict[str, Json]:

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import json
 import secrets
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from inputdesign_cli.errors import OutputError
@@ -75,7 +77,7 @@ def serving(board: Board, port: int = 0) -> Iterator[str]:
         hosts = frozenset[str]()
 
     try:
-        server = ThreadingHTTPServer((HOST, port), Handler)
+        server = _Server((HOST, port), Handler)
     except OSError as error:
         message = f"nothing can be served at {HOST}:{port}: {error.strerror or error}"
         raise OutputError.because(
@@ -83,7 +85,6 @@ def serving(board: Board, port: int = 0) -> Iterator[str]:
         ) from error
     taken = server.server_address[1]
     Handler.hosts = frozenset({f"{HOST}:{taken}", f"localhost:{taken}"})
-    server.daemon_threads = True
     thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
     thread.start()
     try:
@@ -91,6 +92,15 @@ def serving(board: Board, port: int = 0) -> Iterator[str]:
     finally:
         server.shutdown()
         server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away while it waits for news is none for the terminal."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -1,20 +1,25 @@
-"""The charts of a report, drawn from the CSV files of a run as SVG within the page."""
+"""The charts of a report, drawn from figures.json of a run as SVG within the page."""
 
 from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.drawn import READERS, WITHOUT_LIMIT
+from inputdesign_cli.report.described import WITHOUT_LIMIT, described
 from inputdesign_cli.report.numbers import spoken
 from inputdesign_cli.runs.curves import Curves
+from inputdesign_cli.runs.curves_file import read_curves
 from inputdesign_cli.runs.results import Json, Result
-from inputdesign_cli.runs.text_formats import read_csv
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PICTURES = {"png": "image/png", "svg": "image/svg+xml"}
 _CAPTIONS = {
@@ -58,17 +63,9 @@ class Chart:
     readings: str = ""
 
 
-def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) -> dict[str, Chart]:
-    """The charts of a run by file stem. What has no table that we know of is taken from its file."""
-    names = (*READERS, "predicted_output")
-    tables = {name: read_csv(run / f"{name}.csv") for name in names if (run / f"{name}.csv").is_file()}
-    charts = {}
-    for stem, read in READERS.items():
-        found = read(tables, result, closed_loop) if stem in tables else None
-        if found is not None:
-            curves, alt = found
-            caption = alt if alt == WITHOUT_LIMIT else _CAPTIONS[stem]
-            charts[stem] = _readable(curves, time_unit, alt, caption)
+def run_charts(run: Path, result: Result, time_unit: str) -> dict[str, Chart]:
+    """The charts of a run by file stem, drawn for a page; of an older run the pictures that it has."""
+    charts = {stem: _readable(stem, curves, time_unit) for stem, curves in read_curves(run).items()}
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
         if kind in _PICTURES and stem not in charts and (run / name).is_file():
@@ -76,13 +73,24 @@ def run_charts(run: Path, result: Result, time_unit: str, *, closed_loop: bool) 
     return charts
 
 
-def _readable(curves: Curves, time_unit: str, alt: str, caption: str) -> Chart:
+def _readable(stem: str, curves: Curves, time_unit: str) -> Chart:
+    told, caption = described(curves, time_unit), _caption(stem)
+    return readable_chart(
+        lambda seen: draw(curves, time_unit, "svg", narrow=True, seen=seen),
+        told or caption,
+        WITHOUT_LIMIT if told == WITHOUT_LIMIT else caption,
+    )
+
+
+def readable_chart(drawn: Callable[[Callable[[Figure], object]], bytes], alt: str, caption: str) -> Chart:
+    """A chart of which values can be read; `drawn` makes the SVG and hands its page to what it is given."""
     panels: list[dict[str, Json]] = []
-    drawn = draw(curves, time_unit, "svg", narrow=True, seen=lambda page: panels.extend(readings(page)))
-    return Chart(svg_uri(drawn), alt, caption, json.dumps(panels, separators=(",", ":")) if panels else "")
+    content = drawn(lambda page: panels.extend(readings(page)))
+    told = json.dumps(panels, separators=(",", ":")) if panels else ""
+    return Chart(_svg_uri(content), alt, caption, told)
 
 
-def svg_uri(content: bytes) -> str:
+def _svg_uri(content: bytes) -> str:
     """An SVG file as a data URI: in an image its ids meet no others of the page."""
     return "data:image/svg+xml;base64," + base64.b64encode(content).decode()
 
@@ -90,9 +98,12 @@ def svg_uri(content: bytes) -> str:
 def file_chart(path: Path) -> Chart:
     """A figure of the run as it is."""
     data = base64.b64encode(read_regular(path)).decode()
-    name = path.stem.replace("_", " ")
-    caption = _CAPTIONS.get(path.stem) or _caption_by_kind(path.stem) or f"The figure {name} of the run."
+    caption = _caption(path.stem)
     return Chart(f"data:{_PICTURES[path.suffix[1:]]};base64,{data}", caption, caption)
+
+
+def _caption(stem: str) -> str:
+    return _CAPTIONS.get(stem) or _caption_by_kind(stem) or f"The figure {spoken(stem)} of the run."
 
 
 def _caption_by_kind(stem: str) -> str | None:

@@ -59,8 +59,18 @@ def estimate_answer(result: Result) -> str:
         number = result["frequency_response"]["frequencies"]
         return f"The frequency response was measured at {number} frequencies."
     if assessment is None:
-        return f"The model was estimated from {result['samples']} samples."
+        return f"The model was estimated from {result['samples']} samples{_explained(result)}."
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in verdict(result))
+
+
+def _explained(result: Result) -> str:
+    """How much of the output a simulation of the model explains, of unseen data if there are any."""
+    unseen = result.get("validation")
+    fit = unseen["simulation_fit_percent"] if unseen else result["identification"].get("fit_percent")
+    if fit is None:
+        return ""
+    of = "data that it has not seen" if unseen else "these data"
+    return f"; simulated from the input alone, it explains {_per_cent(fit)} of {of}"
 
 
 # Why data leave a verdict open, by `assessment.causes`.
@@ -159,6 +169,13 @@ def campaign_facts(result: Result) -> Iterator[tuple[str, str]]:
         whole = plan["planned_samples"]
         of = f", the first of {whole} that are planned" if whole > plan["samples"] else ""
         yield "next", f"apply {plan['samples']} samples of power {plan['power']:.4g} (signal.csv{of})"
+
+
+def campaign_answer(result: Result) -> str:
+    """The same in sentences."""
+    state, *others = campaign_facts(result)
+    told = [f"The campaign {state[1]}.", *(f"{name.capitalize()}: {text}." for name, text in others if name)]
+    return " ".join(told)
 
 
 def simulation_answer(result: Result) -> Iterator[str]:

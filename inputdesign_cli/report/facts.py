@@ -11,6 +11,9 @@ from inputdesign_cli.runs.results import Json, Result
 # Gaps below this are told as such.
 _CLOSED = 1e-6
 
+# Types of spectra that are short for something.
+_SHORT = {"fir": "FIR"}
+
 # What is said of an excitation that was given, by the status of the result.
 GIVEN = {"given": "", "met": ": it meets the accuracy", "missed": ": it misses the accuracy"}
 
@@ -188,7 +191,8 @@ def _gap(relative: float) -> str:
 def proofs(result: Result) -> Iterator[str]:
     """What is proved of other experiments."""
     found = result.get("objective", {})
-    family = f"no {result.get('spectrum', {}).get('type', 'such')} spectrum gets"
+    kind = result.get("spectrum", {}).get("type", "such")
+    family = f"no {_SHORT.get(kind, kind)} spectrum gets"
     if "frequency_response" in result and "objective" in result:
         family = "no powers of these lines get"
     if "moments" in result:

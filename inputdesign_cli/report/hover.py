@@ -26,6 +26,11 @@ SCRIPT = """\
   const value = (panel, part) => panel.log
     ? panel.low * (panel.high / panel.low) ** part
     : panel.low + part * (panel.high - panel.low);
+  const nearby = ({ path, box }, [across, down], area) => {
+    const away = path[0].map((place, i) => Math.hypot((place - across) * box[2] * area.width,
+      (path[1][i] - down) * box[3] * area.height));
+    return away.indexOf(Math.min(...away));
+  };
   const prepare = (figure) => {
     const panels = JSON.parse(figure.dataset.readings);
     delete figure.dataset.readings;
@@ -44,9 +49,12 @@ SCRIPT = """\
       const x = xs[place], [left, top, width, height] = panel.box;
       const values = panel.curves.map((curve) => curve.name + " " + shown(curve.y[nearest(curve.x, x)]));
       told.textContent = panel.x + " " + shown(x) + " | " + panel.y + ": " + values.join("; ");
-      cursor.style.left = 100 * (left + width * share(panel, x)) + "%";
-      cursor.style.top = 100 * top + "%";
-      cursor.style.height = 100 * height + "%";
+      const [across, down] = panel.path
+        ? [panel.path[0][place], panel.path[1][place]] : [share(panel, x), 0];
+      cursor.classList.toggle("point", Boolean(panel.path));
+      cursor.style.left = 100 * (left + width * across) + "%";
+      cursor.style.top = 100 * (top + height * down) + "%";
+      cursor.style.height = panel.path ? "" : 100 * height + "%";
       plot.setAttribute("aria-valuenow", place);
       plot.setAttribute("aria-valuemax", xs.length - 1);
       plot.setAttribute("aria-valuetext", told.textContent);
@@ -61,8 +69,9 @@ SCRIPT = """\
       const panel = panels.find(({ box }) => across >= box[0] && across <= box[0] + box[2]
         && down >= box[1] && down <= box[1] + box[3]);
       if (!panel) return;
-      const x = value(panel, (across - panel.box[0]) / panel.box[2]);
-      tell(panel, nearest(panel.curves[0].x, x));
+      const inside = [(across - panel.box[0]) / panel.box[2], (down - panel.box[1]) / panel.box[3]];
+      tell(panel, panel.path ? nearby(panel, inside, area)
+        : nearest(panel.curves[0].x, value(panel, inside[0])));
     });
     plot.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1, PageDown: -20, PageUp: 20,

@@ -51,14 +51,9 @@ def read_question(text: str, file: str = "spec.yaml", verb: str = "solve") -> Qu
     """
     spec = parse_spec(text, file, design=verb != "identify")
     error = spec.accuracy.error
-    sentences = [
-        _system(spec),
-        _experiment(spec),
-        *_uncertain(spec),
-        *_accuracy(spec),
-        *_limits(spec),
-        _goal(spec, verb),
-    ]
+    # Data that are only to be explained ask for no accuracy, whatever the spec was written for.
+    designs = [] if verb == "identify" else [*_uncertain(spec), *_accuracy(spec), *_limits(spec)]
+    sentences = [_system(spec), _experiment(spec), *designs, _goal(spec, verb)]
     return Question(
         title=spec.title or "",
         sentences=tuple(sentences),
@@ -209,6 +204,10 @@ def _goal(spec: Spec, verb: str) -> str:
         return "Asked: the model that explains the recorded data, and how sure it is."
     if verb == "assess":
         return "Asked: do the recorded data meet this accuracy; if not, which experiment is still needed?"
+    if verb == "campaign":
+        return (
+            "Asked: an experiment in parts, each designed on the data so far, until these meet the accuracy."
+        )
     if not spec.designs or verb == "analyse":
         return "Asked: what accuracy the given excitation buys."
     family, stated = _SPECTRA.get(_family(spec), ""), spec.spectrum

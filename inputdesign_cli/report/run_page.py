@@ -10,6 +10,8 @@ from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import run_charts
 from inputdesign_cli.report.evidence import (
+    campaign_answer,
+    campaign_facts,
     estimate_answer,
     estimate_facts,
     estimate_table,
@@ -79,7 +81,7 @@ def run_page(run: Path, trail: Trail, *, pictures: bool = True) -> dict[str, Jso
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
         raise DataError.because("run-unreadable", message, hint="run the spec again") from error
-    charts = run_charts(run, result, question.time_unit, closed_loop=question.closed_loop) if pictures else {}
+    charts = run_charts(run, result, question.time_unit) if pictures else {}
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}
@@ -97,25 +99,25 @@ def run_page(run: Path, trail: Trail, *, pictures: bool = True) -> dict[str, Jso
             "The answer",
             *(["The data"] if estimated or data else []),
             *(heading for heading, _ in shown),
-            *(["Simulation"] if simulated or runs else []),
             *(["What was assumed"] if assumed else []),
+            *(["Simulation"] if simulated or runs else []),
             "How to reproduce it",
             *(["Methods"] if cited else []),
             "All numbers",
         ],
         "question": question.sentences,
-        "answer": " ".join(
-            [
-                estimate_answer(result) if "identification" in result else _answer(result),
-                *simulation_answer(result),
-            ]
-        ),
+        "answer": " ".join([_answer(verb, result), *simulation_answer(result)]),
         "notes": result.get("notes", []),
         "estimate": estimated,
         "estimate_facts": list(estimate_facts(result)),
         "verdicts": requirement_table(result, question.time_unit),
         "data_figures": data,
-        "facts": [("status", status, ""), *facts(result, question.time_unit), ("units", question.units, "")],
+        "facts": [
+            ("status", status, ""),
+            *((name, text, "") for name, text in campaign_facts(result)),
+            *facts(result, question.time_unit),
+            ("units", question.units, ""),
+        ],
         "charts": charts,
         "sections": shown,
         "proofs": proved,
@@ -125,6 +127,7 @@ def run_page(run: Path, trail: Trail, *, pictures: bool = True) -> dict[str, Jso
         "assumptions": assumed,
         "command": _command(verb, result),
         "explored": "exploration" in result,
+        "campaign": verb == "campaign",
         "files": _data_files(result),
         "spec": text,
         "provenance": provenance(
@@ -148,6 +151,8 @@ def _check_fields(run: Path, result: Result) -> None:
 
 
 def _verb(result: Result) -> str:
+    if "campaign" in result:
+        return "campaign"
     if "assessment" in result:
         return "assess"
     if "identification" in result:
@@ -183,7 +188,11 @@ def _command(verb: str, result: Result) -> str:
     return shlex.join(["idesign", *words])
 
 
-def _answer(result: Result) -> str:
+def _answer(verb: str, result: Result) -> str:
+    if verb == "campaign":
+        return campaign_answer(result)
+    if "identification" in result:
+        return estimate_answer(result)
     found = result.get("objective", {})
     kind, value = found.get("kind", ""), found.get("value")
     if value is None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.style import rendered
 from inputdesign_cli.figures.sweep_figures import sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.charts import Chart, svg_uri
+from inputdesign_cli.report.charts import Chart, readable_chart
 from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.numbers import provenance
 from inputdesign_cli.report.question import Question, read_question
@@ -87,7 +91,8 @@ def _first_run(table: SweepTable, root: Path) -> tuple[Question | None, dict[str
 
 
 def _answer(table: SweepTable) -> str:
-    statuses = ", ".join(f"{n} {status}" for status, n in table.summary.get("statuses", {}).items())
+    # While the sweep goes on the table is ahead of the summary.
+    statuses = ", ".join(f"{n} {status}" for status, n in sorted(Counter(table.columns["status"]).items()))
     said = f"{table.rows} points: {statuses}."
     found = table.best
     if found is None:
@@ -102,18 +107,18 @@ def _answer(table: SweepTable) -> str:
 
 def _charts(table: SweepTable) -> list[Chart]:
     captions = {
-        "curves": "The result over one key; dashed: the proved bound that no design whatever passes.",
+        "curves": "The result over one key; dashed: the proved bound that no design passes.",
         "map": "The result over both keys; hatched where a point has none.",
         "moments": "The second moments of the regressors over the key.",
     }
     return [
-        Chart(
-            svg_uri(rendered(paint, "svg", narrow=True)),
-            f"{captions[name]} Drawn from sweep.csv.",
-            captions[name],
-        )
+        readable_chart(partial(_drawn, paint), f"{captions[name]} Drawn from sweep.csv.", captions[name])
         for name, paint in sweep_figures(table)
     ]
+
+
+def _drawn(paint: Callable[[Figure], None], seen: Callable[[Figure], object]) -> bytes:
+    return rendered(paint, "svg", narrow=True, seen=seen)
 
 
 def _failures(table: SweepTable) -> list[tuple[str, str, str]]:

@@ -299,6 +299,7 @@ class SignalCurves(Curves):
     labels: Mapping[str, str] = field(default_factory=dict)  # "u1" -> its name and unit, where there are any
     predicted: tuple[PredictedPanel, ...] = ()
     held: bool = True  # each value until the next
+    levels: bool = False  # the channels stand at an operating point; what they cause is counted from rest
     moves: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # "u1" -> largest move, its limit
 
 

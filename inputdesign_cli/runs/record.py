@@ -12,6 +12,7 @@ from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.results import Json
 
 RESULT, SPEC, SIGNAL, PAGE = "result.json", "spec.yaml", "signal.csv", "report.html"
+FIGURES = "figures.json"
 # Every run has some of these; what else it wrote its result lists under `files`.
 STANDARD_FILES = (
     SPEC,

@@ -15,9 +15,10 @@ from pathlib import Path
 from types import MappingProxyType
 
 from inputdesign_cli.errors import DataError, OutputError
+from inputdesign_cli.runs.curves_file import curves_json
 from inputdesign_cli.runs.origin import Origin, check_directory, check_origin, digest, not_a_run
 from inputdesign_cli.runs.provenance import environment
-from inputdesign_cli.runs.record import RESULT, SIGNAL, SPEC, load_result, owned_files
+from inputdesign_cli.runs.record import FIGURES, RESULT, SIGNAL, SPEC, load_result, owned_files
 from inputdesign_cli.runs.replacing import heal, put_in_place, sync, workplace
 from inputdesign_cli.runs.results import Json, Results
 from inputdesign_cli.runs.text_formats import csv_text, json_text, plain
@@ -151,6 +152,8 @@ def _write_files(
     for name, text in texts.items():
         _write(folder / name, text)
     contents = {**results.files, **figures}
+    if results.curves:
+        contents[FIGURES] = curves_json(results.curves)
     for name, content in contents.items():
         (folder / name).write_bytes(content)
     names = [*texts, *contents]

@@ -46,9 +46,9 @@ _ERRORS: dict[str, type[IdesignError]] = {
     "inaccurate": InaccurateError,
     "invalid": SpecError,
 }
-# While points are computed the table is written anew now and then: not more often than this, and for no
-# more than a thirtieth of the time.
-_REST, _SHARE = 10.0, 30.0
+# While points are computed the table is written anew now and then: first so soon that who follows the sweep
+# sees it, later not more often than this, and for no more than a thirtieth of the time.
+_FIRST, _REST, _SHARE = 2.0, 10.0, 30.0
 
 
 class Listing(NamedTuple):
@@ -173,7 +173,7 @@ class _Run:
         points = self.layout.root / "points"
         with output_errors(points):
             points.mkdir(exist_ok=True)
-        due = time.monotonic() + _REST
+        due = time.monotonic() + _FIRST
         function = run_point if self.executor.shares_files else run_point_elsewhere
         finished: Finished[PointJob, PointEnd]
         for finished in self.executor.run(function, self._jobs()):

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
-from inputdesign_cli.wizard.phrases import seconds, short, without_huge_numbers
+from inputdesign_cli.wizard.phrases import seconds, short, with_plain_numbers
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
 from inputdesign_cli.wizard.questions import bad_answer, complete
 from inputdesign_cli.wizard.wishes import wished
 
-_MOST, _LEAST = 5000, 50
+_MOST, LEAST = 5000, 50  # samples
 _PLANTS, _FRESH = 30, 200
 _FIRST = 60  # sinusoids
 
@@ -25,7 +26,8 @@ class Draft:
     Args:
         heads: what stands before the spectrum, tails behind it.
         lines: of the multisine; None where the accuracy tells them.
-        why: the comment on them.
+        said: the answers.
+        why: the comment on the lines.
     """
 
     heads: tuple[str, ...]
@@ -33,6 +35,7 @@ class Draft:
     files: Mapping[str, bytes]
     lines: int | None
     folder: Path
+    said: Mapping[str, str]
     why: str = "sinusoids"
 
     @property
@@ -55,7 +58,8 @@ class Draft:
         Raises:
             SpecError: the answers make no spec.
         """
-        return parse_spec(self.text, "<wizard>", folder=self.folder)
+        with in_their_words(self.said):
+            return parse_spec(self.text, "<answers>", folder=self.folder)
 
     def validate(self) -> None:
         """Write the files that stand beside the spec, and try whether it is well posed.
@@ -68,7 +72,8 @@ class Draft:
 
         for name, content in self.files.items():
             write_bytes(self.folder / name, content)
-        tasks.validate(self.spec())
+        with in_their_words(self.said):
+            tasks.validate(self.spec())
 
 
 def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAnswer | None = None) -> Draft:
@@ -83,12 +88,14 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    said = {key: without_huge_numbers(text, key) for key, text in complete(answers).items()}
+    said = {key: with_plain_numbers(text, key) for key, text in complete(answers).items()}
     span, there = input_range(said["range"]), seconds(said["time"], "time")
     plant = plant or understand_plant(said["plant"], stem, folder)
     step = plant.sample_time
-    if there < _LEAST * step:
-        raise bad_answer("time", f"{short(there)} s are less than {_LEAST} samples of {short(step)} s")
+    if there < LEAST * step:
+        why = "as it is recorded" if plant.sampling is not None else "a twentieth of the time constant"
+        told = f"{short(there)} s are less than {LEAST} samples, one every {short(step)} s ({why})"
+        raise bad_answer("time", told)
     duration = min(there, _MOST * step)
     controller = loop_line(said["loop"], plant)
     asked = wished(said["wish"], plant, controller is not None, duration)
@@ -113,8 +120,8 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         heads[-1] += f", {_MOST} samples; the time there is would be {short(there)}"
     tails = signal_lines(said["signals"], said["converter"], span)
     if nonparametric:
-        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder)
-    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder)
+        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said)
+    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said)
 
 
 def _why_step(plant: PlantAnswer) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from inputdesign_cli.errors import IdesignError, OutputError
 from inputdesign_cli.wizard.composing import Draft, compose
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
-from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, Question
+from inputdesign_cli.wizard.questions import QUESTIONS, Question
 
 # In place of what was not asked yet: it goes with every other answer.
 _MEANWHILE = {
@@ -17,8 +17,6 @@ _MEANWHILE = {
     "range": "plus/minus 1",
     "noise": "standard deviation 1",
 }
-# Which answer a section of the spec comes from, where that has another name.
-_ANSWERS = {"accuracy": "wish", "experiment": "loop", "signal": "signals", "uncertainty": "plant"}
 
 
 class Conversation:
@@ -49,8 +47,7 @@ class Conversation:
         except OutputError:
             raise  # no answer can help
         except IdesignError as error:
-            section = error.diagnostics[0].key.partition(".")[0]
-            key = section if section in KEYS else _ANSWERS.get(section, asked.key)
+            key = error.diagnostics[0].key
             if key not in self._answers:
                 return None  # it is about what stands in for an answer
             del self._answers[key]

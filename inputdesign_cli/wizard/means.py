@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.wizard.phrases import NUMBER, after, needed, number, short
+from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.phrases import NUMBER, after, after_if_named, needed, number, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 from inputdesign_cli.wizard.wishes import pid
 
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
+_LEAST_BITS, _MOST_BITS = 2, 32
 _WHITE = 3.0  # correlations above so many deviations of chance colour the noise
 
 
@@ -40,7 +42,9 @@ def input_range(text: str) -> Range:
     side = number(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*{NUMBER}", text)
     if side is None:
         raise bad_answer("range", f'"{text}" is no range')
-    return Range(needed(side, "range", "the amplitude"), after(text, "around|about|at") or 0.0)
+    return Range(
+        needed(side, "range", "the amplitude"), after_if_named(text, "around|about|at", "range") or 0.0
+    )
 
 
 def limit_lines(span: Range, text: str, duration: float, step: float) -> list[str]:
@@ -49,7 +53,7 @@ def limit_lines(span: Range, text: str, duration: float, step: float) -> list[st
     Raises:
         SpecError: `bad-answer`.
     """
-    rate, output = after(text, "rate"), after(text, "output")
+    rate, output = (after_if_named(text, word, "limits") for word in ("rate", "output"))
     if rate is None and output is None and text.lower() not in ("none", "no"):
         raise bad_answer("limits", f'"{text}" is none of these')
     peak = short(span.amplitude)
@@ -98,7 +102,8 @@ def _at_rest(path: Path) -> tuple[float, float, str]:
 
     if not path.is_file():
         raise bad_answer("noise", f"there is no file {path}")
-    y = read_columns(path, {"y": "y"}, key="noise")["y"]
+    with in_their_words({}, "noise"):
+        y = read_columns(path, {"y": "y"}, key="noise")["y"]
     if y.size < 20:
         raise bad_answer("noise", f"{path.name} has {y.size} rows, and 20 are the least")
     v = y - y.mean()
@@ -137,10 +142,12 @@ def signal_lines(kind: str, converter: str, span: Range) -> list[str]:
     lines.append(f"  offset: {short(span.offset)}  # the operating point, added to signal.csv")
     if converter.lower() in ("no", "none"):
         return lines
-    bits = re.search(r"(\d+)\s*bits?", converter, re.I)
+    bits = re.search(r"(?<![\w.+-])(\d+)\s*bits?", converter, re.I)
     most = after(converter, "up to|over|to|range")
     if bits is None or most is None:
         raise bad_answer("converter", f'"{converter}" is none of these')
+    if not _LEAST_BITS <= int(bits.group(1)) <= _MOST_BITS:
+        raise bad_answer("converter", f"converters have {_LEAST_BITS} to {_MOST_BITS} bits")
     return [
         *lines,
         f"  quantisation: {{bits: {bits.group(1)}, range: {short(needed(most, 'converter', 'its range'))}}}",

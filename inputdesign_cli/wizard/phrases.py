@@ -6,21 +6,27 @@ import re
 
 from inputdesign_cli.wizard.questions import bad_answer
 
-_LARGEST = 1e100
+# Nobody means numbers beyond these, which would overflow, or vanish, where they are squared.
+LARGEST, SMALLEST = 1e15, 1e-15
 NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _SECONDS = {"ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
             "hour": 3600.0, "hours": 3600.0, "d": 86400.0}  # fmt: skip
 
 
-def without_huge_numbers(text: str, key: str) -> str:
-    """The text; what nobody means would overflow where it is squared.
+def with_plain_numbers(text: str, key: str) -> str:
+    """The text; none of its numbers is beyond what can be meant.
 
     Raises:
         SpecError: `bad-answer`.
     """
     for found in re.findall(rf"(?<![\w.]){NUMBER}", text):
-        if abs(float(found)) > _LARGEST:
-            raise bad_answer(key, f"{found} is beyond {_LARGEST:g}")
+        if float(found) and not SMALLEST <= abs(float(found)) <= LARGEST:
+            raise bad_answer(
+                key, f"{found} is beyond what can be meant: sizes lie between {SMALLEST:g} and {LARGEST:g}"
+            )
+    strange = re.search(r"(?<![\w./])(nan|inf|infinity)(?![\w./])", text, re.I)
+    if strange is not None:
+        raise bad_answer(key, f"{strange[1]} is no number")
     return text
 
 
@@ -33,6 +39,19 @@ def number(pattern: str, text: str) -> float | None:
 def after(text: str, words: str) -> float | None:
     """The number behind the words (a pattern), a few others such as "of" or "about" in between."""
     return number(rf"\b(?:{words})\b[\s:=]*(?:(?:of|about|is|ca\.?|up to)\s*)?{NUMBER}", text)
+
+
+def after_if_named(text: str, words: str, key: str) -> float | None:
+    """The number behind the words; None where they are not there.
+
+    Raises:
+        SpecError: `bad-answer`, they are there without a number.
+    """
+    value = after(text, words)
+    named = re.search(rf"\b(?:{words})\b", text, re.I)
+    if value is None and named is not None:
+        raise bad_answer(key, f'"{named[0]}" has no number behind it')
+    return value
 
 
 def seconds_after(text: str, words: str, key: str) -> float | None:

@@ -13,7 +13,8 @@ import numpy as np
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification.yaml.reader import read
-from inputdesign_cli.wizard.phrases import after, needed, seconds_after, share, short
+from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.phrases import LARGEST, after, needed, seconds_after, share, short
 from inputdesign_cli.wizard.questions import bad_answer
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
@@ -130,8 +131,11 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
         path = folder / rest.strip()
         if not path.is_file():
             raise bad_answer("plant", f"there is no file {path}")
-        return _stepped(path, stem) if word.lower() == "step" else _explored(path, stem)
+        with in_their_words({}, "plant"):
+            return _stepped(path, stem) if word.lower() == "step" else _explored(path, stem)
     if text.endswith(".json"):
+        if not (folder / text).is_file():
+            raise bad_answer("plant", f"there is no file {folder / text}")
         return _of_control(folder / text)
     if re.search(r"\bgain\b", text, re.I):
         return _of_numbers(text)
@@ -227,17 +231,26 @@ def _of_control(path: Path) -> PlantAnswer:
         data = json.loads(read_regular(path))
         num, den = ([float(c) for c in data[key]] for key in ("num", "den"))
         late = float(data.get("delay", 0.0))
-        if not np.all(np.isfinite([*num, *den, late])):
-            raise ValueError("a number is not finite")
+        sizes = np.abs([*num, *den, late])
+        if not np.all(sizes <= LARGEST):  # NaN is not, either
+            raise ValueError(f"a number is beyond {LARGEST:g}")
+        sampled = bool(data.get("dt"))
     except (OSError, ValueError, KeyError, TypeError) as error:
-        message = f"{path} does not hold num and den: {error}"
-        raise DataError.because(
-            "bad-answer", message, 'write {"num": [2], "den": [180, 1], "delay": 25}', key="plant"
-        ) from None
+        why = f'{path.name} does not hold {{"num": [2], "den": [180, 1], "delay": 25}} or the like: {error}'
+        raise DataError(bad_answer("plant", why).diagnostics) from None
+    num, den = (np.trim_zeros(part, "f") for part in (num, den))
+    if sampled:
+        raise bad_answer("plant", f"the system of {path.name} is sampled (dt), and is to be in s")
+    if not num or len(num) > len(den):
+        raise bad_answer("plant", f"num of {path.name} must not be zero, nor have more entries than den")
+    if late < 0.0:
+        raise bad_answer("plant", f"the delay in {path.name} is negative")
     poles = np.roots(den)
     decays = -poles.real[poles.real < 0]
     if not decays.size:
-        raise bad_answer("plant", f"the system of {path.name} has no stable pole")
+        raise bad_answer(
+            "plant", f"the system of {path.name} has no stable pole: its time constant is not known"
+        )
     delay = f", delay: {short(late)}" if late else ""
     return PlantAnswer(
         (

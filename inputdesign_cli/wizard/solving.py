@@ -10,11 +10,14 @@ import numpy as np
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.wizard.composing import Draft
+from inputdesign_cli.wizard.composing import LEAST, Draft
+from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.phrases import short
 
 _GAP, _MOST_LINES = 0.02, 240
-_ROOM, _TRIES = 1.1, 4
+_TOLD = 1e-3  # smaller gaps are told as this
+_ROOM, _TRIES = 1.1, 6
+_LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
 
 Solve = Callable[[Spec], Result]
@@ -24,12 +27,15 @@ def enough_lines(draft: Draft, solve: Solve) -> Draft:
     """The draft with as many sinusoids as come within 2 % of every spectrum, at the plant as stated."""
     while draft.lines is not None:
         nominal = draft.spec().with_(uncertainty=None, **{"signal.candidates": 1})
-        objective = solve(nominal)["objective"]
+        with in_their_words(draft.said):
+            objective = solve(nominal)["objective"]
         best = objective.get("any_spectrum_bound")
         if best is None:
             return draft.with_lines(draft.lines, "sinusoids; how near to every spectrum was not computed")
         gap = float(objective["value"]) / float(best) - 1.0
-        told = f"so many sinusoids come within {100.0 * max(gap, 0.0):.2g} % of every spectrum"
+        told = (
+            f"no other spectrum is better than so many sinusoids by more than {100 * max(gap, _TOLD):.2g} %"
+        )
         if gap <= _GAP or 2 * draft.lines > min(_MOST_LINES, nominal.experiment.samples // 2):
             return draft.with_lines(draft.lines, told)
         draft = draft.with_lines(2 * draft.lines, told)
@@ -53,7 +59,7 @@ def verdict(spec: Spec, result: Result, solve: Solve) -> Verdict:
     """What is to be told, with a length that would do, which is tried."""
     ratio, there = float(result["signal"]["worst_ratio"]), result["samples"] * spec.sample_time
     means = f"{lasting(there)} at plus/minus {short(_peak(spec))}"
-    times = f"the error of this record is {ratio:.3g} times what is admitted"
+    times = f"the model that it leaves errs {ratio:.3g} times as much as is admitted"
     found = _length_that_does(spec, ratio, solve)
     said = [f"{means} is enough: {times}." if ratio <= 1.0 else f"{means} is not enough: {times}."]
     if found is not None:
@@ -64,20 +70,22 @@ def verdict(spec: Spec, result: Result, solve: Solve) -> Verdict:
     if kept is not None and loop and (ratio <= 1.0):
         peak = 20.0 * np.log10(kept.peak)
         said.append(
-            f"The peak of |S| stays below {peak:.3g} dB for every plant that the data will leave over (95 % "
-            f"confidence): a gain margin of {loop['gain_margin']:.3g} and {loop['phase_margin']:.3g} degrees."
+            f"The peak of |S| of the loop stays below {peak:.3g} dB for every plant that the data do not "
+            f"rule out (95 % confidence): a gain margin of {loop['gain_margin']:.3g} and a phase margin of "
+            f"{loop['phase_margin']:.3g} degrees are kept."
         )
     drawn = result.get("robust", {}).get("scenarios")
     if drawn:
         said.append(
-            f"This holds at the plant as stated and at {drawn} others drawn from what you know of it."
+            f"This was tried at the plant as you stated it and at {drawn} others within what you said of it."
         )
     return Verdict(ratio, tuple(said))
 
 
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
     """Samples of a record that was designed and meets what is asked; None where none was found."""
-    samples = int(np.ceil(spec.experiment.samples * ratio**2 * _ROOM))
+    # Errors fall with the root of the length, but not in records hardly longer than the plant is slow.
+    samples = max(int(np.ceil(spec.experiment.samples * ratio**2 * _ROOM)), LEAST)
     for _ in range(_TRIES):
         changes = {"limits.duration": None, "experiment.samples": samples, "solver.any_spectrum": False}
         try:
@@ -87,7 +95,8 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
         found = result.get("signal", {}).get("worst_ratio")
         if found is not None and found <= 1.0:
             return int(result["signal"]["samples"])
-        samples = int(np.ceil(samples * (1.3 if found is None else max(1.1, _ROOM * float(found) ** 2))))
+        longer = _LONGER if found is None else float(np.clip(_ROOM * float(found) ** 2, _ROOM, _LONGER))
+        samples = int(np.ceil(samples * longer))
         if ratio <= 1.0 and samples >= spec.experiment.samples:
             return None
     return None
@@ -100,7 +109,8 @@ def to_log(spec: Spec, file: str) -> list[str]:
     return [
         f"Bring the plant to rest at the operating point, apply signal.csv, and log time, u1 and y1 every "
         f"{short(spec.sample_time)} {spec.time_unit}.",
-        f"Then: idesign assess {file} log.csv --operating-point {middle},y1=REST   (REST: y before it began)",
+        f"Then: idesign assess {file} log.csv --operating-point {middle},y1=REST   (REST: the level "
+        "of y before it began)",
     ]
 
 

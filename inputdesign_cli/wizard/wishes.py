@@ -32,6 +32,7 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
     per_cent = f"{100 * part:g} %"
     if re.search(r"predict", text, re.I):
         high = needed(after(text, "up to|to"), "wish", "up to which frequency (rad/s)")
+        _below_nyquist(high, plant)
         low = min(2.0 * math.pi / duration, 0.1 * high)
         return [
             f"accuracy:  # G known within {per_cent}, from one period in the experiment to what you named",
@@ -54,12 +55,22 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
         high = needed(after(text, "to"), "wish", "to which frequency (rad/s)")
         if low >= high:
             raise bad_answer("wish", f"{low:g} is not below {high:g}")
+        _below_nyquist(high, plant)
         return [
             f"accuracy:  # {per_cent} is {_RAYLEIGH:.3g} deviations of a complex error: 95 % are within it",
             f"  frequency_response: {{relative: {short(part / _RAYLEIGH)}, "
             f"band: [{short(low)}, {short(high)}], lines: {_LINES}}}",
         ]
     raise bad_answer("wish", f'"{text}" is none of these')
+
+
+def _below_nyquist(high: float, plant: PlantAnswer) -> None:
+    highest = math.pi / plant.sample_time
+    if high > highest:
+        step = short(plant.sample_time)
+        raise bad_answer(
+            "wish", f"a sample every {step} s, which suits this plant, reaches up to {highest:.3g} rad/s"
+        )
 
 
 def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:

@@ -14,6 +14,7 @@ from inputdesign_cli.cli import app
 from inputdesign_cli.errors import DataError, InaccurateError, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.runs.results import Results
 from tests.support.command_line import RESULT, diagnostic
+from tests.support.processes import running
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
 GROUP = typer.main.get_command(app)
@@ -127,10 +128,8 @@ def test_a_destination_that_is_a_file(run, verbs, tmp_path):
 
 
 def test_a_closed_pipe_is_no_error():
-    process = subprocess.Popen(
-        [sys.executable, "-m", "inputdesign_cli", "init"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    process.stdout.close()
-    assert process.stderr.read() == b""
-    process.stderr.close()
-    assert process.wait() == 141
+    command = [sys.executable, "-m", "inputdesign_cli", "init"]
+    with running(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait() == 141

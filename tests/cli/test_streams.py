@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.processes import running
+
 ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "specs" / "first_order_given.yaml"
 IDESIGN = f"{sys.executable} -m inputdesign_cli"
@@ -82,17 +84,14 @@ def test_signals_end_a_command_whenever_they_come(tmp_path, number, code):
     """Also while modules are imported; Python itself needs some hundredths of a second before that."""
     codes = set()
     for delay in (0.05, 0.1, 0.3, 0.6):
-        process = subprocess.Popen(
-            [sys.executable, "-c", START, "simulate", SPEC, "-o", "r", "--set", "simulation={runs: 1000000}"],
-            cwd=tmp_path,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        process.stdout.readline()
-        time.sleep(delay)
-        process.send_signal(number)
-        _, told = process.communicate(timeout=60)
+        command = [sys.executable, "-c", START, "simulate", SPEC, "-o", "r"]
+        command += ["--set", "simulation={runs: 1000000}"]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        with running(command, cwd=tmp_path, **pipes) as process:
+            process.stdout.readline()
+            time.sleep(delay)
+            process.send_signal(number)
+            _, told = process.communicate(timeout=60)
         assert "Traceback" not in told, told
         codes.add(process.returncode)
     # Before the handlers stand, a signal ends the process by itself; a shell shows the same code.

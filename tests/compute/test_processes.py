@@ -12,6 +12,7 @@ import pytest
 from inputdesign_cli.compute.executor import InProcess, WorkerLostError
 from inputdesign_cli.compute.processes import Processes
 from tests.support import jobs
+from tests.support.processes import running
 
 
 @pytest.mark.parametrize("executor", [InProcess(), Processes(1), Processes(2)])
@@ -70,10 +71,11 @@ if __name__ == "__main__":
 def test_processes_end_with_a_killed_caller(tmp_path):
     script = tmp_path / "caller.py"
     script.write_text(CALLER)
-    caller = subprocess.Popen([sys.executable, str(script), str(ROOT)], stdout=subprocess.PIPE, text=True)
-    pids = {int(caller.stdout.readline()) for _ in range(4)}
-    caller.send_signal(signal.SIGKILL)
-    caller.communicate()
+    command = [sys.executable, str(script), str(ROOT)]
+    with running(command, stdout=subprocess.PIPE, text=True) as caller:
+        pids = {int(caller.stdout.readline()) for _ in range(4)}
+        caller.send_signal(signal.SIGKILL)
+        caller.communicate()
     deadline = time.monotonic() + 5
     while any(alive(pid) for pid in pids) and time.monotonic() < deadline:
         time.sleep(0.02)

@@ -3,13 +3,16 @@
 import struct
 import sys
 from dataclasses import replace
+from itertools import combinations
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from inputdesign_cli.figures.plots import draw, draw_all
+from inputdesign_cli.figures.style import TYPE_SIZE
 from inputdesign_cli.runs.curves import BoundPanel, FitCurves, NyquistCurves, SignalCurves
 from inputdesign_cli.runs.results import Results
 from tests.support.curves import CURVES, FIT, G, T, W, bound
@@ -69,6 +72,49 @@ def test_no_curve_lies_under_a_legend(name, page):
         if legend:
             assert legend.get_window_extent().y0 >= axes.get_window_extent().y1
             assert legend.get_window_extent().x1 <= figure.bbox.x1
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+@pytest.mark.parametrize("name", CURVES)
+def test_no_text_leaves_the_page_or_lies_on_another(name, narrow):
+    found = {}
+
+    def seen(page):
+        renderer = page.canvas.get_renderer()
+        found["page"] = page.bbox.padded(1.0)
+        found["texts"] = [(t.get_text(), t.get_window_extent(renderer)) for t in headings(page)]
+
+    draw(CURVES[name], narrow=narrow, seen=seen)
+    (left, bottom), (right, top) = found["page"].min, found["page"].max
+    for text, box in found["texts"]:
+        assert left <= box.x0, text
+        assert box.x1 <= right, text
+        assert bottom <= box.y0, text
+        assert box.y1 <= top, text
+    for (text, box), (other, its) in combinations(found["texts"], 2):
+        assert overlap(box, its) <= 2.0, (text, other)
+
+
+def headings(page):
+    """Titles, labels of axes and of legends: all text but numbers along the axes."""
+    labels = [text for legend in page.legends for text in legend.get_texts()]
+    labels += [text for text in (page._suptitle, page._supxlabel, page._supylabel) if text]
+    for axes in page.axes:
+        labels += axes.get_legend().get_texts() if axes.get_legend() else []
+        labels += [axes.title, axes._left_title, axes._right_title, axes.xaxis.label, axes.yaxis.label]
+    return [text for text in labels if text.get_text().strip() and text.get_visible()]
+
+
+def overlap(one, other):
+    """Pixels by which two boxes lie on each other, across or down, whichever is less."""
+    both = Bbox.intersection(one, other)
+    return min(both.width, both.height) if both else 0.0
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_all_text_has_one_size(name, page):
+    figure = page(CURVES[name])
+    assert {text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()} == {TYPE_SIZE}
 
 
 @pytest.mark.parametrize(("kind", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])

@@ -84,3 +84,15 @@ def test_the_loop_has_a_disc_where_it_is_limited_and_keeps_off_a_circle(page):
     np.testing.assert_allclose(discs.get_widths(), 0.2)
     assert [circle.get_radius() for circle in axes.patches] == [0.5, 0.5]
     assert not page(CURVES["nyquist without a bound"]).axes[0].patches
+
+
+def test_levels_and_deviations_are_told_apart(page):
+    """The operating point of the input is known, and that of the output is not."""
+    curves = CURVES["predicted signal"]
+    for levels, label, told in (
+        (False, "level (m)", "from rest"),
+        (True, "Δ level (m)", "deviation Δ from rest"),
+    ):
+        figure = page(replace(curves, levels=levels))
+        assert [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()] == ["valve (%)", label]
+        assert any(text.get_text().endswith(told) for text in figure.legends[0].get_texts())

@@ -3,6 +3,7 @@
 import http.client
 import json
 import socket
+import struct
 import threading
 import time
 from contextlib import closing
@@ -110,6 +111,22 @@ def test_news_come_as_soon_as_there_are_any(served):
     assert json.loads(text) == {"version": 2}
     assert 0.2 < time.monotonic() - started < 5.0
     assert "two" in ask(address, address.path)[2]
+
+
+def test_a_browser_that_goes_away_is_no_news_for_the_terminal(served, capsys):
+    """Whoever closes a tab leaves a request for news behind."""
+    board, address = served
+    with socket.create_connection((address.hostname, address.port), timeout=10) as waiting:
+        lines = f"GET {address.path}news?version=1 HTTP/1.1\r\nHost: {address.netloc}\r\n\r\n"
+        waiting.sendall(lines.encode())
+        time.sleep(0.2)
+        waiting.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # a reset at once
+    for _ in range(3):
+        board.show(PAGE.replace("one", "more"))
+        board.show(PAGE)
+        time.sleep(0.1)
+    assert ask(address, address.path)[0] == 200
+    assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("version", ["", "0", "-3", "x", "9" * 50, "1&version=2"])

@@ -14,6 +14,7 @@ from inputdesign_cli.errors import Location, SpecError
 from inputdesign_cli.live.pages import Followed
 from tests.support.browser import clipped, needs_browser, started, violations
 from tests.support.pages import SPEC
+from tests.support.processes import running
 
 PATIENCE = 120.0
 
@@ -22,13 +23,10 @@ PATIENCE = 120.0
 def watching(path, *more):
     """The address of the page, and the process behind it."""
     command = [sys.executable, "-m", "inputdesign_cli", "watch", str(path), *map(str, more)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=path.parent)
-    try:
+    with running(command, stdout=subprocess.PIPE, text=True, cwd=path.parent) as process:
         yield process.stdout.readline().strip()
-    finally:
         process.terminate()
         process.wait(30)
-        process.stdout.close()
 
 
 def page_with(address, part):

@@ -17,4 +17,4 @@ from inputdesign_cli.report.facts import proofs
 )
 def test_a_gap_that_only_rounding_decides_is_told_as_closed(gap, told):
     result = {"objective": {"lower_bound": 2.0, "relative_gap": gap}, "spectrum": {"type": "fir"}}
-    assert list(proofs(result)) == [f"no fir spectrum gets below 2, {told}"]
+    assert list(proofs(result)) == [f"no FIR spectrum gets below 2, {told}"]

@@ -45,7 +45,7 @@ def test_the_page_of_a_run(runs, name):
         f"in {name} loop",
         f"{result['cost']:.6g}",
         f"{result['baseline']['white']['ratio']:.3g} times as much",
-        f"No fir spectrum gets below {result['objective']['lower_bound']:.7g}",
+        f"No FIR spectrum gets below {result['objective']['lower_bound']:.7g}",
         f"No spectrum at all gets below {result['objective']['any_spectrum_bound']:.7g}",
         result["spec_sha256"],
         "idesign solve spec.yaml",

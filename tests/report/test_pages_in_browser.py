@@ -1,23 +1,122 @@
 """Pages in a real browser: no part is clipped, the width is used, and axe-core has nothing to say."""
 
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
+from inputdesign_cli import assess, load_spec, parse_spec, simulate, solve
+from inputdesign_cli.errors import Location, SpecError
+from inputdesign_cli.live.pages import Followed, message_page
 from inputdesign_cli.report.render import report_text
+from inputdesign_cli.runs.run_directory import write_run
 from inputdesign_cli.sweep.running import sweep
+from inputdesign_cli.tasks import explore
 from tests.support.browser import clipped, needs_browser, started, violations
+from tests.support.campaigns import applied
+from tests.support.pages import SPEC
 
 pytestmark = [needs_browser, pytest.mark.browser]
 
+SPECS = Path(__file__).parents[2] / "specs"
+LINE = "accuracy: {model_error: {relativ: 0.01, confidence: 0.95, band: [0.001, 3.1415926535]}}"
+PLACE = Location("s.yaml", 1, 26, LINE)
+FAULT = SpecError.because("unknown-key", "relativ is unknown", "did you mean relative?", location=PLACE)
+WRONG = Followed("s.yaml").failed(FAULT, [LINE], "s.yaml")
+
+
+# Small specs that leave a page of each kind, and the verb that is asked of them.
+KINDS = {
+    "two inputs": (solve, "two_by_two_given", []),
+    "robust": (solve, "robust_first_order", ["uncertainty.scenarios=5", "uncertainty.fresh=10"]),
+    "loop": (solve, "heater_loop", ["signal.candidates=1", "spectrum.lines=20"]),
+    "moments": (solve, "regression", ["experiment.samples=60"]),
+    "lines": (solve, "frequency_response", []),
+    "campaigns": (simulate, "campaign", ["simulation.runs=3"]),
+    "study": (simulate, "first_order", ["simulation.runs=10", "spectrum.order=2"]),
+}
+SWEEPS = {
+    "sweep": (["experiment.samples=50,100,-1", "spectrum.order=1,2"], slice(None)),
+    "sweep of three": (
+        ["experiment.samples=50,100", "spectrum.order=1,2", "noise.variance=1,2"],
+        slice(None),
+    ),
+    "sweep in progress": (["experiment.samples=50,100,200"], slice(0, 3)),
+}
+
+
+NAMES = (
+    "open",
+    "closed",
+    *KINDS,
+    "assessed",
+    "explored",
+    *SWEEPS,
+    "campaign begun",
+    "campaign",
+    "waiting",
+    "wrong",
+)
+
 
 @pytest.fixture(scope="module")
-def pages(runs, tmp_path_factory):
+def record(tmp_path_factory):
+    """A record of the plant of SPEC, which misses what is asked."""
+    rng = np.random.default_rng(1)
+    u, e = rng.standard_normal((2, 400))
+    y = scipy.signal.lfilter([0, 1], [1, -0.5], u) + e
+    path = tmp_path_factory.mktemp("record") / "data.csv"
+    np.savetxt(path, np.c_[np.arange(400.0), u, y], delimiter=",", header="time,u,y", comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def places(runs, record, tmp_path_factory):
+    """Directories by the kind of their page."""
     folder = tmp_path_factory.mktemp("pages")
-    sweep(runs / "open.yaml", ["experiment.samples=50,100,-1", "spectrum.order=1,2"], directory=folder / "s")
-    for name, place in (("open", runs / "open"), ("closed", runs / "closed"), ("sweep", folder / "s")):
+    made = {"open": runs / "open", "closed": runs / "closed"}
+    for name, (verb, spec, overrides) in KINDS.items():
+        made[name] = folder / name
+        write_run(verb(load_spec(SPECS / f"{spec}.yaml", overrides)), made[name])
+    for name, found in (
+        ("assessed", assess(parse_spec(SPEC % ""), record).results),
+        ("explored", explore([record]).results),
+    ):
+        made[name] = folder / name
+        write_run(found, made[name])
+    for name, (settings, rows) in SWEEPS.items():
+        made[name] = folder / name
+        sweep(runs / "open.yaml", settings, directory=made[name])
+        table = made[name] / "sweep.csv"
+        lines = table.read_text().splitlines()[rows]
+        pending = ",".join(["800", "pending", *[""] * (lines[0].count(",") - 1)])
+        table.write_text("\n".join([*lines, *[pending] * (rows.stop is not None), ""]))
+    made["campaign begun"], made["campaign"] = folder / "begun", folder / "campaign"
+    for place in (made["campaign begun"], made["campaign"]):
+        idesign("campaign", SPECS / "campaign.yaml", "-o", place, "--no-figures", "-q")
+    part = applied(made["campaign"], folder / "part.csv")
+    idesign("next", made["campaign"], part, "--no-figures", "-q")
+    return made
+
+
+def idesign(*words):
+    subprocess.run([sys.executable, "-m", "inputdesign_cli", *map(str, words)], check=True)
+
+
+@pytest.fixture(scope="module")
+def pages(places, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("html")
+    for name, place in places.items():
         (folder / f"{name}.html").write_text(report_text(place))
+    for name, text in (
+        ("waiting", message_page("sweep", "3 points have a result so far.", "shows what comes")),
+        ("wrong", WRONG.page),
+    ):
+        (folder / f"{name}.html").write_text(text)
     return folder
 
 
@@ -27,17 +126,24 @@ def browser():
         yield found
 
 
-@pytest.mark.parametrize("name", ["open", "closed", "sweep"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [400, 1400])
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])
 def test_a_page_is_accessible_and_nothing_is_clipped(pages, browser, name, scheme, width):
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     page.goto((pages / f"{name}.html").as_uri())
     assert violations(page) == []
     assert clipped(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert small_text(page) == []
     used = page.evaluate("document.querySelector('main').getBoundingClientRect().width")
     assert used > 0.9 * width
     page.close()
+
+
+def small_text(page):
+    """Pictures, but drawings of this page: their text is as large as that of all others."""
+    return page.evaluate("""() => [...document.querySelectorAll("figure img")]
+        .map((e) => e.src.slice(0, 22)).filter((kind) => kind !== "data:image/svg+xml;bas")""")
 
 
 def test_the_contents_lead_to_headings_by_keyboard(pages, browser):
@@ -73,6 +179,51 @@ def test_values_are_told_where_one_points_and_by_the_arrow_keys(pages, browser, 
     assert len(said) == 5
     assert plot.get_attribute("aria-valuetext") == told.inner_text()
     assert violations(page) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "told", "figure"),
+    [
+        ("sweep", ["number of samples N (100|50) ", "cost: order = 1 [0-9.]+; floor"], 0),
+        ("robust", ["frequency", "r_u / r_adm: largest of 5 plants [0-9.e-]+; plant of the spec"], 1),
+        ("loop", ["frequency ω .rad/s. ", "C G, nominal: real part", "distance of the disc from −1 "], 1),
+        ("lines", ["frequency", "power [0-9.e-]+"], 1),
+        ("assessed", ["time", "predicted one step ahead"], 0),
+    ],
+)
+def test_every_kind_of_curve_tells_its_values(pages, browser, name, told, figure):
+    page = browser.new_page(viewport={"width": 1400, "height": 900})
+    page.goto((pages / f"{name}.html").as_uri())
+    plot = page.locator("figure").nth(figure).locator("[role=slider]")
+    answer = plot.locator("xpath=following-sibling::p")
+    box = plot.bounding_box()
+    plot.hover(position={"x": 0.4 * box["width"], "y": 0.6 * box["height"]})
+    pointed = answer.inner_text()
+    plot.press("End")
+    plot.press("ArrowLeft")
+    for text in (pointed, answer.inner_text()):
+        for part in told:
+            assert re.search(part, text), (part, text)
+    assert plot.get_attribute("aria-valuetext") == answer.inner_text()
+    assert violations(page) == []
+
+
+def test_the_point_of_a_nyquist_plot_is_on_the_curve_that_it_tells_of(pages, browser, places):
+    """What is said at the ring is C G at the frequency that is said, by nyquist.csv."""
+    table = np.genfromtxt(places["loop"] / "nyquist.csv", delimiter=",", names=True)
+    w, loop = table[table.dtype.names[0]], table["CG_re"] + 1j * table["CG_im"]
+    page = browser.new_page(viewport={"width": 1400, "height": 900})
+    page.goto((pages / "loop.html").as_uri())
+    plot = page.locator("figure").nth(1).locator("[role=slider]")
+    box = plot.bounding_box()
+    for across, down in ((0.5, 0.5), (0.6, 0.7), (0.4, 0.6)):
+        plot.hover(position={"x": across * box["width"], "y": down * box["height"]})
+        text = plot.get_attribute("aria-valuetext")
+        at, real, imaginary = (
+            float(re.search(rf"{name} (-?[0-9.e-]+)", text)[1])
+            for name in (r"\)", "real part", "imaginary part")
+        )
+        assert complex(real, imaginary) == pytest.approx(loop[np.abs(w - at).argmin()], abs=0.02)
 
 
 def test_a_page_without_scripts_shows_the_same_pictures(pages, browser):

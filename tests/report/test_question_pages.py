@@ -10,11 +10,10 @@ import scipy.signal
 
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.figures.plots import draw_all
-from inputdesign_cli.report.drawn import READERS, read_bound, read_optimality, read_signal
 from inputdesign_cli.report.render import report_text
+from inputdesign_cli.runs.curves_file import read_curves
 from inputdesign_cli.runs.run_directory import write_run
-from inputdesign_cli.runs.text_formats import read_csv
-from tests.support.pages import LOOP, SPEC, parse, rows, words
+from tests.support.pages import LOOP, SPEC, XHTML, parse, rows, words
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -142,37 +141,18 @@ def test_studies_of_other_kinds(inputs, row, runs, tmp_path):
     assert row in rows(parse(report_text(tmp_path / "run")))
 
 
-@pytest.mark.parametrize(
-    ("result", "label"),
-    [
-        ({"objective": {}}, "design"),
-        ({"identification": {}}, "data"),
-        ({"identification": {}, "objective": {}}, "design"),
-    ],
-)
-def test_the_chart_of_the_error_says_what_gave_it(result, label):
+def test_the_chart_of_the_error_says_what_gave_it(data, tmp_path):
     """A top-up has a design of its own; what the data gave stands beside it."""
-    table = {"frequency_rad_per_s": np.array([0.1, 1.0]), "r_u": np.ones(2), "G_abs": np.ones(2)}
-    curves, _ = read_bound({"bound": table}, result, False)
-    assert curves.panels[0].label == label
-
-
-def test_the_curves_of_the_page_are_those_of_the_run(tmp_path):
-    """Read back from the CSV files, with names, units, limits and what is to be expected."""
-    more = ["channels={u1: {name: valve, unit: '%'}, y1: {name: level, unit: m}}", "limits={amplitude: 50}"]
-    results = solve(parse_spec(SPEC % "", overrides=more))
-    write_run(results, tmp_path / "run")
-    tables = {stem: read_csv(tmp_path / "run" / f"{stem}.csv") for stem in results.tables}
-    for stem, read in READERS.items():
-        if stem not in tables:
-            continue
-        curves, _ = read(tables, results.result, False)
-        assert type(curves) is type(results.curves[stem])
-    shown, drawn = read_signal(tables, results.result, False)[0], results.curves["signal"]
-    assert (shown.limits, shown.labels) == (drawn.limits, drawn.labels)
-    assert [panel.label for panel in shown.predicted] == ["level (m)"]
-    np.testing.assert_array_equal(shown.predicted[0].values, drawn.predicted[0].values)
-    marks = read_optimality(tables, results.result, False)[0].support
-    nearest = np.abs(marks[:, None] - results.curves["optimality"].support).min(axis=1)
-    assert marks.size
-    assert np.all(nearest <= 0.01 * marks)
+    spec = parse_spec(SPEC % "", overrides=["accuracy.model_error.relative=0.1"])
+    write_run(assess(spec, data).results, tmp_path / "run")
+    panels = {stem: one.panels for stem, one in read_curves(tmp_path / "run").items() if "bound" in stem}
+    assert {stem: panel.label for stem, (panel,) in panels.items()} == {
+        "bound": "design",
+        "data_bound": "data",
+    }
+    page = parse(report_text(tmp_path / "run"))
+    drawn = [
+        json.loads(f.get("data-readings")) for f in page.iter(f"{XHTML}figure") if f.get("data-readings")
+    ]
+    named = {curve["name"] for panels in drawn for panel in panels for curve in panel["curves"]}
+    assert {"r_u, design", "r_u, data"} <= named

@@ -28,6 +28,7 @@ def test_the_files_of_a_run(tmp_path):
         "optimality.csv",
         "signal.png",
         "optimality.png",
+        "figures.json",
         "result.json",
     ]
     assert names(tmp_path / "runs" / "a") == {path.name for path in paths}
@@ -37,7 +38,7 @@ def test_the_files_of_a_run(tmp_path):
 
 def test_figures_can_be_left_out(tmp_path):
     write_run(a_run("first"), tmp_path / "a")
-    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "result.json"}
+    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
 
 
 def test_the_result_names_its_software_and_its_spec(tmp_path):
@@ -54,13 +55,13 @@ def test_read_run_returns_what_was_written(tmp_path):
     result = read_run(tmp_path / "a")
     assert result["title"] == "first"
     assert result["objective"] == {"value": 5.0}
-    assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png"}
+    assert set(result["files"]) == {"spec.yaml", "signal.csv", "signal.png", "figures.json"}
 
 
 def test_a_later_run_replaces_an_earlier_one_and_its_stale_figure(tmp_path):
     write_with_figures(a_run("first", optimality=True), tmp_path / "a")
     write_with_figures(a_run("second"), tmp_path / "a")
-    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "result.json"}
+    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "signal.png", "figures.json", "result.json"}
     assert marks(tmp_path / "a") == {"second"}
 
 
@@ -88,7 +89,7 @@ def test_a_file_of_the_user_is_never_overwritten(tmp_path):
 def test_a_run_into_an_empty_directory(tmp_path):
     (tmp_path / "a").mkdir()
     write_run(a_run("first"), tmp_path / "a")
-    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "result.json"}
+    assert names(tmp_path / "a") == {"spec.yaml", "signal.csv", "figures.json", "result.json"}
 
 
 def test_a_link_to_a_directory_stays_a_link(tmp_path):

@@ -7,12 +7,18 @@ import numpy as np
 from inputdesign_cli.runs.curves import (
     BoundCurves,
     BoundPanel,
+    CampaignCurves,
+    CloudCurves,
+    DeviationCurves,
+    DeviationPanel,
     DirectionCurves,
     Ellipse,
     EllipseCurves,
     ErrorBandCurves,
     ErrorBandPanel,
     ErrorCurves,
+    EstimateCurves,
+    FanCurves,
     FitCurves,
     FitPanel,
     LossCurves,
@@ -21,11 +27,13 @@ from inputdesign_cli.runs.curves import (
     OptimalityCurves,
     OrderCurves,
     PredictedPanel,
+    RatioCurves,
     ResidualCurves,
     ResponseCurves,
     ResponsePanel,
     SignalCurves,
     SpectrumCurves,
+    TradeCurves,
 )
 
 W = np.geomspace(1e-3, np.pi, 200)
@@ -123,6 +131,14 @@ CURVES = {
     "response without a model": ResponseCurves((SEEN,)),
     "responses of entries": ResponseCurves((replace(SEEN, entry=(0, 0)), replace(SEEN, entry=(1, 0)))),
     "structures": OrderCurves({"ARX": (T[2:8], 10 * T[2:8]), "OE": (T[2:4], 11 * T[2:4])}, (3.0, 33.0), 1),
+    "fan": FanCurves(W, np.stack([0.3 * G, 0.5 * G]), 0.4 * G, {"plant 2": 0.5 * G}),
+    "campaign": CampaignCurves(T[20:80:20], 60.0 / T[20:80:20], T[20:80:20], 200),
+    "estimates": EstimateCurves(T[20:80:20], {"b1": W[:3], "f1": W[3:6]}, {"b1": W[:3], "f1": W[:3]}),
+    "true ratios": RatioCurves({"campaign": 0.5 + W / 5, "one shot": 0.8 + W / 5}),
+    "costs and shares": TradeCurves({"campaign": (1.0, 0.9, 1.1, 0.95, 0.9, 0.99)}),
+    "cloud": CloudCurves(("b1", "f1"), ((0, 1),), np.stack([W, np.cos(W)], 1), np.ones(2), np.eye(2)),
+    "deviations": DeviationCurves((DeviationPanel(W, G, 0.05 * G, 0.04 * G, None, "design"),)),
+    "named bound": bound(BoundPanel(W, 1e-40 * G, G, 0.01 * G, names="heating → temperature")),
     "constant signal": SignalCurves(np.arange(5.0), {"r1": np.ones(5)}),
 }
 

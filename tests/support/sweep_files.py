@@ -31,7 +31,7 @@ def timeless_files(directory: Path) -> dict[str, object]:
     for path in sorted(directory.glob("points/*/*")) + sorted(directory.glob("failures/*")):
         if path.suffix == ".json":
             content = json.loads(path.read_text())
-            del content["timing_s"]
+            content.pop("timing_s", None)
             found[str(path.relative_to(directory))] = content
         else:
             found[str(path.relative_to(directory))] = path.read_bytes()

@@ -9,6 +9,7 @@ import time
 
 import pytest
 
+from tests.support.processes import running
 from tests.support.sweep_files import timeless_files, timeless_rows
 
 
@@ -27,39 +28,33 @@ def kill_at_random(spec, out, points, kills, seed):
     rng = random.Random(seed)
     stood = []
     for kill in range(kills):
-        process = subprocess.Popen(command(spec, out, points), start_new_session=True)
-        begun = time.monotonic()
-        before = len(whole_points(out))
-        # Some kills hit the start; the others come at a random moment after a first new point.
-        if kill % 4:
-            while len(whole_points(out)) <= before and process.poll() is None:
-                time.sleep(0.005)
-                assert time.monotonic() < begun + 60
-            time.sleep(rng.uniform(0.0, 0.12))
-        else:
-            time.sleep(rng.uniform(0.05, 0.8))
-        if kill % 2:
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()  # its workers must find out by themselves
-        process.wait()
+        with running(command(spec, out, points), start_new_session=True) as process:
+            begun = time.monotonic()
+            before = len(whole_points(out))
+            # Some kills hit the start; the others come at a random moment after a first new point.
+            if kill % 4:
+                while len(whole_points(out)) <= before and process.poll() is None:
+                    time.sleep(0.005)
+                    assert time.monotonic() < begun + 60
+                time.sleep(rng.uniform(0.0, 0.12))
+            else:
+                time.sleep(rng.uniform(0.05, 0.8))
+            if kill % 2:
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()  # its workers must find out by themselves
         stood.append(len(whole_points(out)))
     return stood
 
 
 def test_an_interrupt_from_the_terminal_ends_everything_in_order(spec, tmp_path):
     out = tmp_path / "out"
-    process = subprocess.Popen(
-        command(spec, out, 200),
-        start_new_session=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    while not whole_points(out):
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=30)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with running(command(spec, out, 200), start_new_session=True, **pipes) as process:
+        while not whole_points(out):
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=30)
     assert process.returncode == 130
     assert stdout == ""
     assert stderr == f"what is done is in {out}; the same command finishes the rest\ninterrupted\n"

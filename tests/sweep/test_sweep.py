@@ -12,6 +12,7 @@ from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, Spec
 from inputdesign_cli.sweep.layout import Layout
 from inputdesign_cli.sweep.running import list_points, sweep
 from inputdesign_cli.sweep.table import scalars
+from tests.support.processes import running
 from tests.support.sweep_files import rows, timeless_files, timeless_rows
 
 
@@ -182,16 +183,12 @@ with opened(Path(sys.argv[1])):
 
 def test_a_directory_is_swept_by_one_process_at_a_time(spec, stub, tmp_path):
     out = tmp_path / "out"
-    holder = subprocess.Popen([sys.executable, "-c", HOLD, str(out)], stdout=subprocess.PIPE, text=True)
-    try:
+    with running([sys.executable, "-c", HOLD, str(out)], stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout.readline() == "held\n"
         with pytest.raises(OutputError) as caught:
             sweep(spec, ["experiment.samples=10,20"], directory=out)
         assert caught.value.diagnostics[0].code == "sweep-locked"
         assert f"process {holder.pid}" in caught.value.diagnostics[0].message
-    finally:
-        holder.kill()
-        holder.communicate()
     assert sweep(spec, ["experiment.samples=10,20"], directory=out).computed == 2
 
 

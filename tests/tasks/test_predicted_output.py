@@ -46,3 +46,9 @@ def test_noise_in_a_loop_is_what_is_left_of_it():
 def test_noise_that_drifts_grows_with_the_root_of_time():
     _, _, deviation = predicted("", "noise={drift: true, variance: 0.04}")
     np.testing.assert_allclose(deviation, 0.2 * np.sqrt(np.arange(1.0, deviation.size + 1)), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("offset", "levels"), [("40", True), ("0", False), (None, False)])
+def test_only_an_operating_point_makes_the_input_stand_at_levels(offset, levels):
+    found = solve(parse_spec(SPEC % "", overrides=[f"signal.offset={offset}"] if offset else []))
+    assert found.curves["signal"].levels == levels

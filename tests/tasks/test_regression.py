@@ -173,7 +173,15 @@ def test_estimates_are_least_squares():
 def test_a_run_has_its_files(path, tmp_path):
     outcome = solve(load_spec(path, ["experiment.samples=60"]))
     files = {file.name for file in write_run(outcome, tmp_path / "run", draw_all(outcome))}
-    wanted = {"spec.yaml", "signal.csv", "signal.png", "error.png", "moments.png", "result.json"}
+    wanted = {
+        "spec.yaml",
+        "signal.csv",
+        "signal.png",
+        "error.png",
+        "moments.png",
+        "figures.json",
+        "result.json",
+    }
     assert files == wanted | ({"spectrum.csv"} if path == FIR else set())
 
 

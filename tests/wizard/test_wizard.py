@@ -207,7 +207,7 @@ def test_as_many_sinusoids_as_come_near_to_every_spectrum():
 
     found = enough_lines(draft, solve)
     assert (seen, found.lines) == ([60, 120, 240], 240)
-    assert "within 1 %" in found.text
+    assert "by more than 1 %" in found.text
 
 
 def test_what_is_told_was_designed():
@@ -224,6 +224,21 @@ def test_what_is_told_was_designed():
     assert f"{lasting(5 * 199)} would do" in found.sentences[1]
     missed = verdict(spec, {"samples": 720, "signal": {"worst_ratio": 1.5}}, solve)
     assert "not enough" in missed.sentences[0]
+
+
+def test_a_length_that_does_is_found_where_the_error_does_not_fall_with_its_root():
+    """Records that are shorter than the plant is slow tell far less, or cannot be designed."""
+    spec, tried = compose(ENGINEER, "x", Path()).spec(), []
+
+    def solve(changed):
+        tried.append(changed.experiment.samples)
+        if tried[-1] < 90:
+            raise SpecError.because("too-short", "too short")
+        return {"signal": {"worst_ratio": 20.0 / tried[-1], "samples": tried[-1]}, "samples": 0}
+
+    found = verdict(spec, {"samples": 720, "signal": {"worst_ratio": 0.02}}, solve)
+    assert tried == [50, 100]
+    assert f"{lasting(500.0)} would do" in found.sentences[1]
 
 
 def test_every_question_has_an_example_that_is_understood():
@@ -252,4 +267,4 @@ def test_a_margin_that_is_kept_is_said():
     said = " ".join(verdict(spec, result, lambda other: tasks.solve(other).result).sentences)
     peak = 10.0 ** (6.0 / 20.0)
     assert f"a gain margin of {peak / (peak - 1.0):.3g}" in said
-    assert f"and {np.degrees(2.0 * np.arcsin(0.5 / peak)):.3g} degrees" in said
+    assert f"a phase margin of {np.degrees(2.0 * np.arcsin(0.5 / peak)):.3g} degrees" in said

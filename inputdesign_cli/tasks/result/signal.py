@@ -87,6 +87,7 @@ def signal_curves(
     columns = applied_columns(request, units, record)
     time, *signals = columns.values()
     predicted, panels = predicted_output(units, experiment, record.samples, request.bounds.output)
+    points = request.delivery.operating_points
     curves = SignalCurves(
         time,
         dict(zip(units.excitations, signals, strict=True)),
@@ -95,6 +96,7 @@ def signal_curves(
         panels,
         held=units.sampled,
         moves=_moves(request, units, record),
+        levels=points is not None and bool(np.any(points)),
     )
     return {"signal": Table(columns), "predicted_output": predicted}, curves
 

@@ -1,0 +1,101 @@
+"""What is wrong with the spec of the answers, said of the answer that it comes from, in its words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+
+from inputdesign_cli.errors import Diagnostic, IdesignError, OutputError
+from inputdesign_cli.wizard.questions import KEYS, question
+
+# Which answer a section of the spec comes from, the longer paths first.
+_ANSWERS = {
+    "experiment.controller": "loop",
+    "experiment": "time",
+    "limits.amplitude.output": "limits",
+    "limits.amplitude": "range",
+    "limits.duration": "time",
+    "limits": "limits",
+    "noise.drift": "drift",
+    "noise": "noise",
+    "plant": "plant",
+    "uncertainty": "plant",
+    "sample_time": "plant",
+    "signal.quantisation": "converter",
+    "signal.offset": "range",
+    "signal": "signals",
+}
+_OF_CODE = {"coarse-converter": "converter", "delay-beyond-record": "time", "too-few-lines": "wish"}
+# What a code says, or how it is mended, where the spec's own words would puzzle.
+_MESSAGES = {
+    "unstable-loop": "with these settings the loop is unstable even with the plant as stated",
+    "unbounded-error": "the plant integrates, and no experiment bounds its error at the lowest frequencies",
+    "too-few-lines": "too few frequencies between these two repeat within the time",
+    "delay-beyond-record": "the dead time of the plant is as long as the experiment, or longer",
+    "not-identifiable": "no experiment can tell the parameters of this plant apart",
+}
+_HINTS = {
+    "unstable-loop": "take a smaller Kp, of the same sign as the gain of the plant, or a larger Ti",
+    "unbounded-error": 'ask for "parameters within 5 %", or for a Bode plot from a frequency above zero on',
+    "too-few-lines": "widen the band, or take more time",
+    "delay-beyond-record": "take more time; what is a second, and what a minute?",
+    "not-identifiable": "has it a factor that cancels, or is it too small to be seen?",
+    "coarse-converter": "move the operating point, or let the converter reach further",
+    "data-missing-column": "name the columns in the first line of the file: time, u, y (at rest: y)",
+}
+_TERMS = {"nominal plant": "plant as stated", "the offset": "the operating point"}
+_PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)+")
+_QUIETER = re.compile(r"max_sensitivity_db: ([\d.]+)")
+
+
+@contextmanager
+def in_their_words(said: Mapping[str, str], key: str = "") -> Iterator[None]:
+    """Errors inside are those of an answer.
+
+    Args:
+        said: the answers.
+        key: of the question that they are about where they do not tell.
+    """
+    try:
+        yield
+    except OutputError:
+        raise
+    except IdesignError as error:
+        raise type(error)([_told(one, said, key) for one in error.diagnostics]) from error
+
+
+def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
+    if one.code == "bad-answer" and one.key in KEYS:
+        return one
+    asked = question(_question(one, said) or key or "wish")
+    why = _MESSAGES.get(one.code) or _in_words(one.message)
+    quieter = _QUIETER.search(one.hint)
+    hint = f"ask for {quieter[1]} dB or more" if quieter else _HINTS.get(one.code, "")
+    place = one.location if one.location and not one.location.file.startswith("<") else None
+    return replace(
+        one,
+        message=f"{asked.asks} ({asked.key}): {why}",
+        hint="; ".join(filter(None, (hint, f"allowed: {asked.allowed}"))),
+        key=asked.key,
+        location=place,
+    )
+
+
+def _question(one: Diagnostic, said: Mapping[str, str]) -> str:
+    """The question whose answer an entry of the spec comes from; empty where that is not known."""
+    # In open loop the only controller is that of the wish.
+    if one.code == "unstable-loop" and not re.search(r"\bKp\b", said.get("loop", ""), re.I):
+        return "wish"
+    if one.code in _OF_CODE:
+        return _OF_CODE[one.code]
+    found = (name for path, name in _ANSWERS.items() if f"{one.key}.".startswith(f"{path}."))
+    return next(found, one.key if one.key in KEYS else "")
+
+
+def _in_words(message: str) -> str:
+    """A message without paths and terms of the spec."""
+    for term, words in _TERMS.items():
+        message = message.replace(term, words)
+    return _PATH.sub(lambda path: "the " + path[0].rpartition(".")[2].replace("_", " "), message)

@@ -1,0 +1,231 @@
+"""Whatever is wrong with an answer is said of that answer, in words of the question, and of nothing else."""
+
+import json
+import re
+
+import pytest
+
+from inputdesign_cli.errors import Diagnostic, IdesignError, InfeasibleError, Location, OutputError, SpecError
+from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, question
+from inputdesign_cli.wizard.solving import enough_lines
+
+GOOD = {
+    "plant": "gain 2, time constant 180 s, dead time 25 s",
+    "wish": "own loop with 6 dB, Kp 1.5, Ti 180",
+    "range": "plus/minus 5 around 40",
+    "time": "20 min",
+    "noise": "standard deviation 0.2",
+}
+FILES = {
+    "empty.csv": "",
+    "head.csv": "time,u,y\n",
+    "text.csv": "hello world\nthis is no data\n",
+    "nan.csv": "time,u,y\n" + "".join(f"{k},{int(k >= 20)},nan\n" for k in range(60)),
+    "few.csv": "y\n1\n2\n",
+    "empty.json": "",
+    "lists.json": json.dumps({"num": [[1]], "den": [[1, 2]]}),
+    "sampled.json": json.dumps({"num": [0.1], "den": [1, -0.9], "dt": 1}),
+    "unstable.json": json.dumps({"num": [1], "den": [1, -1]}),
+    "half_unstable.json": json.dumps({"num": [1], "den": [1, 1, -2]}),
+    "improper.json": json.dumps({"num": [1, 2, 3], "den": [1, 1]}),
+    "negative.json": json.dumps({"num": [1], "den": [10, 1], "delay": -3}),
+    "nothing.json": json.dumps({"num": [0], "den": [10, 1]}),
+    "huge.json": json.dumps({"num": [1e300], "den": [1e308, 1]}),
+}
+ANYWHERE = ("", "text", "-1", "0", "1e308", "nan", "1e-300", "$(rm)", "{a: 1}")
+HOSTILE = {
+    "plant": """\
+gain nan, time constant 180 s
+gain 1e308, time constant 180 s
+gain 1e-300, time constant 1 s
+gain 2, time constant 0
+gain 2, time constant 180, dead time 1e6
+gain 2, time constant 3 kg
+gain 2, time constant 9, dead time -3
+gain 2, time constant 9, within -30 %
+gain 2, time constant 9, within 0 %
+gain 2, time constant 180 min
+gain 2, time constant 1e90 s
+log none.csv
+log empty.csv
+log head.csv
+step none.csv
+step empty.csv
+step head.csv
+log text.csv
+step text.csv
+log nan.csv
+step nan.csv
+log .
+step
+none.json
+empty.json
+lists.json
+sampled.json
+unstable.json
+half_unstable.json
+improper.json
+negative.json
+nothing.json
+huge.json
+""",
+    "wish": """\
+PI loop with nan dB
+PI loop with 0 dB
+PI loop with 0.01 dB
+PI loop with -3 dB
+PI loop
+PI loop with 1e99 dB
+PI loop with 90 degrees
+PI loop with gain margin 0.5
+PI loop, 29 Hz
+own loop with 6 dB, Kp 100, Ti 180
+own loop with 6 dB, Kp -1, Ti 180
+own loop with 6 dB, Kp 0
+own loop with 6 dB, Kp 1, Ti 0
+own loop with 6 dB, Kp 1, Ti -5
+own loop with 6 dB, Kp 1e90
+own loop with 6 dB, Kp 1, Ti 1e-9
+own loop with 6 dB, Kp 1, Ti 9 kg
+own loop with 6 dB, 1/(z-1)
+prediction within 0 % up to 1
+prediction within -5 % up to 1
+prediction within 500 % up to 1
+prediction within 5 % up to 0
+prediction within 5 % up to 1e9
+prediction within 1e-90 % up to 1
+parameters within 1e-90 %
+parameters within 5
+Bode plot within 5 % from 1 to 0.1
+Bode plot within 5 % from 0.001 to 100
+Bode plot within 5 % from 0.001 to 0.0010001
+""",
+    "range": """\
+plus/minus nan
+plus/minus 0
+plus/minus -5
+45 to 35
+5 to 5
+plus/minus 1e99
+plus/minus 5 around nan
+plus/minus 5 around text
+plus/minus 1e-99
+0 to 1e99
+""",
+    "time": """\
+0 s
+1e99 h
+5 parsecs
+1e-9 s
+1 h 30 min
+2 h around 5
+10 s
+""",
+    "limits": """\
+rate nan
+rate 0
+rate -1
+rate 1e-99
+output 0
+rate 0.5 output
+rate
+output 1e99
+""",
+    "noise": """\
+standard deviation nan
+standard deviation 0
+standard deviation 1e99
+resolution 0
+rest
+standard deviation 1e-160
+rest none.csv
+rest empty.csv
+rest head.csv
+rest text.csv
+rest nan.csv
+rest few.csv
+0.2
+""",
+    "drift": "maybe",
+    "loop": """\
+PI Kp 100, Ti 60
+PI Kp -1, Ti 60
+PI Kp nan
+PI Kp 1, Ti 0
+PI Kp 1e90, Ti 1
+closed
+PI Kp 1, Ti 60 kg
+C(z) = 1/(z-1)
+1/s
+""",
+    "signals": "square",
+    "converter": """\
+12 bits
+0 bits up to 100
+99 bits up to 100
+1e9 bits up to 100
+12 bits up to 0
+12 bits up to 10
+2 bits up to 100
+""",
+}
+# What only two answers together tell is said of the one that is easier to change.
+ALSO = {"plant": {"time"}}
+NOT_THEIRS = re.compile(
+    r"<\w+>|q\^-1|\b(accuracy|plant|limits|noise|signal|experiment)\.\w|tau_c|--set|--columns"
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("answers")
+    for name, content in FILES.items():
+        (made / name).write_text(content)
+    return made
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_every_fault_is_told_of_its_answer_in_words_of_the_question(key, folder):
+    for text in (*HOSTILE[key].splitlines(), *ANYWHERE):
+        with pytest.raises(IdesignError) as caught:
+            compose({**GOOD, key: text}, "x", folder).validate()
+        for told in caught.value.diagnostics:
+            asked = question(told.key)
+            assert told.key in {key} | ALSO.get(key, set()), text
+            assert told.message.startswith(f"{asked.asks} ({told.key}): "), text
+            assert asked.allowed in told.hint, text
+            assert not NOT_THEIRS.search(f"{told.message} {told.hint}"), (text, told)
+            assert told.location is None or told.location.file.startswith(str(folder)), text
+
+
+def test_an_unstable_loop_is_that_of_the_answer_that_has_a_controller(folder):
+    for answers, key in (({"wish": "own loop with 6 dB, Kp 100"}, "wish"), ({"loop": "PI Kp 100"}, "loop")):
+        with pytest.raises(SpecError) as caught:
+            compose({**GOOD, **answers}, "x", folder).validate()
+        (told,) = caught.value.diagnostics
+        assert (told.code, told.key) == ("unstable-loop", key)
+        assert "smaller Kp" in told.hint
+
+
+def test_what_a_design_of_the_draft_says_is_told_in_words_too(folder):
+    def solve(_):
+        place = Location("<answers>", 3, 1, "limits: {amplitude: 5}")
+        raise InfeasibleError.because("infeasible", "limits.amplitude is too small", "", "limits", place)
+
+    with pytest.raises(InfeasibleError) as caught:
+        enough_lines(compose(GOOD, "x", folder), solve)
+    (told,) = caught.value.diagnostics
+    assert (told.key, told.location) == ("limits", None)
+    assert "the amplitude is too small" in told.message
+
+
+def test_a_file_that_cannot_be_written_is_no_fault_of_an_answer():
+    with pytest.raises(OutputError) as caught, in_their_words({}):
+        raise OutputError.because("output-full", "there is no space left")
+    assert caught.value.diagnostics == (Diagnostic("output-full", "there is no space left"),)
+
+
+def test_every_question_is_tried():
+    assert set(HOSTILE) == {one.key for one in QUESTIONS}
