@@ -24,6 +24,7 @@ from inputdesign_cli.tasks.build.columns import (
     with_names,
 )
 from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.passed_over import passed_over
 from inputdesign_cli.tasks.build.preparation import (
     EVEN,
     MOST_JITTER,
@@ -144,8 +145,9 @@ def prepared(
             there = ~np.isnan(x)
             told += outliers(name, x[there], rows[there])
             told += limits_of_sensor(name, x[there]) if names is signals.outputs else []
-    segments, cuts = whole_segments(time, signals.u, signals.y, step, resample=preparation.resample)
-    told = [*cuts, *told]
+    apart, lines = passed_over(sheet, timed=bool(signals.name))
+    segments, cuts = whole_segments(time, signals.u, signals.y, step, apart, resample=preparation.resample)
+    told = [*lines, *cuts, *told]
     off = jitter(segments, step)
     if off > EVEN:
         if off > MOST_JITTER and not preparation.resample:

@@ -22,6 +22,8 @@ _GAP, _LONG_GAP = 1.5, 3.0
 _SHORTEST = 10
 # Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
 _OUTLYING = 8.0
+# A value so many times farther off than any other leaves nothing of them but rounding, when squared.
+_ABSURD = 1e10
 # More of them than this share are no outliers, but the other level of the signal.
 _OFTEN = 0.05
 _SHOWN = 5
@@ -80,9 +82,9 @@ class Segment:
 
 
 def whole_segments(
-    time: Array, u: Array, y: Array, step: float, *, resample: bool
+    time: Array, u: Array, y: Array, step: float, apart: NDArray[np.bool_], *, resample: bool
 ) -> tuple[list[Segment], list[str]]:
-    """The stretches between gaps: missing numbers, and steps of time that are too long.
+    """The stretches between gaps: missing numbers, steps of time that are too long, and where they are apart.
 
     Stretches of fewer than ten samples are left out where there are longer ones.
 
@@ -90,12 +92,13 @@ def whole_segments(
         time: (n,), increasing.
         u, y: (n, r), (n, p), NaN where a number is missing.
         step: the sample time.
+        apart: (n,), whether a stretch ends before a row, whatever its time.
     """
     told = []
     whole = ~np.isnan(np.column_stack([time, u, y])).any(axis=1)
     missing = int((~whole).sum())
     kept = np.flatnonzero(whole)
-    cut = np.diff(kept) > 1
+    cut = (np.diff(kept) > 1) | apart[kept[1:]]
     long = np.diff(time[kept]) > (_LONG_GAP if resample else _GAP) * step
     parts = np.split(kept, np.flatnonzero(cut | long) + 1)
     if missing:
@@ -141,12 +144,17 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
     return level, f"the mean {level[0]:.6g}"
 
 
+def spread_of(x: Array) -> float:
+    """A standard deviation of x (n,) that a few values do not move."""
+    spread = 1.4826 * float(np.median(np.abs(x - np.median(x))))
+    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
+    # Two levels have no spread about the more frequent one.
+    return max(spread, float(high - low) / 4.0)
+
+
 def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     """Values far from the median of a signal x (n,), with their rows in the file."""
-    middle = np.median(x)
-    spread = 1.4826 * np.median(np.abs(x - middle))
-    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
-    spread = max(spread, (high - low) / 4.0)  # two levels have no spread about the more frequent one
+    middle, spread = np.median(x), spread_of(x)
     if spread <= 0.0:
         return []
     found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
@@ -156,6 +164,23 @@ def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     return [
         f"{name} has {found.size} outlying value{'s' * (found.size > 1)} (row {listed}): look at the record"
     ]
+
+
+def absurd(x: Array) -> int | None:
+    """The first of values of a signal x (n,), NaN where missing, beside which all others are rounding."""
+    there = np.flatnonzero(~np.isnan(x))
+    middle = float(np.median(x[there]))
+    off = np.abs(x[there] - middle)
+    sizes = np.sort(off[off > 0.0])
+    jumps = np.flatnonzero(sizes[1:] > _ABSURD * sizes[:-1])
+    if not jumps.size:
+        return None
+    least = sizes[jumps[-1] + 1]
+    far = there[off >= least]
+    # Beside a level, or as often as the other level of a signal, it is no fault.
+    if far.size > _OFTEN * there.size or least <= _ABSURD * max(abs(middle), spread_of(x[there])):
+        return None
+    return int(far[0])
 
 
 def limits_of_sensor(name: str, x: Array) -> list[str]:

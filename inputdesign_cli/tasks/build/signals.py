@@ -11,11 +11,11 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.columns import channel_columns, time_column
 from inputdesign_cli.tasks.build.files import Sheet
-from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.preparation import Preparation, absurd
 from inputdesign_cli.tasks.build.tables import columns_of, is_dated
 
-# A signal whose largest value is beyond this, or below its inverse, leaves double precision when squared.
-_EXTREME = 1e100
+# Squares of signals are powers, and a spec has none beyond the square of this, or below that of its inverse.
+_EXTREME = 1e18
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,6 @@ def signals_of(
         begin, end = preparation.span
         scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
         rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
-    for role in found.keys() - {"time"}:
-        _check_range(sheet, wanted[role], found[role])
     if not rows.size:
         message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
         raise DataError.because("data-unreadable", message, "mind --skip and --range", sheet.key)
@@ -73,6 +71,11 @@ def signals_of(
     kept = replace(
         sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
     )
+    for role, numbers in found.items():
+        own = numbers[rows]
+        if not np.isnan(own).all():
+            # Clocks count from long ago.
+            _check_range(kept, wanted[role], own - np.nanmin(own) if role == "time" else own)
     driving = (*_labels("u", inputs), *references)
     u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
@@ -83,15 +86,22 @@ def signals_of(
 
 
 def _check_range(sheet: Sheet, name: str, x: Array) -> None:
-    """The products of three samples of a signal x (n,) stay within double precision.
+    """Squares of a signal x (n,), some of it there, stay within double precision, beside each other too.
 
     Raises:
         DataError: `beyond-precision`.
     """
-    row = int(np.nanargmax(np.abs(x)))
+    row, lost = int(np.nanargmax(np.abs(x))), absurd(x)
     size = abs(float(x[row]))
+    if lost is not None:
+        message = f"beside {x[lost]:.6g} in column {name} all other values are lost in rounding"
+        hint = "if it is a fault of measurement, empty the cell, which cuts the record there"
+        raise DataError(sheet.error("beyond-precision", message, hint, lost))
     if size and not 1.0 / _EXTREME < size < _EXTREME:
-        message = f"the column {name} has values up to {size:.3g}: their squares leave double precision"
+        message = (
+            f"the column {name} has values up to {size:.3g}: their squares are beyond {_EXTREME**2:.0e} or "
+            f"below {_EXTREME**-2:.0e}"
+        )
         hint = "write the signals in a unit in which they are of the order of one"
         raise DataError(sheet.error("beyond-precision", message, hint, row))
 

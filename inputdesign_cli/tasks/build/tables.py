@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
+from inputdesign_cli.tasks.build.files.layout import BLANK, LEFT_OUT
 from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
@@ -38,6 +39,22 @@ def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
             hint = "write plain numbers with a decimal point, one row a line"
             raise DataError(sheet.error("data-not-a-number", message, hint, int(missing[0])))
     return found
+
+
+def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
+    """The same of a signal, in which no sample may be missing, not even between its rows.
+
+    Raises:
+        DataError: see `read_columns`; `data-not-a-number`, a line between the numbers is blank or commented out.
+    """
+    sheet = read_sheet(path, key=key)
+    for line, kind in sheet.passed:
+        if kind in LEFT_OUT:
+            what = "is blank" if kind == BLANK else "is commented out"
+            message = f"line {line} of {path.name} {what}: is a sample missing between the rows about it?"
+            row = int(np.searchsorted(sheet.lines, line)) - 1
+            raise DataError(sheet.error("data-not-a-number", message, "take the line out of the file", row))
+    return read_columns(path, wanted, key=key)
 
 
 def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:

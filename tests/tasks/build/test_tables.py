@@ -7,7 +7,7 @@ import time
 import pytest
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.tasks.build.tables import read_columns, read_header
+from inputdesign_cli.tasks.build.tables import read_columns, read_header, read_samples
 
 
 def refused(path, wanted=None):
@@ -80,3 +80,11 @@ def test_the_header_of_a_table_is_shown(tmp_path):
     path.write_text("day,valve,level\n2026-01-01,1,2\n2026-01-02,3,4\n")
     assert "day, valve, level" in refused(path).message
     assert read_header(path, key="") == ["day", "valve", "level"]
+
+
+@pytest.mark.parametrize("line", ["", "# 3"])
+def test_a_signal_lacks_no_sample_between_its_rows(line, tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text(f"u,r\n1,0\n2,0\n{line and line + ',0'}\n4,0\n")
+    with pytest.raises(DataError, match="line 4 of u.csv is .*: is a sample missing"):
+        read_samples(path, {"u": "u"}, key="spectrum.given.signal")

@@ -40,6 +40,7 @@ class Sheet:
         texts: what the rows say, for diagnostics; empty where a file is no text.
         shown: whether messages may show what the file holds: it is a table of numbers, and no secret.
         sample_time: as the file says itself; None where it does not.
+        passed: lines between rows of numbers that are no rows, and what they are: see `layout`.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class Sheet:
     texts: Sequence[str] = ()
     shown: bool = True
     sample_time: float | None = None
+    passed: tuple[tuple[int, str], ...] = ()
 
     @property
     def header(self) -> list[str]:

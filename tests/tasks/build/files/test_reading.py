@@ -11,7 +11,6 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.files.layout import rows_of
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, read_columns
@@ -297,6 +296,39 @@ def test_a_file_that_ends_its_reader_is_refused(tmp_path):
         read_sheet(path, key="")
 
 
-def test_a_row_of_empty_cells_between_numbers_is_a_sample_that_is_missing():
-    text = "u1,y1\n,\n1,2\n,\n3,4\n,\n"
-    assert [row for _, row in rows_of(text, ",")] == [["u1", "y1"], ["1", "2"], ["", ""], ["3", "4"]]
+def cells_of(path, text):
+    path.write_text(text)
+    sheet = read_sheet(path, key="")
+    return np.column_stack([column.numbers for column in sheet.columns])
+
+
+def test_a_row_of_empty_cells_between_numbers_is_a_sample_that_is_missing(tmp_path):
+    found = cells_of(tmp_path / "log.csv", "u1,y1\n,\n1,2\n,\n3,4\n,\n")
+    np.testing.assert_array_equal(found, [[1, 2], [np.nan, np.nan], [3, 4]])
+
+
+def test_it_is_one_beside_a_column_of_words_too(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("u1,y1,state\n1,2,ok\n,,\n3,4,ok\n")
+    np.testing.assert_array_equal(read_columns_with_gaps(path), [1, np.nan, 3])
+
+
+def read_columns_with_gaps(path):
+    return columns_of(read_sheet(path, key=""), {"u": "u1"})["u"]
+
+
+@pytest.mark.parametrize("preamble", ["Serial,42\n\n,\n", "# 1,2\n\n", "\n"])
+def test_what_stands_above_the_table_cuts_nothing(preamble, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(preamble + "u1,y1\n\n1,2\n3,4\n\n# the end\n")
+    sheet = read_sheet(path, key="")
+    assert sheet.passed == ()
+    assert len(sheet.lines) == 2
+
+
+def test_a_field_that_is_too_long_is_no_open_quote(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(f"u,y\n1,2\n3,{'4' * 200_000}\n")
+    with pytest.raises(DataError, match="line 3 has a field of more than 131072 characters") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location.line == 3
