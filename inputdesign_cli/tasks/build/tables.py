@@ -45,7 +45,7 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
     """The same of a signal, in which no sample may be missing, not even between its rows.
 
     Raises:
-        DataError: see `read_columns`; `data-not-a-number`, a line between the numbers is blank or commented out.
+        DataError: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in between.
     """
     sheet = read_sheet(path, key=key)
     for line, kind in sheet.passed:

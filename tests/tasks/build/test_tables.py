@@ -86,5 +86,5 @@ def test_the_header_of_a_table_is_shown(tmp_path):
 def test_a_signal_lacks_no_sample_between_its_rows(line, tmp_path):
     path = tmp_path / "u.csv"
     path.write_text(f"u,r\n1,0\n2,0\n{line and line + ',0'}\n4,0\n")
-    with pytest.raises(DataError, match="line 4 of u.csv is .*: is a sample missing"):
+    with pytest.raises(DataError, match=r"line 4 of u\.csv is .*: is a sample missing"):
         read_samples(path, {"u": "u"}, key="spectrum.given.signal")
