@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,14 @@ from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 
-_TIME = re.compile(r"(sampling[ _]|elapsed[ _])?(time|t|timestamp)(?![a-z0-9]).*")
+_TIME = re.compile(
+    r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
+)
+# The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
+_SHORT = re.compile(
+    r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
+)
+_MOSTLY, _EVENLY = 0.9, 0.01
 
 
 def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
@@ -88,9 +95,33 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
 
-def is_time(name: str) -> bool:
-    """Whether a column of this name, in small letters, holds times."""
-    return _TIME.fullmatch(name) is not None
+def time_columns(sheet: Sheet) -> list[str]:
+    """Names, in small letters, of columns that hold times by their names; that of dates if there is none."""
+    header = sheet.header
+    found = [
+        name
+        for name, column in zip(header, sheet.columns, strict=False)
+        if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly_rises(column.numbers))
+    ]
+    dated = [name for name, column in zip(header, sheet.columns, strict=False) if column.dated]
+    return found or [name for name in dated if name.startswith("dat")]
+
+
+def _mostly_rises(x: Array) -> bool:
+    steps = np.diff(x[~np.isnan(x)])
+    return bool(np.mean(steps > 0.0) > _MOSTLY) if steps.size else False
+
+
+def evenly_rising(sheet: Sheet, taken: Collection[str]) -> list[str]:
+    """Names of columns not taken whose numbers rise by even steps: times, or a count of rows."""
+    found = []
+    for name, column in zip(sheet.names, sheet.columns, strict=False):
+        steps = np.diff(column.numbers)
+        middle = float(np.median(steps)) if steps.size > 1 else 0.0
+        even = middle > 0.0 and bool(np.all(np.abs(steps - middle) < _EVENLY * middle))
+        if even and name.strip().lower() not in taken and column.fault is None:
+            found.append(name.strip())
+    return found
 
 
 def is_dated(sheet: Sheet, name: str) -> bool:
@@ -125,9 +156,13 @@ def named_columns(sheet: Sheet, start: str) -> list[int]:
 
 
 def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
+    held = next((name for name in sheet.left_out if name.lower() in map(str.lower, names)), None)
+    if held is not None:
+        return no_column(sheet, held)
     hint = f"name one column {' and one '.join(names)}"
     if not sheet.key:
-        others = [name.strip() for name in sheet.names if not is_time(name.strip().lower())]
+        times = time_columns(sheet)
+        others = [name.strip() for name in sheet.names if name.strip().lower() not in times]
         called = others if sheet.shown and len(others) == len(names) else ["NAME"] * len(names)
         columns = ",".join(f"{name}={column}" for name, column in zip(names, called, strict=True))
         quoted = f'"{columns}"' if " " in columns else columns
@@ -139,7 +174,16 @@ def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
         message = f"{sheet.path.name} has no header that names {', '.join(names)}"
         message += f" (it has {len(sheet.columns)} columns)"
     elif sheet.shown:
-        message += f" (its header is: {', '.join(name.strip() for name in sheet.names)})"
+        message += f" ({sheet.contents})"
+    return sheet.error("data-missing-column", message, hint)
+
+
+def no_column(sheet: Sheet, name: str) -> Diagnostic:
+    """The error about what a file holds under a name, and what is no column of numbers."""
+    message = (
+        f"{name} in {sheet.path.name} holds {sheet.left_out[name]}: a signal is a column of real numbers"
+    )
+    hint = "save it as an array of numbers, a sample in each row and a channel in each column"
     return sheet.error("data-missing-column", message, hint)
 
 

@@ -6,6 +6,7 @@ import pytest
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import read_data
+from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation, absurd, limits_of_sensor, trend
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
@@ -176,3 +177,11 @@ def test_pulses_steps_and_tiny_values_are_no_faults():
     for x in (pulse, late, 0.9 ** np.arange(400.0), 20.0 + 1e-14 * Y, np.r_[Y, 1e-320], 20.0 + pulse):
         assert absurd(x) is None
     assert absurd(np.r_[Y, 1e25, Y]) == N
+
+
+def test_a_column_that_may_hold_the_times_is_told(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["Sekunden,u,y", *lines_of(20)]))
+    (first, second, *_) = read_log(path, Preparation()).steps
+    assert first.startswith("the file has no times")
+    assert second.startswith("Sekunden rises by even steps")

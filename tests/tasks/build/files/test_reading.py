@@ -332,3 +332,50 @@ def test_a_field_that_is_too_long_is_no_open_quote(tmp_path):
     with pytest.raises(DataError, match="line 3 has a field of more than 131072 characters") as caught:
         read_sheet(path, key="")
     assert caught.value.diagnostics[0].location.line == 3
+
+
+WRONG = {
+    "complex numbers": U + 1j,
+    "text": np.array(list("abcd")),
+    "an array of 3 dimensions": np.ones((4, 2, 2)),
+    "nothing": np.zeros(0),
+    "a single number": np.array(2.0),
+}
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+@pytest.mark.parametrize("what", WRONG)
+def test_arrays_that_are_no_columns_are_told_by_what_they_hold(kind, what, tmp_path):
+    path = tmp_path / f"log.{kind}"
+    (np.savez if kind == "npz" else lambda path, **arrays: scipy.io.savemat(path, arrays))(
+        path, u=WRONG[what], y=Y
+    )
+    for read in (lambda: read_log(path, Preparation()), lambda: read_columns(path, {"u": "u"}, key="")):
+        with pytest.raises(DataError) as caught:
+            read()
+        assert caught.value.diagnostics[0].message.startswith(f"u in log.{kind} holds {what}: ")
+
+
+def test_arrays_that_mean_columns_of_numbers_are_columns(tmp_path):
+    """Complex numbers without an imaginary part, a third dimension of one, fields, and times."""
+    path = tmp_path / "log.npz"
+    moments = np.datetime64("2024-03-12T10:15:00") + (1000 * TIME).astype("timedelta64[ms]")
+    fields = np.array(list(zip(U, Y, strict=True)), dtype=[("u1", float), ("y1", float)])
+    np.savez(path, time=moments, u2=U + 0j, y2=Y[:, None, None], fields=fields)
+    names = ("time", "u1", "y1", "u2", "y2")
+    found = read_columns(path, {name: name for name in names}, key="")
+    for name, expected in zip(names, (TIME, U, Y, U, Y), strict=True):
+        np.testing.assert_array_equal(found[name], expected)
+
+
+def test_dates_of_workbooks_are_times(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "log.parquet"
+    pandas.DataFrame(
+        {"time": pandas.to_datetime(1e9 * TIME), "u": U, "y": Y, "state": list("abcd")}
+    ).to_parquet(path)
+    sheet = read_sheet(path, key="")
+    np.testing.assert_array_equal(columns_of(sheet, {"time": "time"})["time"], TIME)
+    assert sheet.columns[0].dated
+    assert sheet.left_out == {"state": "text"}
