@@ -26,7 +26,7 @@ from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.log import Log, channels_by_name, read_logs
+from inputdesign_cli.tasks.build.log import Log, read_logs, with_channels
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
 from inputdesign_cli.tasks.result.exploration import (
@@ -188,11 +188,13 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         DataError: the data cannot be used.
     """
     started = time.perf_counter()
-    if not preparation.columns:
-        found_columns = channels_by_name(read_sheet(paths[0], key=""))
-        counts = {"u": header.units.inputs, "y": header.units.outputs}
-        own = {name: c for name, c in found_columns.items() if int(name[1:]) <= counts[name[0]]}
-        preparation = replace(preparation, columns=own)
+    counts = {"u": header.units.inputs, "y": header.units.outputs}
+    own = {
+        name: column
+        for name, column in with_channels(read_sheet(paths[0], key=""), preparation.columns).items()
+        if name in preparation.columns or int(name[1:]) <= counts[name[0]]
+    }
+    preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))

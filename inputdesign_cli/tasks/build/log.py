@@ -15,7 +15,7 @@ from inputdesign_cli.tasks.build.columns import time_unit_of, with_headers
 from inputdesign_cli.tasks.build.data import prepared
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.signals import signals_of, stated_step
+from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
 from inputdesign_cli.tasks.build.tables import evenly_rising, no_column
 
 _CHANNELS = {
@@ -60,7 +60,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         DataError: the file cannot be read, or does not tell its inputs and outputs.
     """
     sheet = read_sheet(path, key="")
-    columns = preparation.columns or channels_by_name(sheet)
+    columns = with_channels(sheet, preparation.columns)
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = with_headers(sheet, replace(preparation, columns=columns))
     signals = signals_of(sheet, counts["u"], counts["y"], given)
@@ -71,6 +71,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         step = _typical(signals.time)
     elif stated:
         step = stated
+        _check_apart(sheet, signals, step)
     else:
         step = 1.0
         told.append("the file has no times and no --sample-time was given: the sample time is taken for 1")
@@ -92,6 +93,29 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         unit,
         (*told, *notes),
     )
+
+
+def _check_apart(sheet: Sheet, signals: Signals, step: float) -> None:
+    """Rows are not much farther apart than the stated sample time.
+
+    Raises:
+        DataError: `data-not-uniform`.
+    """
+    apart = _typical(signals.time) if signals.name else step
+    if apart > 1.5 * step:
+        message = f"the rows of {sheet.path.name} are {apart:.6g} apart, and --sample-time says {step:.6g}"
+        hint = "leave --sample-time out: the times tell it; or mind its unit (--time-unit)"
+        raise DataError(sheet.error("data-not-uniform", message, hint, 0))
+
+
+def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
+    """The columns that are named, and by their names those of the inputs or outputs of which none is."""
+    found = {
+        channel: name
+        for channel, name in channels_by_name(sheet).items()
+        if not any(other.startswith(channel[0]) for other in named)
+    }
+    return {**found, **named}
 
 
 def channels_by_name(sheet: Sheet) -> dict[str, str]:

@@ -169,8 +169,9 @@ def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
 def absurd(x: Array) -> int | None:
     """The first of values of a signal x (n,), NaN where missing, beside which all others are rounding."""
     there = np.flatnonzero(~np.isnan(x))
-    middle = float(np.median(x[there]))
-    off = np.abs(x[there] - middle)
+    scaled = x[there] / max(float(np.abs(x[there]).max()), np.finfo(float).tiny)
+    middle = float(np.median(scaled))
+    off = np.abs(scaled - middle)
     sizes = np.sort(off[off > 0.0])
     jumps = np.flatnonzero(sizes[1:] > _ABSURD * sizes[:-1])
     if not jumps.size:
@@ -178,7 +179,7 @@ def absurd(x: Array) -> int | None:
     least = sizes[jumps[-1] + 1]
     far = there[off >= least]
     # Beside a level, or as often as the other level of a signal, it is no fault.
-    if far.size > _OFTEN * there.size or least <= _ABSURD * max(abs(middle), spread_of(x[there])):
+    if far.size > _OFTEN * there.size or least <= _ABSURD * max(abs(middle), spread_of(scaled)):
         return None
     return int(far[0])
 

@@ -72,7 +72,7 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     """
     found = {role: named_columns(sheet, start.strip().lower()) for role, start in wanted.items()}
     wrong = [
-        _unclear(sheet, what, [wanted[role] for role in roles])
+        _unclear(sheet, what, {role: wanted[role] for role in roles})
         for what, roles in (
             ("no column", [role for role, at in found.items() if not at]),
             ("several columns", [role for role, at in found.items() if len(at) > 1]),
@@ -81,6 +81,14 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     ]
     if wrong:
         raise DataError(wrong)
+    for (at,) in found.values():
+        same = [other for other in found if found[other] == [at]]
+        if len(same) > 1:
+            message = f"{' and '.join(same)} are the same column of {sheet.path.name}"
+            if sheet.shown and sheet.names:
+                message += f": {sheet.names[at].strip()}"
+            hint = "name another one for one of them: --columns " + ",".join(f"{o}={wanted[o]}" for o in same)
+            raise DataError(sheet.error("data-missing-column", message, hint))
     for role, (at,) in found.items():
         fault = sheet.columns[at].fault
         if fault is not None:
@@ -155,23 +163,30 @@ def named_columns(sheet: Sheet, start: str) -> list[int]:
     return [number - 1] if 1 <= number <= len(sheet.columns) else []
 
 
-def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
+def _unclear(sheet: Sheet, what: str, wanted: Mapping[str, str]) -> Diagnostic:
+    """The error about columns, by role, of which there is none or several."""
+    names = list(wanted.values())
     held = next((name for name in sheet.left_out if name.lower() in map(str.lower, names)), None)
     if held is not None:
         return no_column(sheet, held)
     hint = f"name one column {' and one '.join(names)}"
+    said = [role for role, start in wanted.items() if not role.startswith(start)]
     if not sheet.key:
         times = time_columns(sheet)
         others = [name.strip() for name in sheet.names if name.strip().lower() not in times]
-        called = others if sheet.shown and len(others) == len(names) else ["NAME"] * len(names)
-        columns = ",".join(f"{name}={column}" for name, column in zip(names, called, strict=True))
+        called = others if sheet.shown and len(others) == len(names) and not said else ["NAME"] * len(names)
+        channels = [role if role in said else start for role, start in wanted.items()]
+        columns = ",".join(f"{channel}={column}" for channel, column in zip(channels, called, strict=True))
         quoted = f'"{columns}"' if " " in columns else columns
         hint += f", or say which it is: --columns {quoted} (or its number)"
+        if said:
+            hint = f"write --columns {quoted} with a name as it stands in the file, or with its number"
     if names == ["frequency"]:
         hint += ", such as frequency_rad_per_s"
-    message = f"{sheet.path.name} has {what} for {', '.join(names)}"
+    told = [f"{start} ({role})" if role in said else start for role, start in wanted.items()]
+    message = f"{sheet.path.name} has {what} for {', '.join(told)}"
     if not sheet.names:
-        message = f"{sheet.path.name} has no header that names {', '.join(names)}"
+        message = f"{sheet.path.name} has no header that names {', '.join(told)}"
         message += f" (it has {len(sheet.columns)} columns)"
     elif sheet.shown:
         message += f" ({sheet.contents})"
