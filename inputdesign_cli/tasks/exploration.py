@@ -76,7 +76,11 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     identified = _asked(
         task,
         Identified(
-            found.estimate, found.model, Data(u, y, None, times, lengths, (), notes), preparation, None
+            found.estimate,
+            found.model,
+            Data(u, y, None, times, lengths, (), notes, recorded=log.recorded.at(found.samples)),
+            preparation,
+            None,
         ),
     )
     results = identification_results(task, identified, started)
@@ -199,7 +203,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)
-    table, curves = validation_curves(header.units, data.u, data.y, found)
+    table, curves = validation_curves(header.units, data.time, data.u, data.y, found)
     result: dict[str, Json] = {
         "format": 1,
         "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",

@@ -12,7 +12,7 @@ import numpy as np
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.columns import time_unit_of, with_headers
-from inputdesign_cli.tasks.build.data import prepared
+from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
@@ -36,6 +36,7 @@ class Log:
         names: of the columns, by channel.
         step, time_unit: the sample time.
         steps: what was done to the record, and what was seen in it.
+        recorded: of the outputs.
     """
 
     u: Array
@@ -45,6 +46,7 @@ class Log:
     step: float
     time_unit: str
     steps: tuple[str, ...]
+    recorded: Recorded
 
     @property
     def parts(self) -> list[tuple[Array, Array]]:
@@ -92,6 +94,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         step,
         unit,
         (*told, *notes),
+        recorded_in(signals, step, segments),
     )
 
 
@@ -200,4 +203,5 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
             for path, log in zip(paths, logs, strict=True)
             for step in log.steps
         ),
+        Recorded.together([log.recorded for log in logs]),
     )

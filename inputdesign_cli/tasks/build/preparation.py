@@ -166,6 +166,22 @@ def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     ]
 
 
+def standing_alone(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
+    """More values of a measured signal x (n,) than outliers are, each far from its neighbours: spikes."""
+    if x.size < _SHORTEST:
+        return []
+    near = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
+    off = np.abs(x[2:-2] - near)
+    found = 2 + np.flatnonzero(off > _OUTLYING * 1.4826 * np.median(off))
+    if not np.median(off) > 0.0 or found.size <= _OFTEN * x.size:
+        return []
+    listed = ", ".join(str(rows[i]) for i in found[:_SHOWN])
+    return [
+        f"{name} has {found.size} values ({100 * found.size / x.size:.2g} %) far from their neighbours (row "
+        f"{listed}, ..): spikes? Look at the record, and empty the cells that are faults of measurement"
+    ]
+
+
 def absurd(x: Array) -> int | None:
     """The first of values of a signal x (n,), NaN where missing, beside which all others are rounding."""
     there = np.flatnonzero(~np.isnan(x))
