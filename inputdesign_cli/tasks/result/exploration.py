@@ -97,8 +97,8 @@ def exploration_notes(
             f"simulates {taken.validation:.1f} % of the other, best of {len(chosen.candidates)} structures"
         )
     notes += [
-        f"{'y' if single else f'y{i + 1}'}: no {' or '.join(chosen.dropped)} model could be estimated: the record "
-        f"does not tell all its parameters{_least_moved(log, found)}"
+        f"{'y' if single else f'y{i + 1}'}: no {' or '.join(chosen.dropped)} model could be estimated: the "
+        f"record does not tell all its parameters{_least_moved(log, found)}"
         for i, chosen in enumerate(found.outputs)
         if chosen.dropped
     ]
