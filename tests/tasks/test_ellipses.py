@@ -65,12 +65,14 @@ def test_unknown_names_and_other_designs_are_refused(name, override, code, key):
 def test_the_boundary_is_that_of_the_region_though_parameters_are_told_together(apart, scale):
     """Points on it have the chi-squared quantile in the covariance; a singular one leaves a line."""
     C = np.array([[1.0, scale], [scale, scale**2 * (1.0 + apart)]])
-    points = boundary(np.array([1.0, 2.0]), C, 0.95) - np.array([[1.0], [2.0]])
+    points = boundary(np.zeros(2), C, 0.95)
     assert np.all(np.isfinite(points))
     radius = np.sqrt(-2.0 * np.log(0.05))
     # Farthest along each axis: radius times its standard deviation.
     reach = np.abs(points).max(axis=1)
     np.testing.assert_allclose(reach, radius * np.sqrt(np.diag(C)), rtol=1e-2)
     if apart == 1.0:
-        lengths = np.einsum("in,ij,jn->n", points, np.linalg.inv(C), points)
+        sizes = np.sqrt(np.diag(C))[:, None]
+        inverse = np.linalg.inv(C / (sizes * sizes.T))
+        lengths = np.einsum("in,ij,jn->n", points / sizes, inverse, points / sizes)
         np.testing.assert_allclose(lengths, radius**2, rtol=1e-9)
