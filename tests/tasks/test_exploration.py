@@ -9,6 +9,7 @@ import scipy.signal
 from typer.testing import CliRunner
 
 from inputdesign_cli.cli import app
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.specification import load_spec, parse_spec
 from inputdesign_cli.tasks import explore, identify, solve
@@ -202,3 +203,18 @@ def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
     assert bool(told) == bool(output["not_estimated"])
     assert {"FOPDT", "SOPDT", "TOPDT"} <= left | set(output["not_estimated"])
     assert "u2 changes in 1 of its samples only" in told[0]
+
+
+def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)
+    pole = np.exp(-0.1)
+    y = scipy.signal.lfilter([0, 1 - pole], [1, -pole], u) + 0.05 * rng.standard_normal(300)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{k},{a:g},{b:.5f}\n" for k, (a, b) in enumerate(zip(u, y, strict=True)))
+    path.write_text(f"time,u,y\n{rows}")
+    found = explore(path).results
+    assert "L 0 +-" in summary(found.result, "s", [])
+    (told,) = [note for note in found.result["notes"] if note.startswith("L of a dead time")]
+    deviation = found.result["identification"]["standard_deviation"]["L"]
+    assert float(told.split(": ")[1].split()[0]) == pytest.approx(1.96 * deviation, rel=0.01)

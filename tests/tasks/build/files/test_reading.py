@@ -10,7 +10,7 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
-from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.files import isolated, read_sheet
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, read_columns
@@ -332,6 +332,16 @@ def test_a_field_that_is_too_long_is_no_open_quote(tmp_path):
     with pytest.raises(DataError, match="line 3 has a field of more than 131072 characters") as caught:
         read_sheet(path, key="")
     assert caught.value.diagnostics[0].location.line == 3
+
+
+def test_an_object_beside_other_arrays_is_told_with_the_lines_that_convert_it(monkeypatch, tmp_path):
+    """SciPy writes no such objects: what its reader tells of one."""
+    path = tmp_path / "log.mat"
+    path.write_bytes(b"MATLAB 5.0 MAT-file")
+    monkeypatch.setattr(isolated, "arrays_of", lambda raw: isolated.Arrays({"v": U}, opaque=True))
+    with pytest.raises(DataError) as caught:
+        read_log(path, Preparation())
+    assert "save('data.mat', '-struct', 's'" in caught.value.diagnostics[0].message
 
 
 WRONG = {
