@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
 
 Detrend = Literal["none", "constant", "linear", "auto"]
 DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
@@ -22,10 +23,6 @@ _GAP, _LONG_GAP = 1.5, 3.0
 _SHORTEST = 10
 # Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
 _OUTLYING = 8.0
-# A value so many times farther off than any other leaves nothing of them but rounding, when squared.
-_ABSURD = 1e10
-# More of them than this share are no outliers, but the other level of the signal.
-_OFTEN = 0.05
 _SHOWN = 5
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
@@ -144,21 +141,13 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
     return level, f"the mean {level[0]:.6g}"
 
 
-def spread_of(x: Array) -> float:
-    """A standard deviation of x (n,) that a few values do not move."""
-    spread = 1.4826 * float(np.median(np.abs(x - np.median(x))))
-    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
-    # Two levels have no spread about the more frequent one.
-    return max(spread, float(high - low) / 4.0)
-
-
 def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     """Values far from the median of a signal x (n,), with their rows in the file."""
     middle, spread = np.median(x), spread_of(x)
     if spread <= 0.0:
         return []
     found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
-    if not found.size or found.size > _OFTEN * x.size:
+    if not found.size or found.size > OFTEN * x.size:
         return []
     listed = ", ".join(str(rows[i]) for i in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
     return [
@@ -173,31 +162,13 @@ def standing_alone(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     near = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
     off = np.abs(x[2:-2] - near)
     found = 2 + np.flatnonzero(off > _OUTLYING * 1.4826 * np.median(off))
-    if not np.median(off) > 0.0 or found.size <= _OFTEN * x.size:
+    if not np.median(off) > 0.0 or found.size <= OFTEN * x.size:
         return []
     listed = ", ".join(str(rows[i]) for i in found[:_SHOWN])
     return [
         f"{name} has {found.size} values ({100 * found.size / x.size:.2g} %) far from their neighbours (row "
         f"{listed}, ..): spikes? Look at the record, and empty the cells that are faults of measurement"
     ]
-
-
-def absurd(x: Array) -> int | None:
-    """The first of values of a signal x (n,), NaN where missing, beside which all others are rounding."""
-    there = np.flatnonzero(~np.isnan(x))
-    scaled = x[there] / max(float(np.abs(x[there]).max()), np.finfo(float).tiny)
-    middle = float(np.median(scaled))
-    off = np.abs(scaled - middle)
-    sizes = np.sort(off[off > 0.0])
-    jumps = np.flatnonzero(sizes[1:] > _ABSURD * sizes[:-1])
-    if not jumps.size:
-        return None
-    least = sizes[jumps[-1] + 1]
-    far = there[off >= least]
-    # Beside a level, or as often as the other level of a signal, it is no fault.
-    if far.size > _OFTEN * there.size or least <= _ABSURD * max(abs(middle), spread_of(scaled)):
-        return None
-    return int(far[0])
 
 
 def limits_of_sensor(name: str, x: Array) -> list[str]:

@@ -10,12 +10,10 @@ import numpy as np
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.columns import channel_columns, time_column
+from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet
-from inputdesign_cli.tasks.build.preparation import Preparation, absurd
+from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, is_dated
-
-# Squares of signals are powers, and a spec has none beyond the square of this, or below that of its inverse.
-_EXTREME = 1e18
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ def signals_of(
         own = numbers[rows]
         if not np.isnan(own).all():
             # Clocks count from long ago.
-            _check_range(kept, wanted[role], own - np.nanmin(own) if role == "time" else own)
+            check_range(kept, wanted[role], own - np.nanmin(own) if role == "time" else own)
     driving = (*_labels("u", inputs), *references)
     u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
@@ -95,27 +93,6 @@ def _nothing_left(sheet: Sheet, preparation: Preparation, time: Array) -> DataEr
         hint = f"its times run from {there.min():.6g} to {there.max():.6g}: no row{skipped} lies within "
         hint += "--range {:g}:{:g}".format(*preparation.span)
     return DataError.because("data-unreadable", message, hint, sheet.key, Location(str(sheet.path), 1, 1, ""))
-
-
-def _check_range(sheet: Sheet, name: str, x: Array) -> None:
-    """Squares of a signal x (n,), some of it there, stay within double precision, beside each other too.
-
-    Raises:
-        DataError: `beyond-precision`.
-    """
-    row, lost = int(np.nanargmax(np.abs(x))), absurd(x)
-    size = abs(float(x[row]))
-    if lost is not None:
-        message = f"beside {x[lost]:.6g} in column {name} all other values are lost in rounding"
-        hint = "if it is a fault of measurement, empty the cell, which cuts the record there"
-        raise DataError(sheet.error("beyond-precision", message, hint, lost))
-    if size and not 1.0 / _EXTREME < size < _EXTREME:
-        message = (
-            f"the column {name} has values up to {size:.3g}: their squares are beyond {_EXTREME**2:.0e} or "
-            f"below {_EXTREME**-2:.0e}"
-        )
-        hint = "write the signals in a unit in which they are of the order of one"
-        raise DataError(sheet.error("beyond-precision", message, hint, row))
 
 
 def _check_rising(sheet: Sheet, time: Array) -> None:

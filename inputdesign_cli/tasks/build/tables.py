@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.files.layout import BLANK, LEFT_OUT
 from inputdesign_cli.tasks.build.header import build_units
@@ -25,6 +26,7 @@ _SHORT = re.compile(
     r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
 )
 _MOSTLY, _EVENLY = 0.9, 0.01
+_LARGEST = 1e40  # as of other numbers in a spec
 
 
 def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
@@ -52,7 +54,8 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
     """The same of a signal, in which no sample may be missing, not even between its rows.
 
     Raises:
-        DataError: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in between.
+        DataError: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in between;
+            `beyond-precision`.
     """
     sheet = read_sheet(path, key=key)
     for line, kind in sheet.passed:
@@ -61,7 +64,10 @@ def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
             message = f"line {line} of {path.name} {what}: is a sample missing between the rows about it?"
             row = int(np.searchsorted(sheet.lines, line)) - 1
             raise DataError(sheet.error("data-not-a-number", message, "take the line out of the file", row))
-    return read_columns(path, wanted, key=key)
+    found = read_columns(path, wanted, key=key)
+    for role, numbers in found.items():
+        check_range(sheet, wanted[role], numbers)
+    return found
 
 
 def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
@@ -223,6 +229,13 @@ def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str
     if frequency.size < 2 or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
         message = "the frequencies must be nonnegative and increase from row to row"
         raise bad_table(spec, name, message, "sort the rows; there must be two at least", key)
+    for column, values in found.items():
+        size = np.abs(values)
+        beyond = np.flatnonzero((size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0)))
+        if beyond.size:
+            message = f"{column} is {values[beyond[0]]:g} in row {beyond[0] + 2}"
+            hint = f"numbers other than zero lie between {1.0 / _LARGEST:g} and {_LARGEST:g}"
+            raise bad_table(spec, name, message, hint, key)
     return found | {"frequency": frequency * build_units(spec).frequency}
 
 

@@ -6,8 +6,9 @@ import pytest
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import read_data
+from inputdesign_cli.tasks.build.extremes import absurd
 from inputdesign_cli.tasks.build.log import read_log
-from inputdesign_cli.tasks.build.preparation import Preparation, absurd, limits_of_sensor, trend
+from inputdesign_cli.tasks.build.preparation import Preparation, limits_of_sensor, trend
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
 N = 60

@@ -129,3 +129,13 @@ def test_a_column_of_dates_holds_the_times_where_none_is_called_so(tmp_path):
     rows = "".join(f"2024-03-12 10:15:0{k},{k % 3},{k % 5}\n" for k in range(9))
     path.write_text(f"Date,u,y\n{rows}")
     assert time_columns(read_sheet(path, key="")) == ["date"]
+
+
+@pytest.mark.parametrize("value", [9e99, -1e308, 1e30, 1e12])
+def test_a_signal_has_no_value_beside_which_the_others_are_lost(value, tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text("u\n" + "".join(f"{value if k == 30 else k % 7}\n" for k in range(60)))
+    with pytest.raises(DataError, match="column u") as caught:
+        read_samples(path, {"u": "u"}, key="spectrum.given.signal")
+    (told,) = caught.value.diagnostics
+    assert (told.code, told.key, told.location.line) == ("beyond-precision", "spectrum.given.signal", 32)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec, solve
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import DataError, SpecError
 
 SPEC = """\
 plant: {B: [0, 1], F: [1, -0.7]}
@@ -59,3 +59,12 @@ def test_a_zero_is_named_where_nothing_may_vanish(at):
         assert f"vanishes at {at:.6g} rad/s" in told.message
     error = {"absolute": 1, "weight": weight, "region": "ellipsoid"}
     assert f"vanishes at {at:.6g} rad/s" in refused({"accuracy": {"model_error": error}}).message
+
+
+@pytest.mark.parametrize("value", [9e99, 1e308, 1e-320])
+def test_a_table_has_numbers_that_a_spec_may_have(value, tmp_path):
+    (tmp_path / "t.csv").write_text(f"frequency,r_adm\n0,1\n1,{value}\n3.2,1\n")
+    table = "accuracy: {model_error: {table: t.csv}}\n"
+    with pytest.raises(DataError, match="in row 3") as caught:
+        solve(parse_spec(SPEC + table, folder=tmp_path))
+    assert caught.value.diagnostics[0].key == "accuracy.model_error.table"
