@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -38,6 +39,8 @@ from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 
 if TYPE_CHECKING:
     from inputdesign_cli.tasks.build.preparation import Preparation
+
+_CHANNEL = re.compile(r"[uy]([1-9]\d*)?|time", re.ASCII)
 
 
 def identify(
@@ -181,7 +184,13 @@ def named(text: str, option: str, example: str) -> dict[str, str]:
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not (name and equals and value):
             raise typer.BadParameter(f"{part!r} is not of the form {example}", param_hint=option)
-        found[f"{name}1" if name in ("u", "y") else name] = value
+        if not _CHANNEL.fullmatch(name):
+            message = f"{name!r} is no channel: inputs are u1, u2, .., outputs y1, y2, .. (as in {example})"
+            raise typer.BadParameter(message, param_hint=option)
+        channel = f"{name}1" if name in ("u", "y") else name
+        if channel in found:
+            raise typer.BadParameter(f"{channel} stands there twice", param_hint=option)
+        found[channel] = value
     return found
 
 
@@ -206,11 +215,6 @@ def preparation(
         raise typer.BadParameter("it is a positive number", param_hint="--sample-time")
     if time_unit is not None and time_unit not in TIME_UNITS:
         raise typer.BadParameter(f"it is one of {', '.join(TIME_UNITS)}", param_hint="--time-unit")
-    begin, _, end = span.partition(":")
-    try:
-        limits = (float(begin or "-inf"), float(end or "inf")) if span else None
-    except ValueError:
-        raise typer.BadParameter("write two times, as in 10:250", param_hint="--range") from None
     return Preparation(
         columns=named(columns, "--columns", "u1=Heater 1,y1=4"),
         sample_time=sample_time,
@@ -218,5 +222,22 @@ def preparation(
         resample=resample,
         detrend=DETRENDS[detrend],
         skip=skip,
-        span=limits,
+        span=_limits(span) if span else None,
     )
+
+
+def _limits(span: str) -> tuple[float, float]:
+    begin, colon, end = span.partition(":")
+    try:
+        first, last = float(begin.strip() or "-inf"), float(end.strip() or "inf")
+    except ValueError:
+        first = last = math.nan
+    if not colon or math.isnan(first) or math.isnan(last):
+        message = f"{span!r} is not two times, as in 10:250; one may be left out, as in 10:"
+        raise typer.BadParameter(message, param_hint="--range")
+    if last < first:
+        raise typer.BadParameter(
+            f"it ends at {last:g}, before it begins at {first:g}: write {last:g}:{first:g}?",
+            param_hint="--range",
+        )
+    return first, last

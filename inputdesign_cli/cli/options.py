@@ -36,7 +36,6 @@ def one_of(words: Sequence[str], help_text: str) -> Any:
 SpecFile = Annotated[
     Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file; - is standard input.")
 ]
-SpecOnDisc = Annotated[Path, typer.Argument(metavar="SPEC", help="The experiment to design, a YAML file.")]
 Confine = Annotated[
     Path | None,
     typer.Option(

@@ -25,18 +25,28 @@ def read_spec(
         SpecError: as `load_spec`.
     """
     from inputdesign_cli import specification
-    from inputdesign_cli.specification.yaml.files import MAX_BYTES, decode
 
     if str(file) != STANDARD_INPUT:
         return specification.load_spec(file, overrides or (), confine=confine, design=design)
+    return specification.parse_spec(
+        standard_input(), "<stdin>", overrides or (), confine=confine, design=design
+    )
+
+
+def standard_input() -> str:
+    """The text of a spec on standard input.
+
+    Raises:
+        SpecError: it is closed, too large, or no text.
+    """
+    from inputdesign_cli.specification.yaml.files import MAX_BYTES, decode
+
     if sys.stdin is None:
         raise bad_spec("file-unreadable", "standard input is closed", hint="name a file")
     raw = sys.stdin.buffer.read(MAX_BYTES + 1)
     if len(raw) > MAX_BYTES:
         raise bad_spec("file-too-large", f"the spec is larger than {MAX_BYTES // 2**20} MiB")
-    return specification.parse_spec(
-        decode(raw, "<stdin>"), "<stdin>", overrides or (), confine=confine, design=design
-    )
+    return decode(raw, "<stdin>")
 
 
 def name_of(file: Path) -> str:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecOnDisc, SweepOutput, one_of
+from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecFile, SweepOutput, one_of
+from inputdesign_cli.cli.reading import name_of, standard_input
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
+from inputdesign_cli.errors import STANDARD_INPUT
 
 if TYPE_CHECKING:
     from inputdesign_cli.sweep.running import Listing, SweepSummary
@@ -21,7 +23,7 @@ VERBS = ("solve", "analyse", "simulate")
 
 
 def sweep(
-    spec: SpecOnDisc,
+    spec: SpecFile,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -70,8 +72,17 @@ def sweep(
     """
     from inputdesign_cli.sweep import running as batch
 
-    directory = output or Path("runs") / f"{spec.stem}-sweep"
-    common: dict[str, Any] = {"directory": directory, "zipped": zipped, "verb": verb, "confine": confine}
+    directory = output or Path("runs") / f"{name_of(spec)}-sweep"
+    text = None
+    if str(spec) == STANDARD_INPUT:
+        spec, text = Path("<stdin>"), standard_input()
+    common: dict[str, Any] = {
+        "directory": directory,
+        "zipped": zipped,
+        "verb": verb,
+        "confine": confine,
+        "text": text,
+    }
     if dry_run:
         _list(batch.list_points(spec, settings or [], **common), json_output=json_output)
         return

@@ -14,7 +14,7 @@ import typer
 
 from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Overrides, Overwrite
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.errors import STANDARD_INPUT, IdesignError
 
 if TYPE_CHECKING:
     from inputdesign_cli.live.board import Board
@@ -50,6 +50,8 @@ def watch(
     from inputdesign_cli.live.pages import message_page
     from inputdesign_cli.live.server import serving
 
+    if str(spec) == STANDARD_INPUT:
+        raise typer.BadParameter("standard input cannot be followed: name a file", param_hint="SPEC")
     board = Board()
     board.show(message_page(spec.name, "Computing .."))
     with serving(board, port) as address:

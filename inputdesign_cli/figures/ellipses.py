@@ -40,4 +40,8 @@ def boundary(center: Array, covariance: Array, probability: float) -> Array:
     radius = np.sqrt(-2.0 * np.log(1.0 - probability))
     angle = np.linspace(0.0, 2.0 * np.pi, POINTS)
     circle = np.stack([np.cos(angle), np.sin(angle)])
-    return center[:, None] + radius * np.linalg.cholesky(covariance) @ circle
+    # Of parameters that are all but told together the covariance is singular, to rounding.
+    scale = np.sqrt(np.diag(covariance))
+    sizes, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    root = scale[:, None] * axes * np.sqrt(np.maximum(sizes, 0.0))
+    return center[:, None] + radius * root @ circle

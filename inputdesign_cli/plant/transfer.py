@@ -38,8 +38,16 @@ class ScalarTransfer(Protocol):
         """Its value at frequencies `w`, same shape."""
 
     @property
+    def pole_points(self) -> ComplexArray:
+        """Poles as points of the frequency plane, frequency + j damping."""
+
+    @property
+    def zero_points(self) -> ComplexArray:
+        """Zeros as such points."""
+
+    @property
     def singularities(self) -> ComplexArray:
-        """Poles and zeros as points of the frequency plane, frequency + j damping."""
+        """Both."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,16 @@ class Rational:
         return roots_in_z(self.numerator)
 
     @property
+    def pole_points(self) -> ComplexArray:
+        """Poles as points of the frequency plane."""
+        return logarithmic_distance(self.poles)
+
+    @property
+    def zero_points(self) -> ComplexArray:
+        """Zeros as points of the frequency plane."""
+        return logarithmic_distance(self.zeros)
+
+    @property
     def singularities(self) -> ComplexArray:
         """Poles and zeros as points of the frequency plane."""
         return logarithmic_distance(join_roots([self.poles, self.zeros]))
@@ -96,10 +114,24 @@ class ContinuousRational:
         return np.asarray(np.polyval(self.numerator, s) / np.polyval(self.denominator, s), dtype=complex)
 
     @property
+    def pole_points(self) -> ComplexArray:
+        """Poles as points of the frequency plane."""
+        return _in_the_plane(self.denominator)
+
+    @property
+    def zero_points(self) -> ComplexArray:
+        """Zeros as points of the frequency plane."""
+        return _in_the_plane(self.numerator)
+
+    @property
     def singularities(self) -> ComplexArray:
         """Poles and zeros as points of the frequency plane."""
-        roots = np.concatenate([np.roots(self.numerator), np.roots(self.denominator)])
-        return np.asarray(np.abs(roots.imag) + 1j * np.abs(roots.real))
+        return np.concatenate([self.zero_points, self.pole_points])
+
+
+def _in_the_plane(polynomial: Array) -> ComplexArray:
+    roots = np.asarray(np.roots(polynomial), dtype=complex)
+    return np.abs(roots.imag) + 1j * np.abs(roots.real)
 
 
 class StateSpace(NamedTuple):

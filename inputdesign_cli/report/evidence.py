@@ -8,6 +8,8 @@ from inputdesign_cli.report.numbers import BREAK, Fact, Rows, listed, shown, spo
 from inputdesign_cli.runs.results import Json, Result
 
 _SPREAD = "{:.4g} ± {:.2g}"
+# Below this share of its standard deviation the digits of an estimate say nothing, not even its order.
+_NOTHING = 1e-3
 
 
 def estimate_table(result: Result) -> Rows | None:
@@ -16,8 +18,16 @@ def estimate_table(result: Result) -> Rows | None:
     if found is None or "theta" not in found:
         return None
     deviations = found["standard_deviation"]
-    rows = tuple((name, f"{v:.6g}", f"{deviations[name]:.2g}") for name, v in found["theta"].items())
+    rows = tuple(
+        (name, _beside(value, deviations[name]), f"{deviations[name]:.2g}")
+        for name, value in found["theta"].items()
+    )
     return Rows(("parameter", "estimate", "standard deviation"), rows)
+
+
+def _beside(value: float, deviation: float) -> str:
+    """An estimate; zero where it is nothing beside its standard deviation."""
+    return "0" if abs(value) < _NOTHING * deviation else f"{value:.6g}"
 
 
 def estimate_facts(result: Result) -> Iterator[Fact]:

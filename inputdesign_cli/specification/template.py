@@ -89,15 +89,19 @@ class SpecTemplate:
 
 
 def read_template(
-    path: str | os.PathLike[str], overrides: Sequence[str] = (), *, confine: FilePath | None = None
+    path: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    *,
+    confine: FilePath | None = None,
+    text: str | None = None,
 ) -> SpecTemplate:
-    """Read a spec file with `overrides` applied, and check nothing yet.
+    """Read a spec file with `overrides` applied, and check nothing yet; or its `text`, where that is known.
 
     Raises:
         SpecError: The file cannot be read or is no mapping in YAML, an override cannot be applied, or a
             file cannot be included.
     """
-    text, file = read_text(path), os.fspath(path)
+    text, file = read_text(path) if text is None else text, os.fspath(path)
     folder = FilePath(path).parent
     tree = read_tree(text, file, overrides, folder, confine)
     if tree.diagnostics:

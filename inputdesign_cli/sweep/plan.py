@@ -78,9 +78,15 @@ class Plan:
 
 
 def build_plan(
-    spec: Path, settings: Sequence[str], *, zipped: bool, verb: Verb, confine: Path | None = None
+    spec: Path,
+    settings: Sequence[str],
+    *,
+    zipped: bool,
+    verb: Verb,
+    confine: Path | None = None,
+    text: str | None = None,
 ) -> Plan:
-    """Read the spec and the settings.
+    """Read the spec, unless its text is given, and the settings.
 
     Raises:
         SpecError: the spec, its `sweep` block or a setting cannot be used, or no point is a spec.
@@ -89,7 +95,7 @@ def build_plan(
         hint = "sweep with --verb solve"
         raise bad_spec("not-supported", f"this version does not {verb} anything", hint=hint)
     fixed, axes = parse_settings(settings)
-    draft = read_template(spec, fixed, confine=confine)
+    draft = read_template(spec, fixed, confine=confine, text=text)
     plan = Plan(draft, build_grid(draft.sweep(), axes, zipped=zipped), verb)
     plan.check()
     return plan

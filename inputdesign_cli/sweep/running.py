@@ -94,9 +94,10 @@ def list_points(
     zipped: bool = False,
     verb: Verb = "solve",
     confine: Path | None = None,
+    text: str | None = None,
 ) -> Iterator[Listing]:
     """The points of a sweep and whether they are done; nothing is computed or written."""
-    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine)
+    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine, text=text)
     layout = Layout(directory)
     for index, point in enumerate(plan.grid):
         key = plan.key(index)
@@ -113,6 +114,7 @@ def sweep(
     zipped: bool = False,
     verb: Verb = "solve",
     confine: Path | None = None,
+    text: str | None = None,
     executor: Executor | None = None,
     fail_fast: bool = False,
     rerun_failed: bool = False,
@@ -124,6 +126,7 @@ def sweep(
     Args:
         settings: `KEY=V1,V2,..`, `KEY=LOW:HIGH:STEP`, or `KEY=VALUE` for all points.
         confine: the folder outside of which the spec may name no files.
+        text: of the spec, where it is in no file.
         executor: where the points are computed (default: in this process).
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
@@ -134,7 +137,7 @@ def sweep(
         SpecError, OutputError: before anything is computed; later OutputError only.
         IdesignError: the first failure, with `fail_fast`.
     """
-    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine)
+    plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine, text=text)
     with opened(directory) as layout:
         layout.remove_page()
         replace_text(layout.root / SPEC, to_yaml(plan.data()))

@@ -26,7 +26,7 @@ from inputdesign_cli.runs.units import Header, Units
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.exploration import build_explored, spec_text
 from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.log import Log, channels_by_name, read_logs
+from inputdesign_cli.tasks.build.log import Log, read_logs, with_channels
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.identification import Identification, Identified, identification_results, told
 from inputdesign_cli.tasks.result.exploration import (
@@ -76,7 +76,11 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     identified = _asked(
         task,
         Identified(
-            found.estimate, found.model, Data(u, y, None, times, lengths, (), notes), preparation, None
+            found.estimate,
+            found.model,
+            Data(u, y, None, times, lengths, (), notes, recorded=log.recorded.at(found.samples)),
+            preparation,
+            None,
         ),
     )
     results = identification_results(task, identified, started)
@@ -188,16 +192,18 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
         DataError: the data cannot be used.
     """
     started = time.perf_counter()
-    if not preparation.columns:
-        found_columns = channels_by_name(read_sheet(paths[0], key=""))
-        counts = {"u": header.units.inputs, "y": header.units.outputs}
-        own = {name: c for name, c in found_columns.items() if int(name[1:]) <= counts[name[0]]}
-        preparation = replace(preparation, columns=own)
+    counts = {"u": header.units.inputs, "y": header.units.outputs}
+    own = {
+        name: column
+        for name, column in with_channels(read_sheet(paths[0], key=""), preparation.columns).items()
+        if name in preparation.columns or int(name[1:]) <= counts[name[0]]
+    }
+    preparation = replace(preparation, columns=own)
     data = read_data(paths, header.units, preparation)
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)
-    table, curves = validation_curves(header.units, data.u, data.y, found)
+    table, curves = validation_curves(header.units, data.time, data.u, data.y, found)
     result: dict[str, Json] = {
         "format": 1,
         "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",

@@ -29,6 +29,8 @@ from inputdesign_cli.tasks.result.responses import response_of_data
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
 _SURE = 0.95
+# Inputs of which more than this differs from period to period do not repeat, in a loop with noise either.
+_UNLIKE = 0.5
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ def measure(
         found = of_periods(by_lines, periods.period)
         judged = _judged(task, by_lines, data, periods, repeats)
         silent = _silent(task, data, periods, repeats)
+        data = replace(data, notes=(*data.notes, *_seen(data, periods, repeats)))
     shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
     results = measured_results(
         question.header, found, shown, judged, silent, data, time.perf_counter() - started, assess=assess
@@ -115,6 +118,28 @@ def _periods(task: ResponseTask, data: Data, name: str) -> tuple[Periods, int]:
             hint="record more periods, or give several records",
         )
     return stated, len(data.lengths)
+
+
+def _seen(data: Data, periods: Periods, repeats: int) -> list[str]:
+    """What is left out of the records, and whether the inputs repeat at all."""
+    told, samples = [], data.lengths[0]
+    left = samples - periods.each(samples) * periods.blocks * periods.period
+    if left:
+        told.append(
+            f"the first {left} of {samples} samples are left out: the others are whole periods of "
+            f"{periods.period}"
+        )
+    lines = np.stack([periods.transforms(one) for one in np.split(data.u, repeats)])[..., 1:, :]
+    # Over records and periods, which differ by noise alone.
+    other = float(np.sum(np.abs(lines - lines.mean(axis=(0, 2), keepdims=True)) ** 2))
+    share = other / max(float(np.sum(np.abs(lines) ** 2)), 1e-300)
+    if share > _UNLIKE:
+        told.append(
+            f"{100.0 * share:.3g} % of the power of the inputs differs from period to period of "
+            f"{periods.period} samples: they do not repeat as the spec says; was its signal.csv applied, and "
+            "is u recorded as it was?"
+        )
+    return told
 
 
 def _judged(

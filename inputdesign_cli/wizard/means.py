@@ -98,12 +98,12 @@ def noise_lines(text: str, drift: str, folder: Path) -> list[str]:
 
 def _at_rest(path: Path) -> tuple[float, float, str]:
     """Variance of the innovation, the pole of the noise (0 where it is white), and how that is known."""
-    from inputdesign_cli.tasks.build.tables import read_columns
+    from inputdesign_cli.tasks.build.tables import read_samples
 
     if not path.is_file():
         raise bad_answer("noise", f"there is no file {path}")
     with in_their_words({}, "noise"):
-        y = read_columns(path, {"y": "y"}, key="noise")["y"]
+        y = read_samples(path, {"y": "y"}, key="noise")["y"]
     if y.size < 20:
         raise bad_answer("noise", f"{path.name} has {y.size} rows, and 20 are the least")
     v = y - y.mean()

@@ -1,4 +1,7 @@
-"""What is wrong with the answer to a spec: an exception that is not ours, a warning, or nonsense."""
+"""What is wrong with the answer to a spec: an exception that is not ours, a warning, or nonsense.
+
+All figures of an answer are drawn, too.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from inputdesign_cli import parse_spec, solve, validate
 from inputdesign_cli.diagnostics import render
 from inputdesign_cli.error_codes import explanations
 from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.figures.plots import draw_all
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.runs.run_directory import finished_result
 from inputdesign_cli.runs.text_formats import json_text
@@ -29,8 +33,10 @@ def judged(text: str, folder: Path) -> tuple[str, str]:
         try:
             spec = parse_spec(text, "fuzz.yaml", folder=folder)
             validate(spec)
-            result = written(solve(spec))
+            results = solve(spec)
+            result = written(results)
             end, wrong = result["status"], nonsense(dict(spec.content), result)
+            wrong = wrong or undrawn(results)
         except IdesignError as error:
             end = error.diagnostics[0].code
             wrong = "" if render(error) and end in explanations() else "no such code"
@@ -41,6 +47,11 @@ def judged(text: str, folder: Path) -> tuple[str, str]:
     if caught and not wrong:
         wrong = f"warning: {caught[0].message} ({caught[0].filename}:{caught[0].lineno})"
     return end, wrong
+
+
+def undrawn(results: Results) -> str:
+    """Figures that come out empty; one that fails raises."""
+    return ", ".join(f"{name} is empty" for name, drawn in draw_all(results).items() if not drawn)
 
 
 def written(results: Results) -> dict:

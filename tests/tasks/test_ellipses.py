@@ -7,6 +7,7 @@ import pytest
 
 from inputdesign_cli import analyse, load_spec, solve, validate
 from inputdesign_cli.errors import SpecError
+from inputdesign_cli.figures.ellipses import boundary
 
 SPECS = Path(__file__).parents[2] / "specs"
 
@@ -57,3 +58,21 @@ def test_unknown_names_and_other_designs_are_refused(name, override, code, key):
     assert (diagnostic.code, diagnostic.key) == (code, key)
     assert diagnostic.hint
     assert diagnostic.location is not None
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-9, 0.0, -1e-17])
+@pytest.mark.parametrize("scale", [1.0, 1e-12, 1e9])
+def test_the_boundary_is_that_of_the_region_though_parameters_are_told_together(apart, scale):
+    """Points on it have the chi-squared quantile in the covariance; a singular one leaves a line."""
+    C = np.array([[1.0, scale], [scale, scale**2 * (1.0 + apart)]])
+    points = boundary(np.zeros(2), C, 0.95)
+    assert np.all(np.isfinite(points))
+    radius = np.sqrt(-2.0 * np.log(0.05))
+    # Farthest along each axis: radius times its standard deviation.
+    reach = np.abs(points).max(axis=1)
+    np.testing.assert_allclose(reach, radius * np.sqrt(np.diag(C)), rtol=1e-2)
+    if apart == 1.0:
+        sizes = np.sqrt(np.diag(C))[:, None]
+        inverse = np.linalg.inv(C / (sizes * sizes.T))
+        lengths = np.einsum("in,ij,jn->n", points / sizes, inverse, points / sizes)
+        np.testing.assert_allclose(lengths, radius**2, rtol=1e-9)

@@ -9,9 +9,11 @@ import scipy.signal
 from typer.testing import CliRunner
 
 from inputdesign_cli.cli import app
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.specification import load_spec, parse_spec
 from inputdesign_cli.tasks import explore, identify, solve
+from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 
 STEP = Path(__file__).parents[2] / "docs" / "data" / "tclab" / "step.csv"
@@ -143,3 +145,76 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
     for read in (explore, lambda log: identify(parse_spec(PLANT, design=False), log)):
         with pytest.raises(DataError, match="states the sample time -1"):
             read(path)
+
+
+def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
+    path = record(tmp_path / "log.csv", samples=400)
+    good = explore(path).results.result["notes"]
+    lines = path.read_text().splitlines()
+    for row in range(200, 250):
+        lines[row] = ",".join([*lines[row].split(",")[:2], lines[200].split(",")[2]])
+    path.write_text("\n".join(lines))
+    found = explore(path).results.result["notes"]
+    assert not any("stands still" in note for note in good)
+    (told,) = [note for note in found if "stands still" in note]
+    assert "rows 201 to 250" in told
+
+
+def test_many_spikes_are_told(tmp_path):
+    """Of 400 samples 32, more than outliers are."""
+    path = record(tmp_path / "log.csv", samples=400)
+    lines = path.read_text().splitlines()
+    rng = np.random.default_rng(0)
+    for row in rng.choice(np.arange(5, 395, 6), 32, replace=False):
+        time, u, y = lines[row].split(",")
+        lines[row] = f"{time},{u},{float(y) + 15.0}"
+    assert not any("spikes" in step for step in read_log(path, Preparation()).steps)
+    path.write_text("\n".join(lines))
+    (told,) = [step for step in read_log(path, Preparation()).steps if "spikes" in step]
+    assert told.startswith("y has 32 values (8 %) far from their neighbours")
+
+
+def test_times_of_the_record_stay_under_a_verdict(run, tmp_path):
+    path = record(tmp_path / "late.csv")
+    lines = path.read_text().splitlines()
+    head, *rows = (line.split(",") for line in lines)
+    shifted = [",".join([f"{float(time) + 1000.0:g}", *rest]) for time, *rest in rows]
+    path.write_text("\n".join([",".join(head), *shifted]))
+    found = explore(path, model=load_spec(run / "model.yaml", design=False)).results
+    assert found.tables["fit"].columns["time_min"][[0, -1]].tolist() == [1000.0, 1149.5]
+
+
+def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
+    """Of two inputs the second steps once only: plants in s with more than one pole cannot be told."""
+    rng = np.random.default_rng(0)
+    n = np.arange(200)
+    u = np.column_stack([np.repeat(rng.choice([-1.0, 1.0], 40), 5), (n >= 95).astype(float)])
+    y = scipy.signal.lfilter([0, 0.2], [1, -0.8], u[:, 0]) + scipy.signal.lfilter(
+        [0, 0.3], [1, -0.6], u[:, 1]
+    )
+    rows = np.column_stack([n, u, y + 0.05 * rng.standard_normal(200)])
+    path = tmp_path / "log.csv"
+    path.write_text("time,u1,u2,y\n" + "\n".join(",".join(f"{x:.6g}" for x in row) for row in rows))
+    result = explore(path).results.result
+    (output,) = result["exploration"]["outputs"]
+    left = {structure["family"] for structure in output["structures"]}
+    assert not left & set(output["not_estimated"])
+    told = [note for note in result["notes"] if "model could be estimated" in note]
+    assert bool(told) == bool(output["not_estimated"])
+    assert {"FOPDT", "SOPDT", "TOPDT"} <= left | set(output["not_estimated"])
+    assert "u2 changes in 1 of its samples only" in told[0]
+
+
+def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
+    rng = np.random.default_rng(2)
+    u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)
+    pole = np.exp(-0.1)
+    y = scipy.signal.lfilter([0, 1 - pole], [1, -pole], u) + 0.05 * rng.standard_normal(300)
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{k},{a:g},{b:.5f}\n" for k, (a, b) in enumerate(zip(u, y, strict=True)))
+    path.write_text(f"time,u,y\n{rows}")
+    found = explore(path).results
+    assert "L 0 +-" in summary(found.result, "s", [])
+    (told,) = [note for note in found.result["notes"] if note.startswith("L of a dead time")]
+    deviation = found.result["identification"]["standard_deviation"]["L"]
+    assert float(told.split(": ")[1].split()[0]) == pytest.approx(1.96 * deviation, rel=0.01)

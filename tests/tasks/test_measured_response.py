@@ -168,3 +168,14 @@ def test_blocks_that_are_cut_are_refused(write):
     spec, u, y = recorded(TWO, 1)
     with pytest.raises(DataError, match="blocks of whole periods"):
         identify(spec, write(table(u[:-7], y[:-7])), frequency_response=True)
+
+
+def test_what_does_not_repeat_and_what_is_left_out_is_told(write):
+    spec, u, y = recorded(TEXT, 1)
+    whole = identify(spec, write(table(u, y)), frequency_response=True).result.get("notes", [])
+    assert not any("left out" in note or "do not repeat" in note for note in whole)
+    short = identify(spec, write(table(u[:2700], y[:2700])), frequency_response=True).result["notes"]
+    assert any(note.startswith("the first 200 of 2700 samples are left out") for note in short)
+    noise = np.random.default_rng(5).standard_normal(u.shape)
+    other = identify(spec, write(table(noise, y)), frequency_response=True).result["notes"]
+    assert any("they do not repeat as the spec says" in note for note in other)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError, bad_spec
 from inputdesign_cli.identification.checks import check_varying, signal_name
@@ -23,6 +24,7 @@ _BLOCKS = 10
 _STILL = 0.02
 _FEWEST = 30
 _MOST_SAMPLES = 20_000
+_TOO_SIMPLE = "the input moves too little or too simply: apply steps of several lengths, or a PRBS"
 # So many structures, the best first, are tried for all outputs together where those that were chosen fail.
 _MOST_TRIED = 4
 
@@ -35,7 +37,8 @@ class Found:
         outputs: what was found for each; `taken` is the candidate that the model is made of, `ranges` has of
             each input the delays that 95 % of confidence leaves it.
         model: of all channels, estimated on the whole record; inputs that never move have no part in it.
-        estimate: its estimate; `used` are the records that it was made from.
+        estimate: its estimate; `used` are the records that it was made from, and `samples` (n,) where these
+            stand in all.
         validation: the fits of the same structures, estimated on one part, to the other.
         interleaved: whether the parts are blocks that take turns, instead of beginning and end.
         still: inputs (from zero) that never move.
@@ -47,6 +50,7 @@ class Found:
     model: Model
     estimate: Estimate
     used: Parts
+    samples: NDArray[np.int64]
     validation: Fits
     interleaved: bool
     still: tuple[int, ...]
@@ -83,7 +87,7 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) 
             raise bad_spec(
                 "no-structure",
                 f"no model of {name} could be estimated: the record does not tell its parameters",
-                hint="the input moves too little or too simply: apply steps of several lengths, or a PRBS",
+                hint=_too_little([signal_name("u", j, u.shape[1]) for j in moving], first, second),
                 key=name,
             )
         found.append(chosen)
@@ -100,10 +104,18 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) 
         whole,
         replace(estimate, names=whole.names),
         busiest(parts, _MOST_SAMPLES),
+        _busiest_samples(moved),
         validation,
         interleaved,
         still,
     )
+
+
+def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
+    lengths = [len(y) for _, y in parts]
+    every = np.split(np.arange(sum(lengths), dtype=float)[:, None], np.cumsum(lengths)[:-1])
+    counted = [(u, at) for (u, _), at in zip(parts, every, strict=True)]
+    return np.concatenate([at[:, 0] for _, at in busiest(counted, _MOST_SAMPLES)]).astype(np.int64)
 
 
 def _estimated(
@@ -182,6 +194,22 @@ def divided(parts: Parts) -> tuple[Parts, Parts, bool]:
         if len(y) - begin >= length // 2
     ]
     return blocks[::2], blocks[1::2], True
+
+
+def _too_little(names: Sequence[str], first: Parts, second: Parts) -> str:
+    """What to do about inputs, by name, of which the parts tell no model."""
+    once = [
+        name
+        for j, name in enumerate(names)
+        if not all(any(np.any(np.diff(u[:, j])) for u, _ in some) for some in (first, second))
+    ]
+    if not once:
+        return _TOO_SIMPLE
+    return (
+        f"{' and '.join(once)} moves in one stretch of the record only, which cannot both estimate a model "
+        "and judge it: let it step up and down again, several times; or identify a structure that you know: "
+        "idesign identify DATA --spec SPEC"
+    )
 
 
 def _moves(some: Parts, whole: Parts) -> bool:

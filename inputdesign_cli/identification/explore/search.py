@@ -120,6 +120,7 @@ class Chosen:
         by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
         finalists: those that may be taken, the best first.
         estimated: the records of the first part, and `most` the longest delay that was looked for.
+        dropped: families of which no structure could be estimated.
     """
 
     candidates: tuple[Candidate, ...]
@@ -127,6 +128,7 @@ class Chosen:
     finalists: tuple[Candidate, ...]
     estimated: Parts
     most: int
+    dropped: tuple[str, ...]
 
     @property
     def best(self) -> Candidate:
@@ -245,8 +247,11 @@ def explore_structure(
     late = max(max(found.delays) for found in quick.values())
     parts = _Parts(first, second, feedback, quick, resting, late)
 
+    families = dict[str, None]()
+
     def judged(tried: Iterable[Shape]) -> list[Candidate]:
-        small = (shape for shape in dict.fromkeys(tried) if _PER_PARAMETER * shape.size <= samples)
+        small = [shape for shape in dict.fromkeys(tried) if _PER_PARAMETER * shape.size <= samples]
+        families.update(dict.fromkeys(shape.family for shape in small))
         return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
 
     tried: list[Shape] = []
@@ -279,7 +284,9 @@ def explore_structure(
     )
     best = good[0]
     rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
-    return Chosen((best, *rest), by_order, tuple(good), first, most)
+    estimated = {c.orders.family for c in found}
+    dropped = tuple(family for family in families if family not in estimated)
+    return Chosen((best, *rest), by_order, tuple(good), first, most, dropped)
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
@@ -317,7 +324,8 @@ def _ranges(parts: Parts, n: int, delays: tuple[int, ...], most: int) -> tuple[t
         losses = {d: output_error(parts, n, max(n, 2), (*delays[:j], d, *delays[j + 1 :])).loss for d in near}
         least = min(losses.values())
         kept = [d for d, loss in losses.items() if samples * np.log(loss / max(least, 1e-300)) <= _CHI2]
-        found.append((min(kept), max(kept)))
+        # Another structure than that of the quick estimate may have settled elsewhere.
+        found.append((min(*kept, chosen), max(*kept, chosen)))
     return tuple(found)
 
 

@@ -12,7 +12,8 @@ from inputdesign_cli.specification.wording import show
 
 Polynomial = tuple[float, ...]
 
-# Coefficients of which the sum is this small have a root at z = 1, as far as decimals can tell.
+# Coefficients of which the sum is this small have a root at z = 1, as far as decimals can tell; a radius this
+# near to 1 is 1.
 _ROUNDING = 1e-12
 
 
@@ -70,7 +71,7 @@ def check_delay_stable(polynomial: Polynomial) -> PathDiagnostic | None:
         return found
     worst = roots[np.argmax(np.abs(roots))]
     radius = float(abs(worst))
-    if radius < 1.0:
+    if radius < 1.0 - _ROUNDING:
         return None
     angle = abs(float(np.angle(worst)))
     where = f"{radius:.6g}" if abs(radius - 1.0) > 5e-6 else "1"

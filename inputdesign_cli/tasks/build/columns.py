@@ -11,11 +11,17 @@ from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import is_time, named_columns
+from inputdesign_cli.tasks.build.tables import named_columns, time_columns
 
 TIME_UNITS = tuple(SECONDS)
-_UNITS = {"s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s"} | {
-    unit: unit for unit in TIME_UNITS
+_UNITS = {
+    **{unit: unit for unit in TIME_UNITS},
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("mins", "minute", "minutes"), "min"),
+    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
+    **dict.fromkeys(("day", "days"), "d"),
 }
 _SPELLINGS = {
     **dict.fromkeys(("celsius", "degcelsius", "\u2103", "c"), "degc"),
@@ -58,7 +64,8 @@ def time_column(sheet: Sheet, preparation: Preparation) -> dict[str, str]:
     """
     if "time" in preparation.columns:
         return {"time": preparation.columns["time"]}
-    timed = [name for name in sheet.header if is_time(name)]
+    claimed = {column.strip().lower() for column in preparation.columns.values()}
+    timed = [name for name in time_columns(sheet) if name not in claimed]
     if len(timed) > 1:
         listed = f": {', '.join(timed)}" if sheet.shown else ""
         message = f"{sheet.path.name} has several columns of times{listed}"

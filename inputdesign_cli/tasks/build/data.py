@@ -24,6 +24,7 @@ from inputdesign_cli.tasks.build.columns import (
     with_names,
 )
 from inputdesign_cli.tasks.build.files import read_sheet
+from inputdesign_cli.tasks.build.passed_over import passed_over
 from inputdesign_cli.tasks.build.preparation import (
     EVEN,
     MOST_JITTER,
@@ -33,6 +34,7 @@ from inputdesign_cli.tasks.build.preparation import (
     limits_of_sensor,
     outliers,
     resampled,
+    standing_alone,
     trend,
     whole_segments,
 )
@@ -52,6 +54,19 @@ class Recorded:
     rows: NDArray[np.int64]
     held: NDArray[np.bool_]
     resolution: Array
+
+    @classmethod
+    def together(cls, parts: Sequence[Recorded]) -> Recorded:
+        """Those of several files, one after the other."""
+        return cls(
+            np.concatenate([part.rows for part in parts]),
+            np.concatenate([part.held for part in parts]),
+            np.max([part.resolution for part in parts], axis=0),
+        )
+
+    def at(self, samples: NDArray[np.int64]) -> Recorded:
+        """Those of some samples."""
+        return replace(self, rows=self.rows[samples], held=self.held[samples])
 
 
 @dataclass(frozen=True)
@@ -113,15 +128,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
         np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
-        _together([part.recorded for part in parts if part.recorded is not None]),
-    )
-
-
-def _together(parts: Sequence[Recorded]) -> Recorded:
-    return Recorded(
-        np.concatenate([part.rows for part in parts]),
-        np.concatenate([part.held for part in parts]),
-        np.max([part.resolution for part in parts], axis=0),
+        Recorded.together([part.recorded for part in parts if part.recorded is not None]),
     )
 
 
@@ -142,10 +149,14 @@ def prepared(
     for names, values in ((signals.inputs, signals.u), (signals.outputs, signals.y)):
         for name, x in zip(names, values.T, strict=True):
             there = ~np.isnan(x)
-            told += outliers(name, x[there], rows[there])
-            told += limits_of_sensor(name, x[there]) if names is signals.outputs else []
-    segments, cuts = whole_segments(time, signals.u, signals.y, step, resample=preparation.resample)
-    told = [*cuts, *told]
+            far = outliers(name, x[there], rows[there])
+            told += far
+            if names is signals.outputs:
+                told += [] if far else standing_alone(name, x[there], rows[there])
+                told += limits_of_sensor(name, x[there])
+    apart, lines = passed_over(sheet, timed=bool(signals.name))
+    segments, cuts = whole_segments(time, signals.u, signals.y, step, apart, resample=preparation.resample)
+    told = [*lines, *cuts, *told]
     off = jitter(segments, step)
     if off > EVEN:
         if off > MOST_JITTER and not preparation.resample:
@@ -209,11 +220,12 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         ((path.name, len(inputs)),),
         tuple(f"{path.name}: {note}" if named else note for note in told),
         np.nanmean(signals.u[:, : units.inputs], axis=0),
-        _recorded(signals, units.sample_time, segments),
+        recorded_in(signals, units.sample_time, segments),
     )
 
 
-def _recorded(signals: Signals, step: float, segments: Sequence[Segment]) -> Recorded:
+def recorded_in(signals: Signals, step: float, segments: Sequence[Segment]) -> Recorded:
+    """The outputs of the file, sample by sample of the segments, `step` apart."""
     stamped = np.flatnonzero(~np.isnan(signals.time))
     stamps = signals.time[stamped] * (1.0 if signals.name else step)
     times = np.concatenate([part.time for part in segments])

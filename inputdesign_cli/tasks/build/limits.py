@@ -15,7 +15,7 @@ from inputdesign_cli.specification.models.limits import Curve
 from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.signal_settings import stated_moves, stated_peaks
 from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
-from inputdesign_cli.tasks.build.weights import build_weight
+from inputdesign_cli.tasks.build.weights import build_weight, check_finite, on_the_limit
 
 _KEY = "limits.spectrum"
 
@@ -75,16 +75,19 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
         if curve is None or curve == 0.0:
             continue
         key = f"{_KEY}.{'max' if upper else 'min'}" if stated.min is not None else _KEY
-        level, knots, singular = _level(spec, curve, key)
+        level, knots, singular, zero = _level(spec, curve, key, experiment.band)
         grid = graded_grid(
             np.concatenate([experiment.singularities, singular]), *experiment.band, knots=knots
         )
-        if upper and level(grid).min() <= 0:
-            at = grid[int(np.argmin(level(grid)))] / unit
+        if upper and zero is None and level(grid).min() <= 0.0:
+            zero = float(grid[int(np.argmin(level(grid)))])
+        if zero is not None:
+            why = "no spectrum with a density vanishes there and stays positive around"
+            relative = "how far a spectrum stays above it is counted relative to it"
             raise spec.complain(
                 "bad-limit",
-                f"the upper bound vanishes at {at:.6g} rad/{spec.time_unit}: no spectrum with a density "
-                "vanishes there and stays positive around",
+                f"the {'upper' if upper else 'lower'} bound vanishes at {zero / unit:.6g} "
+                f"rad/{spec.time_unit}: {why if upper else relative}",
                 hint="give a small positive bound instead",
                 key=key,
             )
@@ -103,17 +106,24 @@ def build_density_limits(spec: Spec, experiment: Experiment) -> list[DensityLimi
     return limits
 
 
-def _level(spec: Spec, curve: Curve, key: str) -> tuple[Callable[[Array], Array], Array, ComplexArray]:
-    """The level over frequency in rad/sample, its kinks, and the points near which it changes fast."""
+def _level(
+    spec: Spec, curve: Curve, key: str, band: tuple[float, float]
+) -> tuple[Callable[[Array], Array], Array, ComplexArray, float | None]:
+    """The level over frequency in rad/sample, its kinks, points near which it changes fast, where it is zero.
+
+    Raises:
+        SpecError: `bad-limit`, it is infinite somewhere in the band.
+    """
     nowhere, smooth = np.zeros(0), np.zeros(0, dtype=complex)
     if isinstance(curve, float | int):
         constant = float(curve)
-        return lambda w: np.full(np.shape(w), constant), nowhere, smooth
+        return lambda w: np.full(np.shape(w), constant), nowhere, smooth, None
     if curve.kind == "table":
         columns = read_frequency_table(spec, curve.table, ["phi"], key)
         frequency, value = columns["frequency"], columns["phi"]
         if np.any(value < 0):
             raise bad_table(spec, curve.table, "phi must not be negative", "correct the values", key)
-        return lambda w: np.interp(w, frequency, value), frequency, smooth
+        return lambda w: np.interp(w, frequency, value), frequency, smooth, None
     W = build_weight(spec, curve, key)
-    return lambda w: np.abs(W.at(w)) ** 2, nowhere, W.singularities
+    check_finite(spec, W, band, "bad-limit", key)
+    return lambda w: np.abs(W.at(w)) ** 2, nowhere, W.singularities, on_the_limit(W.zero_points, band)

@@ -12,10 +12,11 @@ import numpy as np
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.columns import time_unit_of, with_headers
-from inputdesign_cli.tasks.build.data import prepared
+from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.signals import signals_of, stated_step
+from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
+from inputdesign_cli.tasks.build.tables import evenly_rising, no_column
 
 _CHANNELS = {
     "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
@@ -35,6 +36,7 @@ class Log:
         names: of the columns, by channel.
         step, time_unit: the sample time.
         steps: what was done to the record, and what was seen in it.
+        recorded: of the outputs.
     """
 
     u: Array
@@ -44,6 +46,7 @@ class Log:
     step: float
     time_unit: str
     steps: tuple[str, ...]
+    recorded: Recorded
 
     @property
     def parts(self) -> list[tuple[Array, Array]]:
@@ -59,7 +62,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         DataError: the file cannot be read, or does not tell its inputs and outputs.
     """
     sheet = read_sheet(path, key="")
-    columns = preparation.columns or channels_by_name(sheet)
+    columns = with_channels(sheet, preparation.columns)
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = with_headers(sheet, replace(preparation, columns=columns))
     signals = signals_of(sheet, counts["u"], counts["y"], given)
@@ -70,9 +73,14 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         step = _typical(signals.time)
     elif stated:
         step = stated
+        _check_apart(sheet, signals, step)
     else:
         step = 1.0
         told.append("the file has no times and no --sample-time was given: the sample time is taken for 1")
+        told += [
+            f"{name} rises by even steps: if it holds the times, add time={name} to --columns"
+            for name in evenly_rising(sheet, [column.strip().lower() for column in given.columns.values()])
+        ]
     if not np.isfinite(step):
         message = f"{path.name} has one time only, which tells no sample time"
         hint = "give it: --sample-time 0.5; or say which column holds the time: --columns time=1"
@@ -86,7 +94,31 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         step,
         unit,
         (*told, *notes),
+        recorded_in(signals, step, segments),
     )
+
+
+def _check_apart(sheet: Sheet, signals: Signals, step: float) -> None:
+    """Rows are not much farther apart than the stated sample time.
+
+    Raises:
+        DataError: `data-not-uniform`.
+    """
+    apart = _typical(signals.time) if signals.name else step
+    if apart > 1.5 * step:
+        message = f"the rows of {sheet.path.name} are {apart:.6g} apart, and --sample-time says {step:.6g}"
+        hint = "leave --sample-time out: the times tell it; or mind its unit (--time-unit)"
+        raise DataError(sheet.error("data-not-uniform", message, hint, 0))
+
+
+def with_channels(sheet: Sheet, named: Mapping[str, str]) -> dict[str, str]:
+    """The columns that are named, and by their names those of the inputs or outputs of which none is."""
+    found = {
+        channel: name
+        for channel, name in channels_by_name(sheet).items()
+        if not any(other.startswith(channel[0]) for other in named)
+    }
+    return {**found, **named}
 
 
 def channels_by_name(sheet: Sheet) -> dict[str, str]:
@@ -110,8 +142,11 @@ def _count(sheet: Sheet, letter: str, columns: Mapping[str, str]) -> int:
     wanted = {f"{letter}{i + 1}" for i in range(len(named))}
     if named and set(named) == wanted:
         return len(named)
+    held = next((name for name in sheet.left_out if _CHANNELS[letter].fullmatch(name.lower())), None)
+    if held is not None and not named:
+        raise DataError(no_column(sheet, held))
     what = "input" if letter == "u" else "output"
-    header = f"its header is: {', '.join(sheet.header)}" if sheet.names else "it has no header"
+    header = sheet.contents or "it has no header"
     shown = f" ({header}; {len(sheet.columns)} columns)" if sheet.shown else ""
     message = f"which column of {sheet.path.name} is the {what}?{shown}"
     if named:
@@ -168,4 +203,5 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
             for path, log in zip(paths, logs, strict=True)
             for step in log.steps
         ),
+        Recorded.together([log.recorded for log in logs]),
     )

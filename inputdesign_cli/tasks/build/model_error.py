@@ -23,7 +23,7 @@ from inputdesign_cli.accuracy.model_error import OnModelError, check_positive
 from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Model, Rational
+from inputdesign_cli.plant import Model, Rational, ScalarTransfer
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.specification.models.controller import Controller
@@ -31,7 +31,7 @@ from inputdesign_cli.tasks.build.header import build_units
 from inputdesign_cli.tasks.build.system import build_loop
 from inputdesign_cli.tasks.build.tables import bad_table, has_column, read_frequency_table
 from inputdesign_cli.tasks.build.tuning import loop_controller
-from inputdesign_cli.tasks.build.weights import build_weight, rational
+from inputdesign_cli.tasks.build.weights import build_weight, check_finite, on_the_limit, rational
 
 _KEY = "accuracy.model_error"
 _LOOP = "accuracy.loop"
@@ -116,7 +116,12 @@ def _on_entry(
 ) -> OnModelError:
     admissible = _admissible_of(spec, error, experiment.model, band, entry, nominal)
     if error.weight is not None:
-        admissible = Weighted(admissible, build_weight(spec, error.weight, f"{_KEY}.weight"))
+        key = f"{_KEY}.weight"
+        weight = build_weight(spec, error.weight, key)
+        check_finite(spec, weight, band, "admissible-not-positive", key)
+        if error.region == "ellipsoid":
+            _check_nowhere_void(spec, weight, band, key)
+        admissible = Weighted(admissible, weight)
     alpha = model_error_alpha(spec, experiment.model)
     made: OnModelError
     if error.region == "first_order":
@@ -140,6 +145,19 @@ def _on_entry(
         except SpecError as missed:
             raise _too_much(spec, admissible, made) or missed from missed
     return made
+
+
+def _check_nowhere_void(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], key: str) -> None:
+    """Raise `SpecError` (`not-supported`) where a weight vanishes: ellipsoids are compared with r_adm."""
+    void, units = on_the_limit(weight.zero_points, band), build_units(spec)
+    if void is not None:
+        raise spec.complain(
+            "not-supported",
+            f"{key} vanishes at {void / units.frequency:.6g} {units.per_time}, where region: ellipsoid has "
+            "nothing to bound",
+            hint="leave that frequency out of the band, move the zero off it, or use region: first_order",
+            key=key,
+        )
 
 
 def _too_much(spec: Spec, admissible: AdmissibleError, made: OnModelError) -> SpecError | None:
@@ -254,7 +272,7 @@ def _admissible(
         if entry is not None and not units.single and has_column(path, "r_adm_", key=f"{_KEY}.table"):
             column += units.suffix(*entry)
         return positive_table(spec, error.table, band, column, f"{_KEY}.table")
-    return _sensitivity(spec, error, model)
+    return _sensitivity(spec, error, model, band)
 
 
 def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str, key: str) -> Table:
@@ -282,7 +300,7 @@ def positive_table(spec: Spec, name: str, band: tuple[float, float], column: str
     return Table(frequency, value)
 
 
-def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
+def _sensitivity(spec: Spec, error: StatedError, model: Model, band: tuple[float, float]) -> Sensitivity:
     asked = error.sensitivity
     loop_kept = spec.accuracy.loop
     if loop_kept is not None:
@@ -300,7 +318,9 @@ def _sensitivity(spec: Spec, error: StatedError, model: Model) -> Sensitivity:
             key=f"{_KEY}.sensitivity" if loop_kept is None else _LOOP,
         )
     if asked.weight is not None:
-        return Sensitivity(loop, rational(asked.weight))
+        weight = rational(asked.weight)
+        check_finite(spec, weight, band, "admissible-not-positive", f"{_KEY}.sensitivity")
+        return Sensitivity(loop, weight)
     peak = 1.0 if asked.max_db is None else 10 ** (-asked.max_db / 20)
     settings = _settings(given) if loop_kept is not None else None
     return Sensitivity(loop, Rational.build([peak]), settings)

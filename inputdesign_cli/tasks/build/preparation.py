@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
 
 Detrend = Literal["none", "constant", "linear", "auto"]
 DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
@@ -22,8 +23,6 @@ _GAP, _LONG_GAP = 1.5, 3.0
 _SHORTEST = 10
 # Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
 _OUTLYING = 8.0
-# More of them than this share are no outliers, but the other level of the signal.
-_OFTEN = 0.05
 _SHOWN = 5
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
@@ -80,9 +79,9 @@ class Segment:
 
 
 def whole_segments(
-    time: Array, u: Array, y: Array, step: float, *, resample: bool
+    time: Array, u: Array, y: Array, step: float, apart: NDArray[np.bool_], *, resample: bool
 ) -> tuple[list[Segment], list[str]]:
-    """The stretches between gaps: missing numbers, and steps of time that are too long.
+    """The stretches between gaps: missing numbers, steps of time that are too long, and where they are apart.
 
     Stretches of fewer than ten samples are left out where there are longer ones.
 
@@ -90,12 +89,13 @@ def whole_segments(
         time: (n,), increasing.
         u, y: (n, r), (n, p), NaN where a number is missing.
         step: the sample time.
+        apart: (n,), whether a stretch ends before a row, whatever its time.
     """
     told = []
     whole = ~np.isnan(np.column_stack([time, u, y])).any(axis=1)
     missing = int((~whole).sum())
     kept = np.flatnonzero(whole)
-    cut = np.diff(kept) > 1
+    cut = (np.diff(kept) > 1) | apart[kept[1:]]
     long = np.diff(time[kept]) > (_LONG_GAP if resample else _GAP) * step
     parts = np.split(kept, np.flatnonzero(cut | long) + 1)
     if missing:
@@ -143,18 +143,31 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
 
 def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
     """Values far from the median of a signal x (n,), with their rows in the file."""
-    middle = np.median(x)
-    spread = 1.4826 * np.median(np.abs(x - middle))
-    low, high = np.quantile(x, [0.5 * _OFTEN, 1.0 - 0.5 * _OFTEN])
-    spread = max(spread, (high - low) / 4.0)  # two levels have no spread about the more frequent one
+    middle, spread = np.median(x), spread_of(x)
     if spread <= 0.0:
         return []
     found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
-    if not found.size or found.size > _OFTEN * x.size:
+    if not found.size or found.size > OFTEN * x.size:
         return []
     listed = ", ".join(str(rows[i]) for i in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
     return [
         f"{name} has {found.size} outlying value{'s' * (found.size > 1)} (row {listed}): look at the record"
+    ]
+
+
+def standing_alone(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
+    """More values of a measured signal x (n,) than outliers are, each far from its neighbours: spikes."""
+    if x.size < _SHORTEST:
+        return []
+    near = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
+    off = np.abs(x[2:-2] - near)
+    found = 2 + np.flatnonzero(off > _OUTLYING * 1.4826 * np.median(off))
+    if not np.median(off) > 0.0 or found.size <= OFTEN * x.size:
+        return []
+    listed = ", ".join(str(rows[i]) for i in found[:_SHOWN])
+    return [
+        f"{name} has {found.size} values ({100 * found.size / x.size:.2g} %) far from their neighbours (row "
+        f"{listed}, ..): spikes? Look at the record, and empty the cells that are faults of measurement"
     ]
 
 

@@ -22,7 +22,7 @@ from inputdesign_cli.tasks.build.model_error import (
     required_band,
 )
 from inputdesign_cli.tasks.build.parameters import embedded
-from inputdesign_cli.tasks.build.weights import build_weight
+from inputdesign_cli.tasks.build.weights import build_weight, check_finite
 from inputdesign_cli.tasks.result.within_limits import StatedBound
 
 _RELATIVE_ZERO = 1e-9
@@ -168,6 +168,7 @@ def _weighted_variances(spec: Spec, experiment: Experiment) -> list[RequirementF
     assert stated is not None
     weight = build_weight(spec, stated.weight, f"{key}.weight")
     band = required_band(spec, experiment, stated.band)
+    check_finite(spec, weight, band, "admissible-not-positive", f"{key}.weight")
     found = [
         WeightedVariance(
             experiment=experiment,

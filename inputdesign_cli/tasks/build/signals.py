@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError
+from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build.columns import channel_columns, time_column
+from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, is_dated
-
-# A signal whose largest value is beyond this, or below its inverse, leaves double precision when squared.
-_EXTREME = 1e100
 
 
 @dataclass(frozen=True)
@@ -58,21 +56,23 @@ def signals_of(
         if np.isnan(numbers).all():
             message = f"the column {wanted[role]} holds no number"
             raise DataError(sheet.error("data-not-a-number", message, "is it another column?", 0))
-    rows = np.arange(preparation.skip, len(sheet.lines))
+    rows = np.arange(min(preparation.skip, len(sheet.lines)), len(sheet.lines))
     time = found.get("time", np.arange(len(sheet.lines), dtype=float))
+    scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
     if preparation.span is not None:
         begin, end = preparation.span
-        scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
         rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
-    for role in found.keys() - {"time"}:
-        _check_range(sheet, wanted[role], found[role])
     if not rows.size:
-        message = f"nothing is left of the {len(sheet.lines)} rows of {sheet.path.name}"
-        raise DataError.because("data-unreadable", message, "mind --skip and --range", sheet.key)
+        raise _nothing_left(sheet, preparation, time * scale)
     name = wanted.get("time", "")
     kept = replace(
         sheet, lines=sheet.lines[rows], texts=[sheet.texts[i] for i in rows.tolist()] if sheet.texts else ()
     )
+    for role, numbers in found.items():
+        own = numbers[rows]
+        if not np.isnan(own).all():
+            # Clocks count from long ago.
+            check_range(kept, wanted[role], own - np.nanmin(own) if role == "time" else own)
     driving = (*_labels("u", inputs), *references)
     u = np.column_stack([found[name][rows] for name in (*(f"u{i + 1}" for i in range(inputs)), *references)])
     y = np.column_stack([found[f"y{i + 1}"][rows] for i in range(outputs)])
@@ -82,18 +82,17 @@ def signals_of(
     return Signals(kept, time[rows], name, dated, u, y, driving, _labels("y", outputs))
 
 
-def _check_range(sheet: Sheet, name: str, x: Array) -> None:
-    """The products of three samples of a signal x (n,) stay within double precision.
-
-    Raises:
-        DataError: `beyond-precision`.
-    """
-    row = int(np.nanargmax(np.abs(x)))
-    size = abs(float(x[row]))
-    if size and not 1.0 / _EXTREME < size < _EXTREME:
-        message = f"the column {name} has values up to {size:.3g}: their squares leave double precision"
-        hint = "write the signals in a unit in which they are of the order of one"
-        raise DataError(sheet.error("beyond-precision", message, hint, row))
+def _nothing_left(sheet: Sheet, preparation: Preparation, time: Array) -> DataError:
+    """The error about rows that options leave out altogether."""
+    count, name = len(sheet.lines), sheet.path.name
+    message = f"nothing is left of the {count} rows of {name}"
+    hint = f"--skip {preparation.skip} leaves them all out"
+    if preparation.skip < count and preparation.span is not None:
+        there = time[~np.isnan(time)]
+        skipped = f" after the first {preparation.skip} rows" if preparation.skip else ""
+        hint = f"its times run from {there.min():.6g} to {there.max():.6g}: no row{skipped} lies within "
+        hint += "--range {:g}:{:g}".format(*preparation.span)
+    return DataError.because("data-unreadable", message, hint, sheet.key, Location(str(sheet.path), 1, 1, ""))
 
 
 def _check_rising(sheet: Sheet, time: Array) -> None:

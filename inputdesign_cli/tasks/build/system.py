@@ -40,7 +40,7 @@ from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import degrees_of, delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.state_space import state_space_model
-from inputdesign_cli.tasks.build.tables import read_columns
+from inputdesign_cli.tasks.build.tables import read_samples
 
 # Of pi/sample_time, where a band is proposed.
 _WITHIN = 0.95
@@ -232,7 +232,7 @@ def read_excitation_record(spec: Spec, name: str, key: str) -> Array:
     """
     units = build_units(spec)
     names = [units.excitation] if units.inputs == 1 else list(units.excitations)
-    columns = read_columns(spec.resolve_path(name), {column: column for column in names}, key=key)
+    columns = read_samples(spec.resolve_path(name), {column: column for column in names}, key=key)
     return np.stack([columns[column] for column in names], axis=1)
 
 

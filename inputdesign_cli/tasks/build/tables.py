@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +11,22 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
+from inputdesign_cli.tasks.build.files.layout import BLANK, LEFT_OUT
 from inputdesign_cli.tasks.build.header import build_units
 
 Array = NDArray[np.float64]
 
-_TIME = re.compile(r"(sampling[ _]|elapsed[ _])?(time|t|timestamp)(?![a-z0-9]).*")
+_TIME = re.compile(
+    r"(sampling[ _]|elapsed[ _])?(time|time[ _]?stamp|date[ _]?time|zeit|zeitstempel|tiempo)(?![^\W_]).*"
+)
+# The letter alone may be a temperature as well: what follows is a unit of time, and its numbers rise.
+_SHORT = re.compile(
+    r"t([ _]*[(\[]?\s*(s|secs?|seconds?|ms|us|min|mins|minutes?|h|hrs?|hours?|d|days?)\s*[)\]]?)?"
+)
+_MOSTLY, _EVENLY = 0.9, 0.01
+_LARGEST = 1e40  # as of other numbers in a spec
 
 
 def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
@@ -40,6 +50,26 @@ def read_columns(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str
     return found
 
 
+def read_samples(path: Path, wanted: Mapping[str, str], *, key: str) -> dict[str, Array]:
+    """The same of a signal, in which no sample may be missing, not even between its rows.
+
+    Raises:
+        DataError: see `read_columns`; `data-not-a-number`, a blank line, or a row commented out, in between;
+            `beyond-precision`.
+    """
+    sheet = read_sheet(path, key=key)
+    for line, kind in sheet.passed:
+        if kind in LEFT_OUT:
+            what = "is blank" if kind == BLANK else "is commented out"
+            message = f"line {line} of {path.name} {what}: is a sample missing between the rows about it?"
+            row = int(np.searchsorted(sheet.lines, line)) - 1
+            raise DataError(sheet.error("data-not-a-number", message, "take the line out of the file", row))
+    found = read_columns(path, wanted, key=key)
+    for role, numbers in found.items():
+        check_range(sheet, wanted[role], numbers)
+    return found
+
+
 def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     """The wanted columns, see `read_columns`; NaN where a cell is empty.
 
@@ -48,7 +78,7 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     """
     found = {role: named_columns(sheet, start.strip().lower()) for role, start in wanted.items()}
     wrong = [
-        _unclear(sheet, what, [wanted[role] for role in roles])
+        _unclear(sheet, what, {role: wanted[role] for role in roles})
         for what, roles in (
             ("no column", [role for role, at in found.items() if not at]),
             ("several columns", [role for role, at in found.items() if len(at) > 1]),
@@ -57,6 +87,14 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     ]
     if wrong:
         raise DataError(wrong)
+    for (at,) in found.values():
+        same = [other for other in found if found[other] == [at]]
+        if len(same) > 1:
+            message = f"{' and '.join(same)} are the same column of {sheet.path.name}"
+            if sheet.shown and sheet.names:
+                message += f": {sheet.names[at].strip()}"
+            hint = "name another one for one of them: --columns " + ",".join(f"{o}={wanted[o]}" for o in same)
+            raise DataError(sheet.error("data-missing-column", message, hint))
     for role, (at,) in found.items():
         fault = sheet.columns[at].fault
         if fault is not None:
@@ -71,9 +109,33 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
 
-def is_time(name: str) -> bool:
-    """Whether a column of this name, in small letters, holds times."""
-    return _TIME.fullmatch(name) is not None
+def time_columns(sheet: Sheet) -> list[str]:
+    """Names, in small letters, of columns that hold times by their names; that of dates if there is none."""
+    header = sheet.header
+    found = [
+        name
+        for name, column in zip(header, sheet.columns, strict=False)
+        if _TIME.fullmatch(name) or (_SHORT.fullmatch(name) and _mostly_rises(column.numbers))
+    ]
+    dated = [name for name, column in zip(header, sheet.columns, strict=False) if column.dated]
+    return found or [name for name in dated if name.startswith("dat")]
+
+
+def _mostly_rises(x: Array) -> bool:
+    steps = np.diff(x[~np.isnan(x)])
+    return bool(np.mean(steps > 0.0) > _MOSTLY) if steps.size else False
+
+
+def evenly_rising(sheet: Sheet, taken: Collection[str]) -> list[str]:
+    """Names of columns not taken whose numbers rise by even steps: times, or a count of rows."""
+    found = []
+    for name, column in zip(sheet.names, sheet.columns, strict=False):
+        steps = np.diff(column.numbers)
+        middle = float(np.median(steps)) if steps.size > 1 else 0.0
+        even = middle > 0.0 and bool(np.all(np.abs(steps - middle) < _EVENLY * middle))
+        if even and name.strip().lower() not in taken and column.fault is None:
+            found.append(name.strip())
+    return found
 
 
 def is_dated(sheet: Sheet, name: str) -> bool:
@@ -107,22 +169,42 @@ def named_columns(sheet: Sheet, start: str) -> list[int]:
     return [number - 1] if 1 <= number <= len(sheet.columns) else []
 
 
-def _unclear(sheet: Sheet, what: str, names: list[str]) -> Diagnostic:
+def _unclear(sheet: Sheet, what: str, wanted: Mapping[str, str]) -> Diagnostic:
+    """The error about columns, by role, of which there is none or several."""
+    names = list(wanted.values())
+    held = next((name for name in sheet.left_out if name.lower() in map(str.lower, names)), None)
+    if held is not None:
+        return no_column(sheet, held)
     hint = f"name one column {' and one '.join(names)}"
+    said = [role for role, start in wanted.items() if not role.startswith(start)]
     if not sheet.key:
-        others = [name.strip() for name in sheet.names if not is_time(name.strip().lower())]
-        called = others if sheet.shown and len(others) == len(names) else ["NAME"] * len(names)
-        columns = ",".join(f"{name}={column}" for name, column in zip(names, called, strict=True))
+        times = time_columns(sheet)
+        others = [name.strip() for name in sheet.names if name.strip().lower() not in times]
+        called = others if sheet.shown and len(others) == len(names) and not said else ["NAME"] * len(names)
+        channels = [role if role in said else start for role, start in wanted.items()]
+        columns = ",".join(f"{channel}={column}" for channel, column in zip(channels, called, strict=True))
         quoted = f'"{columns}"' if " " in columns else columns
         hint += f", or say which it is: --columns {quoted} (or its number)"
+        if said:
+            hint = f"write --columns {quoted} with a name as it stands in the file, or with its number"
     if names == ["frequency"]:
         hint += ", such as frequency_rad_per_s"
-    message = f"{sheet.path.name} has {what} for {', '.join(names)}"
+    told = [f"{start} ({role})" if role in said else start for role, start in wanted.items()]
+    message = f"{sheet.path.name} has {what} for {', '.join(told)}"
     if not sheet.names:
-        message = f"{sheet.path.name} has no header that names {', '.join(names)}"
+        message = f"{sheet.path.name} has no header that names {', '.join(told)}"
         message += f" (it has {len(sheet.columns)} columns)"
     elif sheet.shown:
-        message += f" (its header is: {', '.join(name.strip() for name in sheet.names)})"
+        message += f" ({sheet.contents})"
+    return sheet.error("data-missing-column", message, hint)
+
+
+def no_column(sheet: Sheet, name: str) -> Diagnostic:
+    """The error about what a file holds under a name, and what is no column of numbers."""
+    message = (
+        f"{name} in {sheet.path.name} holds {sheet.left_out[name]}: a signal is a column of real numbers"
+    )
+    hint = "save it as an array of numbers, a sample in each row and a channel in each column"
     return sheet.error("data-missing-column", message, hint)
 
 
@@ -147,6 +229,13 @@ def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str
     if frequency.size < 2 or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
         message = "the frequencies must be nonnegative and increase from row to row"
         raise bad_table(spec, name, message, "sort the rows; there must be two at least", key)
+    for column, values in found.items():
+        size = np.abs(values)
+        beyond = np.flatnonzero((size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0)))
+        if beyond.size:
+            message = f"{column} is {values[beyond[0]]:g} in row {beyond[0] + 2}"
+            hint = f"numbers other than zero lie between {1.0 / _LARGEST:g} and {_LARGEST:g}"
+            raise bad_table(spec, name, message, hint, key)
     return found | {"frequency": frequency * build_units(spec).frequency}
 
 

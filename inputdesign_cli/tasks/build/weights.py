@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from inputdesign_cli.plant import ContinuousRational, Rational, ScalarTransfer, zero_order_hold
+from inputdesign_cli.plant.polynomial import ComplexArray
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.transfer import ContinuousTransfer, DiscreteTransfer
+from inputdesign_cli.tasks.build.header import build_units
+
+# So near to the stability limit a root is on it; so near to an end of the band, as a share, within it.
+_ON_THE_LIMIT, _EDGE = 1e-9, 1e-9
 
 
 def rational(transfer: DiscreteTransfer) -> Rational:
@@ -53,3 +58,32 @@ def build_weight(
             )
         case ContinuousTransfer():
             return held(transfer, spec.sample_time)
+
+
+def check_finite(spec: Spec, weight: ScalarTransfer, band: tuple[float, float], code: str, key: str) -> None:
+    """Raise `SpecError` (with this code) where a weight has a pole on the stability limit in the band.
+
+    Args:
+        band: in rad/sample, or in rad per time unit where the plant is in continuous time.
+    """
+    at = on_the_limit(weight.pole_points, band)
+    if at is None:
+        return
+    units = build_units(spec)
+    sampled = spec.plant.sampled
+    mended = "a factor [1, -0.999] in place of [1, -1]" if sampled else "s + 0.001 in place of s"
+    raise spec.complain(
+        code,
+        f"{key} has a pole on the {'unit circle' if sampled else 'imaginary axis'}, at "
+        f"{at / units.frequency:.6g} {units.per_time}: it is infinite there",
+        hint=f"move it inside (such as {mended}), or keep the band that it is for away from it",
+        key=key,
+    )
+
+
+def on_the_limit(points: ComplexArray, band: tuple[float, float]) -> float | None:
+    """The lowest frequency of the band at which one of these points lies on the stability limit, if any."""
+    lo, hi = band
+    near = points.real[np.abs(points.imag) <= _ON_THE_LIMIT * hi]
+    inside = near[(near >= lo - _EDGE * hi) & (near <= hi * (1.0 + _EDGE))]
+    return float(inside.min()) if inside.size else None

@@ -19,6 +19,7 @@ from inputdesign_cli.tasks.result.rivals import rival_entries
 
 # A first residual beyond so many standard deviations is named.
 _SEEN_AT_ONCE = 3.0
+_NORMAL = 1.96  # 95 % of a Gaussian estimate
 
 
 def identification_entry(estimate: Estimate) -> dict[str, Json]:
@@ -145,6 +146,13 @@ def identification_notes(
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
     notes += vague_notes(model, vague)
+    notes += [
+        f"{name} of a dead time cannot be told from zero: {value + _NORMAL * deviation:.3g} at most (95 %)"
+        for name, value, deviation, late in zip(
+            estimate.names, estimate.theta, deviations, model.dead_times, strict=True
+        )
+        if late and name in vague
+    ]
     if model.continuous and estimate.failed:
         notes.append(
             "the input was taken for the band-limited interpolation of its samples; where it is held "

@@ -14,6 +14,9 @@ from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.refutations import chance
 
+# An input that changes no more often excites little but its steps.
+_FEW_CHANGES = 10
+
 
 def validation_entry(found: Fits) -> dict[str, Json]:
     """`validation` of `result.json`: numbers for one output, else lists."""
@@ -49,6 +52,7 @@ def exploration_entry(
                 "delay_range": [list(pair) for pair in ranges],
                 "output_error_by_order": {str(n): rms for n, rms in chosen.by_order.items()},
                 "structures": [_structure(candidate) for candidate in chosen.candidates],
+                "not_estimated": list(chosen.dropped),
             }
             for i, (chosen, taken, ranges) in enumerate(
                 zip(found.outputs, found.taken, found.ranges, strict=True)
@@ -93,6 +97,12 @@ def exploration_notes(
             f"simulates {taken.validation:.1f} % of the other, best of {len(chosen.candidates)} structures"
         )
     notes += [
+        f"{'y' if single else f'y{i + 1}'}: no {' or '.join(chosen.dropped)} model could be estimated: the "
+        f"record does not tell all its parameters{_least_moved(log, found)}"
+        for i, chosen in enumerate(found.outputs)
+        if chosen.dropped
+    ]
+    notes += [
         f"u{j + 1} never moves in this record: the model has no part of it, and an experiment must move it"
         for j in found.still
     ]
@@ -117,6 +127,17 @@ def exploration_notes(
     return notes
 
 
+def _least_moved(log: Log, found: Found) -> str:
+    """The input that changes in the fewest samples, of several, where these are few."""
+    moving = [j for j in range(found.model.inputs) if j not in found.still]
+    if len(moving) < 2:
+        return ""
+    changes = {j: sum(int(np.sum(np.diff(u[:, j]) != 0.0)) for u, _ in log.parts) for j in moving}
+    least = min(moving, key=lambda j: changes[j])
+    few = changes[least] <= _FEW_CHANGES
+    return f" (u{least + 1} changes in {changes[least]} of its samples only)" if few else ""
+
+
 def structure_curves(found: Found) -> dict[str, Curves]:
     """structures.png, one an output."""
     curves: dict[str, Curves] = {}
@@ -138,9 +159,10 @@ def structure_curves(found: Found) -> dict[str, Curves]:
     return curves
 
 
-def validation_curves(units: Units, u: Array, y: Array, found: Fits) -> tuple[Table, FitCurves]:
-    """fit.csv with its figure: a given model against data."""
-    instants = units.sample_time * np.arange(len(y), dtype=np.float64)
+def validation_curves(
+    units: Units, instants: Array, u: Array, y: Array, found: Fits
+) -> tuple[Table, FitCurves]:
+    """fit.csv with its figure: a given model against data at these times (n,)."""
     columns = {units.time_header: instants}
     panels = []
     for j, values in enumerate(u.T):

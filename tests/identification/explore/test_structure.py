@@ -182,3 +182,23 @@ def test_an_input_that_only_answers_is_noticed(dither):
 def test_a_sinusoid_is_no_answer():
     u = np.sin(0.3 * np.arange(500.0))[:, None]
     assert only_answers([(u, u + 0.1 * np.random.default_rng(1).standard_normal(u.shape))]) == []
+
+
+def test_a_record_of_a_single_step_is_told_what_it_lacks():
+    rng = np.random.default_rng(1)
+    u = (np.arange(200) >= 20)[:, None].astype(float)
+    y = scipy.signal.lfilter([0, 0.1], [1, -0.9], u, axis=0) + 0.02 * rng.standard_normal((200, 1))
+    with pytest.raises(SpecError, match="no model of y") as caught:
+        explore_records([(u, y)])
+    assert caught.value.diagnostics[0].hint.startswith("u moves in one stretch")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_range_of_a_delay_holds_it(seed):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 5)[:, None]
+    y = scipy.signal.lfilter([0, 0, 0, 0.2], [1, -1.2, 0.4], u, axis=0) + 0.3 * rng.standard_normal((300, 1))
+    chosen = explore_structure([(u[:180], y[:180])], [(u[180:], y[180:])])
+    for candidate in chosen.candidates:
+        for delay, (low, high) in zip(candidate.orders.delays, chosen.ranges(candidate), strict=True):
+            assert low <= delay <= high

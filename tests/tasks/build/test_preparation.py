@@ -6,6 +6,8 @@ import pytest
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import read_data
+from inputdesign_cli.tasks.build.extremes import absurd
+from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation, limits_of_sensor, trend
 
 UNITS = Units("s", 1.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
@@ -104,3 +106,83 @@ def test_two_names_of_one_channel_are_a_question(tmp_path, header, channel):
         read_data([tmp_path / "a.csv"], UNITS, Preparation())
     found = read_data([tmp_path / "a.csv"], UNITS, Preparation(columns={channel: "2"}))
     assert (found.u if channel == "u1" else found.y)[:3, 0].tolist() == [0.0, 1.0, 0.0]
+
+
+BETWEEN = {
+    "": ((20,), (20,), ""),
+    "\n": ((10, 10), (20,), "1 blank line between the numbers (line 12)"),
+    "\n  \n": ((10, 10), (20,), "2 blank lines between the numbers (lines 12, 13)"),
+    ",,\n": ((10, 10), (10, 10), "1 rows with a missing number"),
+    "# 10.2,1.0,2.0\n": ((10, 10), (20,), "1 row that is commented out between the numbers (line 12)"),
+    "# a pause\n": ((20,), (20,), "1 comment between the numbers (line 12) passed over"),
+}
+
+
+def lines_of(count):
+    return [f"{k}.0,{k % 3},{np.sin(k):.12g}" for k in range(count)]
+
+
+@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize("line", BETWEEN)
+def test_lines_between_the_numbers_are_told(line, timed, tmp_path):
+    """Without times nobody knows what is missing; with them it is seen, and nothing is."""
+    rows, path = lines_of(20), tmp_path / "log.csv"
+    head = "time,u,y" if timed else "step,u,y"
+    path.write_text("\n".join([head, *rows[:10], line + "\n".join(rows[10:])]))
+    found = read_data([path], UNITS, Preparation())
+    untimed, with_times, told = BETWEEN[line]
+    assert found.lengths == (with_times if timed else untimed)
+    assert "".join(found.notes).startswith(told)
+    assert bool(found.notes) == bool(line)
+
+
+def test_blank_lines_between_all_rows_are_the_layout(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("step,u,y\n\n" + "\n\n".join(lines_of(20)))
+    found = read_data([path], UNITS, Preparation())
+    assert found.lengths == (20,)
+    assert found.notes == ("blank lines stand between most rows: they were passed over",)
+
+
+def test_rows_that_are_left_out_take_their_lines_along(tmp_path):
+    path, (first, *others) = tmp_path / "log.csv", lines_of(20)
+    path.write_text("\n".join(["step,u,y", first, "", *others]))
+    found = read_data([path], UNITS, Preparation(skip=1))
+    assert (found.lengths, found.notes) == ((19,), ())
+
+
+@pytest.mark.parametrize("column", ["time", "u", "y"])
+@pytest.mark.parametrize("value", [9e99, -1e308, 1e30, 1e19, 1e12])
+def test_values_beside_which_all_others_are_rounding_are_refused_with_their_line(column, value, tmp_path):
+    signals = {"time": TIME.copy(), "u": U.copy(), "y": Y.copy()}
+    signals[column][-1 if column == "time" else 30] = abs(value) if column == "time" else value
+    if column == "time" and abs(value) < 1e18:
+        return  # a gap of the record
+    with pytest.raises(DataError, match=f"column {column}") as caught:
+        read(tmp_path / "a.csv", **signals)
+    (told,) = caught.value.diagnostics
+    assert told.code == "beyond-precision"
+    assert told.location.line == (N + 1 if column == "time" else 32)
+
+
+@pytest.mark.parametrize("scale", [1e19, 1e200, 1e-19, 1e-320])
+def test_signals_whose_squares_leave_the_range_are_refused(scale, tmp_path):
+    with pytest.raises(DataError, match="column y has values up to") as caught:
+        read(tmp_path / "a.csv", y=scale * Y)
+    assert caught.value.diagnostics[0].code == "beyond-precision"
+
+
+def test_pulses_steps_and_tiny_values_are_no_faults():
+    pulse = np.eye(1, 200)[0]
+    late = np.where(np.arange(200) < 195, 0.0, 1.0)
+    for x in (pulse, late, 0.9 ** np.arange(400.0), 20.0 + 1e-14 * Y, np.r_[Y, 1e-320], 20.0 + pulse):
+        assert absurd(x) is None
+    assert absurd(np.r_[Y, 1e25, Y]) == N
+
+
+def test_a_column_that_may_hold_the_times_is_told(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["Sekunden,u,y", *lines_of(20)]))
+    (first, second, *_) = read_log(path, Preparation()).steps
+    assert first.startswith("the file has no times")
+    assert second.startswith("Sekunden rises by even steps")

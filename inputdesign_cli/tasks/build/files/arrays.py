@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,11 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import isolated
-from inputdesign_cli.tasks.build.files.sheet import Array, Sheet, of_arrays, unreadable
+from inputdesign_cli.tasks.build.files.sheet import Sheet, of_arrays, unreadable
 
 _MOST_BYTES = 2**30
+_SHOWN = 5
+_OBJECT = "an object"
 _SAMPLE_TIMES = ("ts", "sample_time", "dt")
 _CONVERT = (
     "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  "
@@ -33,13 +36,22 @@ def read_npz(path: Path, key: str, raw: bytes) -> Sheet:
             if sum(entry.file_size for entry in archive.infolist()) > _MOST_BYTES:
                 raise unreadable(path, key, "unpacks to more than 1 GiB", "keep to what is needed")
         with np.load(io.BytesIO(raw), allow_pickle=False) as found:
-            arrays = {name: found[name] for name in found.files}
+            arrays = {name: _loaded(found, name) for name in found.files}
     except DataError:
         raise
     except Exception:  # whatever a broken archive leads the reader to
         hint = "write it with numpy.savez(file, u=.., y=..)"
         raise unreadable(path, key, "is no .npz file of numbers", hint) from None
-    return _sheet(path, key, arrays)
+    kept, left_out = isolated.divided(arrays)
+    return _sheet(path, key, isolated.Arrays(kept, left_out=left_out))
+
+
+def _loaded(archive: Mapping[str, NDArray], name: str) -> NDArray:
+    """An array of an archive; an empty one of objects in place of those, which are never unpickled."""
+    try:
+        return archive[name]
+    except ValueError:
+        return np.array([None])
 
 
 def read_mat(path: Path, key: str, raw: bytes) -> Sheet:
@@ -54,21 +66,30 @@ def read_mat(path: Path, key: str, raw: bytes) -> Sheet:
         raise unreadable(path, key, "is a .mat file of version 7.3", hint)
     if found.fault:
         raise unreadable(path, key, "is no .mat file that can be read", "save it in MATLAB anew")
-    if not any(value.size > 1 for value in found.arrays.values()):
-        what = "holds an object that only MATLAB reads" if found.opaque else "holds no arrays of numbers"
-        raise unreadable(path, key, what, _CONVERT)
-    return _sheet(path, key, found.arrays)
+    return _sheet(path, key, found)
 
 
-def _sheet(path: Path, key: str, arrays: Mapping[str, NDArray]) -> Sheet:
-    """Scalars called Ts, sample_time or dt are the sample time; the signals are what has several rows."""
-    numbers = {name: value for name, value in arrays.items() if isolated.is_numeric(value)}
-    times = [
-        float(np.ravel(value)[0])
-        for name, value in numbers.items()
-        if name.lower() in _SAMPLE_TIMES and value.size == 1
-    ]
-    signals: list[tuple[str, Array]] = [
-        (name, np.asarray(value, dtype=float)) for name, value in numbers.items() if value.size > 1
-    ]
-    return of_arrays(path, key, signals, times[0] if times else None)
+def _sheet(path: Path, key: str, found: isolated.Arrays) -> Sheet:
+    """Scalars called Ts, sample_time or dt are the sample time; the signals are what has several rows.
+
+    Raises:
+        DataError: `data-unreadable`, nothing has.
+    """
+    signals, times, left_out = [], list[float](), dict(found.left_out)
+    for name, value in found.arrays.items():
+        if value.size > 1:
+            signals.append((name, value))
+        elif name.lower() in _SAMPLE_TIMES:
+            times.append(float(np.ravel(value)[0]))
+        else:
+            left_out[name] = "a single number"
+    if found.opaque:
+        left_out[_OBJECT] = "what only MATLAB reads"
+    if not signals:
+        told = "; ".join(f"{name} holds {what}" for name, what in list(left_out.items())[:_SHOWN])
+        hint = _CONVERT if path.suffix.lower() == ".mat" else "write it with numpy.savez(file, u=.., y=..)"
+        raise unreadable(path, key, f"holds no arrays of numbers{f' ({told})' if told else ''}", hint)
+    if found.opaque:
+        left_out[_OBJECT] += f" ({_CONVERT})"
+    sheet = of_arrays(path, key, signals, times[0] if times else None)
+    return replace(sheet, left_out=left_out)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from inputdesign_cli.tasks.build.files.isolated import divided
 from inputdesign_cli.tasks.build.files.sheet import Sheet, of_arrays, unreadable
 
 PARQUET = (".parquet", ".pq")
@@ -14,7 +17,7 @@ EXCEL = (".xlsx", ".xls", ".xlsm", ".ods")
 
 
 def read_frame(path: Path, key: str, raw: bytes) -> Sheet:
-    """The columns of a parquet file, or of the first sheet of a workbook, that hold numbers.
+    """The columns of a parquet file, or of the first sheet of a workbook, that hold numbers or dates.
 
     Raises:
         DataError: `data-unreadable`.
@@ -30,5 +33,16 @@ def read_frame(path: Path, key: str, raw: bytes) -> Sheet:
         raise unreadable(path, key, f"is {kind}, and pandas is not installed", hint) from None
     except Exception:  # whatever a broken file leads the reader to
         raise unreadable(path, key, f"is not {kind} that can be read", "save it as CSV") from None
-    numbers = frame.select_dtypes("number")
-    return of_arrays(path, key, [(str(name), np.asarray(numbers[name], dtype=float)) for name in numbers])
+    arrays = {str(name): np.asarray(frame[name]) for name in frame}
+    kept, left_out = divided({name: _bare(array) for name, array in arrays.items()})
+    return replace(of_arrays(path, key, list(kept.items())), left_out=left_out)
+
+
+def _bare(array: NDArray) -> NDArray:
+    """Cells that are all numbers or empty as numbers."""
+    if array.dtype.kind != "O":
+        return array
+    try:
+        return np.array([np.nan if cell is None else cell for cell in array.tolist()], dtype=float)
+    except (TypeError, ValueError):
+        return array

@@ -22,11 +22,15 @@ _COMMAND = f"from {__name__} import answer; answer()"
 
 @dataclass(frozen=True)
 class Arrays:
-    """The arrays of numbers in a file; a `fault` where it cannot be read, `opaque` if MATLAB alone can."""
+    """The arrays of numbers in a file; a `fault` where it cannot be read, `opaque` if MATLAB alone can.
+
+    `left_out` says of the others, by name, what they hold.
+    """
 
     arrays: Mapping[str, NDArray] = field(default_factory=dict)
     fault: str = ""
     opaque: bool = False
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 def arrays_of(raw: bytes) -> Arrays:
@@ -46,13 +50,18 @@ def arrays_of(raw: bytes) -> Arrays:
         return Arrays(fault=told["fault"])
     with np.load(io.BytesIO(rest), allow_pickle=False) as found:
         arrays = {name: found[f"arr_{i}"] for i, name in enumerate(told["names"])}
-    return Arrays(arrays, opaque=told["opaque"])
+    return Arrays(arrays, opaque=told["opaque"], left_out=told["left_out"])
 
 
 def answer() -> None:
     """In that process: a file on standard input, its arrays on standard output."""
     found = _loaded(sys.stdin.buffer.read())
-    told = {"fault": found.fault, "opaque": found.opaque, "names": list(found.arrays)}
+    told = {
+        "fault": found.fault,
+        "opaque": found.opaque,
+        "names": list(found.arrays),
+        "left_out": dict(found.left_out),
+    }
     sys.stdout.buffer.write(json.dumps(told).encode() + b"\n")
     buffer = io.BytesIO()
     np.savez(buffer, *found.arrays.values())
@@ -76,8 +85,8 @@ def _loaded(raw: bytes) -> Arrays:
         if not name.startswith("__"):
             plain = _plain(value)
             flat |= plain if isinstance(plain, Mapping) else {name: plain}
-    kept = {name: np.asarray(value) for name, value in flat.items() if is_numeric(value)}
-    return Arrays(kept, opaque="__function_workspace__" in found)
+    kept, left_out = divided(flat)
+    return Arrays(kept, opaque="__function_workspace__" in found, left_out=left_out)
 
 
 def _plain(value: Any) -> Any:
@@ -90,7 +99,47 @@ def _plain(value: Any) -> Any:
     return {_IDDATA.get(name, name): item for name, item in fields.items() if np.size(item)}
 
 
-def is_numeric(value: Any) -> bool:
-    """Whether a value is a number, or an array of them with rows and columns at most."""
-    array = np.asarray(value)
-    return array.dtype.kind in "fiub" and array.ndim <= 2
+def divided(values: Mapping[str, Any]) -> tuple[dict[str, NDArray], dict[str, str]]:
+    """The arrays of numbers, or of times, with rows and columns at most; and what the others hold."""
+    kept: dict[str, NDArray] = {}
+    left_out: dict[str, str] = {}
+    for name, value in values.items():
+        array = np.asarray(value) if not isinstance(value, list) else _of_cells(value)
+        if array.dtype.names:
+            fields, others = divided({f"{own}": array[own] for own in array.dtype.names})
+            kept, left_out = kept | fields, left_out | others
+            continue
+        while array.ndim > 2 and array.shape[-1] == 1:
+            array = array[..., 0]
+        if array.dtype.kind == "c" and not np.any(array.imag):
+            array = array.real
+        wrong = _wrong(array)
+        if wrong:
+            left_out[name] = wrong
+        else:
+            kept[name] = array
+    return kept, left_out
+
+
+def _of_cells(value: list[Any]) -> NDArray:
+    cells = np.empty(len(value), dtype=object)
+    cells[:] = value
+    return cells
+
+
+def _wrong(array: NDArray) -> str:
+    """What an array holds that is no column of numbers; nothing where it is one."""
+    if array.size == 0:
+        return "nothing"
+    if array.dtype.kind == "c":
+        return "complex numbers"
+    if array.dtype.kind in "SU":
+        return "text"
+    if array.dtype.kind == "O":
+        if any(isinstance(item, str) for item in array.ravel()):
+            return "text"
+        several = any(np.size(item) > 1 for item in array.ravel())
+        return "cells, as those of several experiments (in MATLAB: getexp(data, 1))" if several else "objects"
+    if array.dtype.kind not in "fiubmM":
+        return f"numbers of the kind {array.dtype}"
+    return f"an array of {array.ndim} dimensions" if array.ndim > 2 else ""

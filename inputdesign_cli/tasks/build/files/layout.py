@@ -9,10 +9,19 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
+
 from inputdesign_cli.specification.yaml.scalars import plain_number
 from inputdesign_cli.tasks.build.files.dates import is_moment
 
 Rows = list[tuple[int, list[str]]]
+Passed = tuple[tuple[int, str], ...]
+"""Lines that are no rows, and what they are."""
+
+BLANK, SPACING, EMPTY = "blank", "spacing", "empty cells"
+COMMENT, COMMENTED = "comment", "commented numbers"
+# Between rows without times nobody knows how many samples are missing there.
+LEFT_OUT = (BLANK, COMMENTED)
 
 COMMENTS = ("#", "%", "//")
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
@@ -86,6 +95,15 @@ class OpenQuoteError(ValueError):
         self.line = line
 
 
+class LongFieldError(ValueError):
+    """A field of `line` that is longer than any number or name."""
+
+    def __init__(self, line: int) -> None:
+        most = csv.field_size_limit()
+        super().__init__(f"line {line} has a field of more than {most} characters, which is no number")
+        self.line = line
+
+
 def separator_of(lines: Sequence[str]) -> str | None:
     """What stands between the fields: that by which most cells are numbers."""
     used = [line for line in lines if line.strip() and not line.strip().startswith(COMMENTS)]
@@ -99,30 +117,52 @@ def separator_of(lines: Sequence[str]) -> str | None:
     return best if numbers(best) else next((m for m in "\t;" if used and m in used[0].strip()), ",")
 
 
-def rows_of(text: str, separator: str | None) -> Rows:
-    """Line numbers and fields of what is neither empty nor a comment.
+def rows_of(text: str, separator: str | None) -> tuple[Rows, Passed]:
+    """Line numbers and fields of what is neither empty nor a comment, and the other lines.
 
     Raises:
         OpenQuoteError: the end of the text, or of a line, stands inside quotes that nothing closes.
+        LongFieldError: a field is longer than any number or name.
     """
     if separator is None:
         found = [(number, line.split()) for number, line in enumerate(text.splitlines(), start=1)]
     else:
         found = list(_quoted(text, separator))
-    full = [any(map(str.strip, row)) for _, row in found]
-    last = max((i for i, filled in enumerate(full) if filled), default=-1)
-    # Between rows of numbers a row of empty cells is a sample that is missing; elsewhere it is nothing.
-    numbers = [
-        filled and all(is_plain(cell, comma=separator != ",") for cell in row if cell.strip())
-        for filled, (_, row) in zip(full, found, strict=True)
-    ]
-    first = next((i for i, of_numbers in enumerate(numbers) if of_numbers), len(found))
-    return [
-        (line, row)
-        for i, (line, row) in enumerate(found)
-        if (full[i] or (len(row) > 1 and first < i < last))
-        and not (row and row[0].lstrip().startswith(COMMENTS))
-    ]
+    rows: Rows = []
+    passed: list[tuple[int, str]] = []
+    for line, row in found:
+        if not any(map(str.strip, row)):
+            passed.append((line, EMPTY if len(row) > 1 else BLANK))
+        elif row[0].lstrip().startswith(COMMENTS):
+            passed.append((line, _comment([row[0].lstrip().lstrip("#%/"), *row[1:]], separator)))
+        else:
+            rows.append((line, row))
+    return rows, tuple(passed)
+
+
+def _comment(bare: Sequence[str], separator: str | None) -> str:
+    filled = [cell for cell in bare if cell.strip()]
+    numbers = len(filled) > 1 and all(is_plain(cell, comma=separator != ",") for cell in filled)
+    return COMMENTED if numbers else COMMENT
+
+
+def within(body: Rows, passed: Passed, separator: str | None) -> tuple[Rows, Passed]:
+    """Rows with those of empty cells between them, samples that are missing, and what else stands between.
+
+    Blank lines between most rows are `SPACING`, which means nothing.
+    """
+    comma = separator != ","
+    ends = [i for i, (_, row) in enumerate(body) if _of_numbers(row, comma)]
+    if not ends:
+        return body, ()
+    first, last = body[ends[0]][0], body[ends[-1]][0]
+    between = [(line, kind) for line, kind in passed if first < line < last]
+    empty = [(line, [""] * len(body[ends[0]][1])) for line, kind in between if kind == EMPTY]
+    lines = np.array([line for line, _ in body])
+    blank = np.array([line for line, kind in between if kind == BLANK])
+    if 2 * np.unique(np.searchsorted(lines, blank)).size > ends[-1] - ends[0]:
+        between = [(line, SPACING if kind == BLANK else kind) for line, kind in between]
+    return sorted([*body, *empty], key=lambda row: row[0]), tuple(p for p in between if p[1] != EMPTY)
 
 
 def _quoted(text: str, separator: str) -> Rows:
@@ -138,8 +178,9 @@ def _quoted(text: str, separator: str) -> Rows:
                 raise OpenQuoteError(begun)
             rows.append((reader.line_num, row))
             begun = reader.line_num + 1
-    except csv.Error:  # a field grew beyond all bounds: a quote that nothing closes
-        raise OpenQuoteError(begun) from None
+    except csv.Error:  # a field grew beyond all bounds
+        quoted = '"' in lines[begun - 1] and len(lines[begun - 1]) < csv.field_size_limit()
+        raise (OpenQuoteError if quoted else LongFieldError)(begun) from None
     if rows.pop()[1] != [end]:
         raise OpenQuoteError(begun)
     return rows

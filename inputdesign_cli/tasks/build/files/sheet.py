@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +40,8 @@ class Sheet:
         texts: what the rows say, for diagnostics; empty where a file is no text.
         shown: whether messages may show what the file holds: it is a table of numbers, and no secret.
         sample_time: as the file says itself; None where it does not.
+        left_out: what the file holds besides that is no column, and what it holds instead of numbers.
+        passed: lines between rows of numbers that are no rows, and what they are: see `layout`.
     """
 
     path: Path
@@ -51,11 +53,22 @@ class Sheet:
     texts: Sequence[str] = ()
     shown: bool = True
     sample_time: float | None = None
+    passed: tuple[tuple[int, str], ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def header(self) -> list[str]:
         """The names in small letters."""
         return [name.strip().lower() for name in self.names]
+
+    @property
+    def contents(self) -> str:
+        """The names, and what is no column, for messages; nothing where they may not be shown."""
+        if not self.shown:
+            return ""
+        told = [f"its header is: {', '.join(name.strip() for name in self.names)}"] if self.names else []
+        told += [f"{name} holds {what}" for name, what in self.left_out.items()]
+        return "; ".join(told)
 
     def error(self, code: str, message: str, hint: str, row: int | None = None) -> Diagnostic:
         """A diagnostic that points at a row, or at the header."""
@@ -74,7 +87,7 @@ def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = No
 
 
 def of_arrays(
-    path: Path, key: str, arrays: Sequence[tuple[str, Array]], sample_time: float | None = None
+    path: Path, key: str, arrays: Sequence[tuple[str, NDArray]], sample_time: float | None = None
 ) -> Sheet:
     """Named arrays, (n,) or (n, m), as columns: those of one array are called x1, x2, ..
 
@@ -84,19 +97,20 @@ def of_arrays(
     names: list[str] = []
     columns: list[Column] = []
     for name, array in arrays:
-        wide = np.asarray(array, dtype=float)
+        dated = array.dtype.kind in "mM"
+        wide = _seconds(array) if dated else np.asarray(array, dtype=float)
         wide = wide[:, None] if wide.ndim == 1 else wide
         wide = wide.T if wide.shape[0] == 1 else wide
         single = wide.shape[1] == 1
         names += [name if single else f"{name}{i + 1}" for i in range(wide.shape[1])]
-        columns += [Column(column, _infinite(column)) for column in wide.T]
+        columns += [Column(column, _infinite(column), dated) for column in wide.T]
     lengths = {len(column.numbers) for column in columns}
     if lengths in (set(), {0}):
         raise unreadable(path, key, "holds no rows of numbers", "save the signals as arrays u, y and time")
     if len(lengths) > 1:
-        told = ", ".join(f"{name} {len(c.numbers)}" for name, c in zip(names, columns, strict=True))
-        hint = "keep the signals of one experiment in a file, all of one length"
-        raise unreadable(path, key, f"holds columns of different lengths ({told})", hint)
+        told = ", ".join(f"{name} {' x '.join(map(str, array.shape))}" for name, array in arrays)
+        hint = "keep the signals of one experiment in a file, all of one length, a sample in each row"
+        raise unreadable(path, key, f"holds arrays of different lengths ({told})", hint)
     return Sheet(
         path,
         key,
@@ -106,6 +120,13 @@ def of_arrays(
         (1, ", ".join(names)),
         sample_time=sample_time,
     )
+
+
+def _seconds(moments: NDArray) -> Array:
+    """Dates and times, or lengths of time, in seconds since the first; NaN where there is none."""
+    since = moments - moments.ravel()[0] if moments.dtype.kind == "M" else moments
+    seconds = since / np.timedelta64(1, "s")
+    return np.asarray(seconds, dtype=float)
 
 
 def _infinite(numbers: Array) -> tuple[int, str] | None:

@@ -15,6 +15,7 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files.dates import moments_of
 from inputdesign_cli.tasks.build.files.layout import (
     COMMENTS,
+    LongFieldError,
     OpenQuoteError,
     Rows,
     between_thousands,
@@ -25,6 +26,7 @@ from inputdesign_cli.tasks.build.files.layout import (
     rows_of,
     separator_of,
     table_begins,
+    within,
 )
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, unreadable
 
@@ -39,16 +41,20 @@ def read_text(path: Path, key: str, text: str) -> Sheet:
     comment, first = _leading_comment(lines)
     separator = separator_of(lines[first:])
     try:
-        rows = rows_of(text, separator)
+        rows, passed = rows_of(text, separator)
     except OpenQuoteError as error:
         hint = "close it, or take it out; numbers need no quotes"
         raise unreadable(path, key, f"is no CSV file: {error}", hint, error.line) from None
+    except LongFieldError as error:
+        hint = "keep one sample a line, its numbers separated by commas, semicolons, tabs or blanks"
+        raise unreadable(path, key, f"is no table: {error}", hint, error.line) from None
     rows = rows[table_begins(rows, separator) :]
     if decimal_commas(rows, separator):
         rows = [(line, [cell.replace(",", ".") for cell in row]) for line, row in rows]
     head, names, body = headed(rows, comment, separator)
     if not body:
         raise unreadable(path, key, "holds no rows of numbers", "write a header line and rows below it")
+    body, between = within(body, passed, separator)
     if names and all(len(row) == len(names) + 1 and not row[-1].strip() for _, row in body):
         body = [(line, row[:-1]) for line, row in body]  # every row ends with a separator
     width = len(names) or max(len(row) for _, row in body)
@@ -63,6 +69,7 @@ def read_text(path: Path, key: str, text: str) -> Sheet:
         head,
         [mark.join(row) for _, row in body],
         _of_numbers(body, columns),
+        passed=between,
     )
     long = next((i for i, (_, row) in enumerate(body) if len(row) > width), None)
     if long is not None:

@@ -10,8 +10,7 @@ import scipy.io
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from inputdesign_cli.errors import DataError, IdesignError
-from inputdesign_cli.tasks.build.files import read_sheet
-from inputdesign_cli.tasks.build.files.layout import rows_of
+from inputdesign_cli.tasks.build.files import isolated, read_sheet
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.tables import columns_of, read_columns
@@ -297,6 +296,96 @@ def test_a_file_that_ends_its_reader_is_refused(tmp_path):
         read_sheet(path, key="")
 
 
-def test_a_row_of_empty_cells_between_numbers_is_a_sample_that_is_missing():
-    text = "u1,y1\n,\n1,2\n,\n3,4\n,\n"
-    assert [row for _, row in rows_of(text, ",")] == [["u1", "y1"], ["1", "2"], ["", ""], ["3", "4"]]
+def cells_of(path, text):
+    path.write_text(text)
+    sheet = read_sheet(path, key="")
+    return np.column_stack([column.numbers for column in sheet.columns])
+
+
+def test_a_row_of_empty_cells_between_numbers_is_a_sample_that_is_missing(tmp_path):
+    found = cells_of(tmp_path / "log.csv", "u1,y1\n,\n1,2\n,\n3,4\n,\n")
+    np.testing.assert_array_equal(found, [[1, 2], [np.nan, np.nan], [3, 4]])
+
+
+def test_it_is_one_beside_a_column_of_words_too(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("u1,y1,state\n1,2,ok\n,,\n3,4,ok\n")
+    np.testing.assert_array_equal(read_columns_with_gaps(path), [1, np.nan, 3])
+
+
+def read_columns_with_gaps(path):
+    return columns_of(read_sheet(path, key=""), {"u": "u1"})["u"]
+
+
+@pytest.mark.parametrize("preamble", ["Serial,42\n\n,\n", "# 1,2\n\n", "\n"])
+def test_what_stands_above_the_table_cuts_nothing(preamble, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(preamble + "u1,y1\n\n1,2\n3,4\n\n# the end\n")
+    sheet = read_sheet(path, key="")
+    assert sheet.passed == ()
+    assert len(sheet.lines) == 2
+
+
+def test_a_field_that_is_too_long_is_no_open_quote(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(f"u,y\n1,2\n3,{'4' * 200_000}\n")
+    with pytest.raises(DataError, match="line 3 has a field of more than 131072 characters") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location.line == 3
+
+
+def test_an_object_beside_other_arrays_is_told_with_the_lines_that_convert_it(monkeypatch, tmp_path):
+    """SciPy writes no such objects: what its reader tells of one."""
+    path = tmp_path / "log.mat"
+    path.write_bytes(b"MATLAB 5.0 MAT-file")
+    monkeypatch.setattr(isolated, "arrays_of", lambda raw: isolated.Arrays({"v": U}, opaque=True))
+    with pytest.raises(DataError) as caught:
+        read_log(path, Preparation())
+    assert "save('data.mat', '-struct', 's'" in caught.value.diagnostics[0].message
+
+
+WRONG = {
+    "complex numbers": U + 1j,
+    "text": np.array(list("abcd")),
+    "an array of 3 dimensions": np.ones((4, 2, 2)),
+    "nothing": np.zeros(0),
+    "a single number": np.array(2.0),
+}
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+@pytest.mark.parametrize("what", WRONG)
+def test_arrays_that_are_no_columns_are_told_by_what_they_hold(kind, what, tmp_path):
+    path = tmp_path / f"log.{kind}"
+    (np.savez if kind == "npz" else lambda path, **arrays: scipy.io.savemat(path, arrays))(
+        path, u=WRONG[what], y=Y
+    )
+    for read in (lambda: read_log(path, Preparation()), lambda: read_columns(path, {"u": "u"}, key="")):
+        with pytest.raises(DataError) as caught:
+            read()
+        assert caught.value.diagnostics[0].message.startswith(f"u in log.{kind} holds {what}: ")
+
+
+def test_arrays_that_mean_columns_of_numbers_are_columns(tmp_path):
+    """Complex numbers without an imaginary part, a third dimension of one, fields, and times."""
+    path = tmp_path / "log.npz"
+    moments = np.datetime64("2024-03-12T10:15:00") + (1000 * TIME).astype("timedelta64[ms]")
+    fields = np.array(list(zip(U, Y, strict=True)), dtype=[("u1", float), ("y1", float)])
+    np.savez(path, time=moments, u2=U + 0j, y2=Y[:, None, None], fields=fields)
+    names = ("time", "u1", "y1", "u2", "y2")
+    found = read_columns(path, {name: name for name in names}, key="")
+    for name, expected in zip(names, (TIME, U, Y, U, Y), strict=True):
+        np.testing.assert_array_equal(found[name], expected)
+
+
+def test_dates_of_workbooks_are_times(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "log.parquet"
+    pandas.DataFrame(
+        {"time": pandas.to_datetime(1e9 * TIME), "u": U, "y": Y, "state": list("abcd")}
+    ).to_parquet(path)
+    sheet = read_sheet(path, key="")
+    np.testing.assert_array_equal(columns_of(sheet, {"time": "time"})["time"], TIME)
+    assert sheet.columns[0].dated
+    assert sheet.left_out == {"state": "text"}

@@ -1,0 +1,70 @@
+"""A weight with a pole on the stability limit in its band is refused by its name, whatever it weighs."""
+
+import json
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import DataError, SpecError
+
+SPEC = """\
+plant: {B: [0, 1], F: [1, -0.7]}
+noise: {variance: 1}
+experiment: {samples: 500}
+spectrum: {type: fir, order: 6}
+"""
+POLES = {0.0: [1, -1], np.pi: [1, 1], 0.5 * np.pi: [1, 0, 1], 0.3: [1, -2 * np.cos(0.3), 1]}
+LOOP = {"numerator": [0.1], "denominator": [1]}
+BESIDE = {"accuracy": {"model_error": {"absolute": 1}}}
+KEYS = {
+    "accuracy.model_error.weight": lambda w: {"accuracy": {"model_error": {"absolute": 1, "weight": w}}},
+    "accuracy.weighted_variance.weight": lambda w: {
+        "accuracy": {"weighted_variance": {"max": 0.01, "weight": w}}
+    },
+    "accuracy.model_error.sensitivity": lambda w: {
+        "accuracy": {"model_error": {"sensitivity": {**w, "controller": LOOP}}}
+    },
+    "limits.spectrum": lambda w: {**BESIDE, "limits": {"spectrum": {"max": w}}},
+    "limits.spectrum.min": lambda w: {**BESIDE, "limits": {"spectrum": {"min": w}}},
+}
+
+
+def refused(content):
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(SPEC, overrides=[f"{key}={json.dumps(value)}" for key, value in content.items()]))
+    return caught.value.diagnostics[0]
+
+
+@pytest.mark.parametrize("at", POLES)
+@pytest.mark.parametrize("key", KEYS)
+def test_a_pole_on_the_circle_is_named_with_its_frequency(key, at):
+    told = refused(KEYS[key]({"numerator": [1], "denominator": POLES[at]}))
+    assert told.key == key
+    assert f"{at:.6g} rad/s: it is infinite there" in told.message
+
+
+def test_a_band_without_it_does():
+    weight = {"numerator": [1], "denominator": [1, -1]}
+    error = {"absolute": 1, "weight": weight, "band": [0.01, 3.0]}
+    spec = parse_spec(SPEC, overrides=[f"accuracy.model_error={json.dumps(error)}"])
+    assert solve(spec).result["status"] == "optimal"
+
+
+@pytest.mark.parametrize("at", POLES)
+def test_a_zero_is_named_where_nothing_may_vanish(at):
+    weight = {"numerator": POLES[at], "denominator": [1]}
+    for bound in ("max", "min"):
+        told = refused({**BESIDE, "limits": {"spectrum": {bound: weight}}})
+        assert f"vanishes at {at:.6g} rad/s" in told.message
+    error = {"absolute": 1, "weight": weight, "region": "ellipsoid"}
+    assert f"vanishes at {at:.6g} rad/s" in refused({"accuracy": {"model_error": error}}).message
+
+
+@pytest.mark.parametrize("value", [9e99, 1e308, 1e-320])
+def test_a_table_has_numbers_that_a_spec_may_have(value, tmp_path):
+    (tmp_path / "t.csv").write_text(f"frequency,r_adm\n0,1\n1,{value}\n3.2,1\n")
+    table = "accuracy: {model_error: {table: t.csv}}\n"
+    with pytest.raises(DataError, match="in row 3") as caught:
+        solve(parse_spec(SPEC + table, folder=tmp_path))
+    assert caught.value.diagnostics[0].key == "accuracy.model_error.table"
