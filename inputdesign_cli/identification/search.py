@@ -154,7 +154,7 @@ def _noise_before(records: Records, point: Point) -> bool:
 def _never_forgets(records: Records, point: Point) -> bool:
     """Whether noise before the records acts on them to their end.
 
-    Starts that are free then act as parameters of the noise do, and the likelihood draws zeros of H to the unit
+    Free starts then act as parameters of the noise do, and the likelihood draws zeros of H to the unit
     circle, where such starts explain most.
     """
     power = np.sum(records.past_noise(point.theta) ** 2, axis=(0, 2))
