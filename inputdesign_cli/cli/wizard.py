@@ -96,7 +96,9 @@ def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
             found = verdict(spec, results.result, _result)
         if not quiet:
             typer.echo(
-                "\n".join(["", *found.sentences, *to_log(spec, str(file)), f"files: {place.directory}"])
+                "\n".join(
+                    ["", *found.sentences, *to_log(spec, results, str(file)), f"files: {place.directory}"]
+                )
             )
     if trade:
         from inputdesign_cli.cli.trade import WORDS, tell_trade

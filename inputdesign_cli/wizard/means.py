@@ -39,7 +39,11 @@ def input_range(text: str) -> Range:
         if not low < high:
             raise bad_answer("range", f"{low:g} is not below {high:g}")
         return Range(0.5 * (high - low), 0.5 * (low + high))
-    side = number(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*{NUMBER}", text)
+    side = number(
+        rf"(?:plus/minus|plus or minus|\+/?-|±|by)?\s*{NUMBER}\s*\S{{0,3}}\s*(?:around|about|at)", text
+    )
+    if side is None:
+        side = number(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*{NUMBER}", text)
     if side is None:
         raise bad_answer("range", f'"{text}" is no range')
     return Range(

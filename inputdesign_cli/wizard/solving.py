@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.results import Result, Results
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.composing import LEAST, Draft
 from inputdesign_cli.wizard.faults import in_their_words
@@ -102,15 +103,27 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
     return None
 
 
-def to_log(spec: Spec, file: str) -> list[str]:
+def to_log(spec: Spec, results: Results, file: str) -> list[str]:
     """What to record, and how it is judged."""
-    offset = spec.signal.offset or 0.0
-    middle = f"u1={offset:g}" if isinstance(offset, float | int) else ""
+    applied, caused = (
+        [name for name in results.tables[table].columns if re.fullmatch(r"[ruy]\d+", name)]
+        for table in ("signal", "predicted_output")
+    )
+    numbers = [name[1:] for name in applied]
+    inputs, outputs = [f"u{n}" for n in numbers], [name for name in caused if name.startswith("y")]
+    levels = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), len(inputs))
+    references = any(name.startswith("r") for name in applied)
+    what = ", ".join(["time", *inputs, *outputs[:-1]])
+    known = [f"{name}={level:g}" for name, level in zip(inputs, levels, strict=True)]
+    point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
+    apply = "apply signal.csv"
+    if references:
+        apply = "add signal.csv to the output of the controller (it is no position of the actuator)"
     return [
-        f"Bring the plant to rest at the operating point, apply signal.csv, and log time, u1 and y1 every "
-        f"{short(spec.sample_time)} {spec.time_unit}.",
-        f"Then: idesign assess {file} log.csv --operating-point {middle},y1=REST   (REST: the level "
-        "of y before it began)",
+        f"Bring the plant to rest at the operating point, {apply}, and log "
+        f"{what} and {outputs[-1]} every {short(spec.sample_time)} {spec.time_unit}.",
+        f"Then: idesign assess {file} log.csv --operating-point {point}   (REST: the level of "
+        f"{' and '.join(outputs)} before it began)",
     ]
 
 

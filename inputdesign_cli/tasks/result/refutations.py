@@ -36,8 +36,9 @@ REMEDY = {
     "nonlinear": "a linear model holds for one range of the input only: use the range that the model is for, "
     "or give as u what the actuator really does",
 }
-# The prior and the data of one system differ as much with this probability.
-_ONE_SYSTEM = 1e-3
+# Experiments of one system differ as much with this probability; a prior, which decides along with the data
+# and may hide what they say, and the data with this one.
+_ONE_SYSTEM, _PRIOR = 1e-3, 1e-2
 _LEAST = 1e-300
 
 
@@ -59,7 +60,7 @@ def unsettled(estimate: Estimate) -> list[str]:
 
 def contradictions(estimate: Estimate) -> list[str]:
     """What to say where the prior and the data are not of one system."""
-    if estimate.agreement is None or estimate.agreement >= _ONE_SYSTEM:
+    if estimate.agreement is None or estimate.agreement >= _PRIOR:
         return []
     return [
         f"experiment.prior and these data contradict each other (probability {chance(estimate.agreement)} "

@@ -24,6 +24,10 @@ COMMENT, COMMENTED = "comment", "commented numbers"
 LEFT_OUT = (BLANK, COMMENTED)
 
 COMMENTS = ("#", "%", "//")
+# What sheets write in place of a number that they do not have.
+_ERRORS = re.compile(
+    r"#(?:N/A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|SPILL!|CALC!|GETTING_DATA|#+)", re.IGNORECASE
+)
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "?"})
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?\d+", re.ASCII)
 # Numbers with marks between thousands, or in the digits of any script.
@@ -134,16 +138,22 @@ def rows_of(text: str, separator: str | None) -> tuple[Rows, Passed]:
         if not any(map(str.strip, row)):
             passed.append((line, EMPTY if len(row) > 1 else BLANK))
         elif row[0].lstrip().startswith(COMMENTS):
-            passed.append((line, _comment([row[0].lstrip().lstrip("#%/"), *row[1:]], separator)))
+            passed.append((line, _comment(row, separator)))
         else:
             rows.append((line, row))
     return rows, tuple(passed)
 
 
-def _comment(bare: Sequence[str], separator: str | None) -> str:
-    filled = [cell for cell in bare if cell.strip()]
-    numbers = len(filled) > 1 and all(is_plain(cell, comma=separator != ",") for cell in filled)
-    return COMMENTED if numbers else COMMENT
+def _comment(row: Sequence[str], separator: str | None) -> str:
+    """Whether a row that begins as comments do holds samples, or errors of a sheet in place of them."""
+    first = row[0].strip()
+    if _ERRORS.fullmatch(first):
+        return COMMENTED
+    bare = [first.lstrip("#%/").strip(), *row[1:]]
+    if separator is not None and any(is_plain(cell, comma=separator != ",") for cell in bare[1:]):
+        return COMMENTED
+    cells = re.split(r"[;,\t ]+", bare[0]) if len(bare) == 1 else [cell for cell in bare if cell.strip()]
+    return COMMENTED if len(cells) > 1 and all(is_plain(cell, comma=True) for cell in cells) else COMMENT
 
 
 def within(body: Rows, passed: Passed, separator: str | None) -> tuple[Rows, Passed]:
