@@ -22,8 +22,6 @@ _MISTAKEN = 0.01
 # the power that it leaves comes after the first tenth.
 _SILENT = 0.1
 _REMEMBERED = 0.1
-# Noise before the record that never fades leaves this share of its power to the second half.
-_LASTING = 0.4
 # Above this probability nothing is searched for.
 _UNLIKELY = 0.2
 # Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
@@ -151,17 +149,6 @@ def _noise_before(records: Records, point: Point) -> bool:
     return bool(np.sum(power[later]) > _REMEMBERED * np.sum(power)) or by_chance(point, found) < _SILENT
 
 
-def _never_forgets(records: Records, point: Point) -> bool:
-    """Whether noise before the records acts on them to their end.
-
-    Free starts then act as parameters of the noise do, and the likelihood draws zeros of H to the unit
-    circle, where such starts explain most.
-    """
-    power = np.sum(records.past_noise(point.theta) ** 2, axis=(0, 2))
-    second = np.concatenate([np.arange(length) >= 0.5 * length for length in records.lengths])
-    return bool(np.sum(power[second]) > _LASTING * np.sum(power))
-
-
 def from_rest_or_free(
     records: Records,
     deviations: Records,
@@ -173,7 +160,7 @@ def from_rest_or_free(
 
     The likelihood ratio of the two is N p log(cost / cost), chi-squared with as many degrees of freedom as
     there are unknowns. Noise never rests: where its zeros remember what was before the record, the start is
-    free as well, unless they come to remember for ever.
+    free as well.
 
     Args:
         records: from rest.
@@ -218,7 +205,5 @@ def from_rest_or_free(
     if not noisy and probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
         return at_rest
     begun = begun_free(at_rest.point.theta, late)
-    lasting = _never_forgets(records, begun.point)
-    # What zeros that move to the circle gain besides is no evidence about the start.
-    refuted = probability(near.cost if lasting else begun.point.cost) < _MISTAKEN
-    return replace(begun, rest_refuted=refuted) if refuted or (noisy and not lasting) else at_rest
+    refuted = probability(begun.point.cost) < _MISTAKEN
+    return replace(begun, rest_refuted=refuted) if noisy or refuted else at_rest

@@ -169,8 +169,7 @@ class Experiment(Coordinates):
         """(k, k): what N samples tell without any excitation, by the noise alone (in the loop)."""
         if not self.told_by_noise:
             return np.zeros((self.size, self.size))
-        numbers = self.size * self.model.outputs**2
-        told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities, numbers)
+        told = told_by_noise(lambda w: self.noise_gradient(w)[:, None], self.singularities)
         return self.samples * told[0]
 
     @property

@@ -60,7 +60,7 @@ def _noise(experiments: Sequence[Experiment]) -> NDArray[np.float64]:
         columns = whiteners @ _noise_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
         return columns.transpose(2, 0, 1)[..., None, None]
 
-    told = told_by_noise(gradients, _singularities(experiments), number * first.size)
+    told = told_by_noise(gradients, _singularities(experiments))
     return np.asarray(first.samples * told)
 
 

@@ -8,16 +8,13 @@ from numpy.typing import NDArray
 from inputdesign_cli.information.quadrature import NODES_AT_ONCE, Quadrature, Values, integrate
 from inputdesign_cli.plant.polynomial import ComplexArray
 
-_NUMBERS_AT_ONCE = 2**16
 
-
-def told_by_noise(gradients: Values, singularities: ComplexArray, numbers: int) -> NDArray[np.float64]:
+def told_by_noise(gradients: Values, singularities: ComplexArray) -> NDArray[np.float64]:
     """(S, k, k): what a sample of each of S plants tells without any excitation.
 
     Args:
         gradients: (n, S, k, p, p) at frequencies (n,): what white e of covariance I contributes.
         singularities: of all of them.
-        numbers: S k p^2.
     """
 
     def sums(rule: Quadrature, values: NDArray) -> NDArray[np.float64]:
@@ -26,5 +23,5 @@ def told_by_noise(gradients: Values, singularities: ComplexArray, numbers: int) 
         rows = np.concatenate([flat.real, flat.imag], axis=2)
         return np.asarray(rows @ rows.swapaxes(1, 2))
 
-    at_once = max(_NUMBERS_AT_ONCE // numbers, NODES_AT_ONCE)
-    return integrate(gradients, sums, singularities, at_once=at_once)
+    # Sums of a few hundred nodes, added up, round less than one of them all.
+    return integrate(gradients, sums, singularities, at_once=NODES_AT_ONCE)
