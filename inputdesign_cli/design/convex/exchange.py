@@ -26,6 +26,8 @@ from inputdesign_cli.spectrum import Basis
 
 MAX_ROUNDS = 60
 _STAGE_TOLERANCE = 1e-2
+# A finite program that is solved to the tolerance may leave a little more: it is solved to this share of it.
+_FINER = 0.1
 _STAGE_ROUNDS = 10
 # Rounds without a tenth of progress after which rounding has the last word. A basis that still grows may
 # take several to find the sinusoids that pay.
@@ -121,10 +123,11 @@ def exchange(
             state = state.moved_to(stage) if state.solved else first_state(stage, start, interior, known)
         goal = tolerance if stage is problem else max(_STAGE_TOLERANCE, tolerance)
         gaps: list[float] = []
+        asked = tolerance
         for _ in range(MAX_ROUNDS if stage is problem else _STAGE_ROUNDS):
             rounds += 1
             try:
-                solved = state.improve(tolerance)
+                solved = state.improve(asked)
             except OutOfTimeError as ended:
                 raise UnfinishedError.of(ended, _result(state.on(problem).tight(), rounds)) from None
             gaps.append(state.gap)
@@ -132,6 +135,9 @@ def exchange(
             grows = state.problem.basis.size > stage.basis.size
             patience = _PATIENCE_GROWING if grows else _PATIENCE
             stalled = len(gaps) > patience and gaps[-1] > 0.9 * gaps[-1 - patience]
+            if not solved and state.gap > goal and asked == tolerance:
+                asked *= _FINER
+                continue
             if not solved or state.gap <= goal or stalled:
                 break
             if done(state.best.objective, state.certificate.bound):
