@@ -132,17 +132,13 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
 
 def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
     """(S, n, k, p, r): what x contributes to the gradients of the predictions, in raw parameters."""
-    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
-    if loops:
-        return np.stack([loop.excitation_gradient(w) for loop in loops])
-    models = [experiment.model for experiment in experiments]
-    return input_gradients(models[0], models, w)
+    if experiments[0].loop is not None:
+        return np.stack([e.loop.excitation_gradient(w) for e in experiments if e.loop is not None])
+    return input_gradients(experiments[0].model, [e.model for e in experiments], w)
 
 
 def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
     """(S, n, k, p, p): what e contributes."""
-    loops = [experiment.loop for experiment in experiments if experiment.loop is not None]
-    if loops:
-        return np.stack([loop.noise_gradient(w) for loop in loops])
-    models = [experiment.model for experiment in experiments]
-    return noise_gradients(models[0], models, w)
+    if experiments[0].loop is not None:
+        return np.stack([e.loop.noise_gradient(w) for e in experiments if e.loop is not None])
+    return noise_gradients(experiments[0].model, [e.model for e in experiments], w)

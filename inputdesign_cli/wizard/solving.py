@@ -118,7 +118,9 @@ def to_log(spec: Spec, results: Results, file: str) -> list[str]:
     point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
     apply = "apply signal.csv"
     if references:
-        apply = "add signal.csv to the output of the controller (it is no position of the actuator)"
+        apply = (
+            "apply signal.csv as r in u = r - C y (C y counted from rest; r is no position of the actuator)"
+        )
     return [
         f"Bring the plant to rest at the operating point, {apply}, and log "
         f"{what} and {outputs[-1]} every {short(spec.sample_time)} {spec.time_unit}.",
