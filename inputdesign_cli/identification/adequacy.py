@@ -79,14 +79,18 @@ class White:
 
     Attributes:
         root: R (p, p), which makes residuals white.
-        residuals: (N p,).
-        starts: (N p, m), orthonormal, what m unknown starts explain.
-        explained: (N p, m + k), what they and the k parameters explain; `basis`, orthonormal.
+        samples: N of them; errors of noise before the records, M of every output, follow.
+        residuals: ((N + M) p,).
+        variance: of the noise, in these units: residuals lack what unknown starts explain.
+        starts: ((N + M) p, m), orthonormal, what m unknown starts explain.
+        explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
         means: (k,), of the scores of the parameters, see `echoes`.
     """
 
     root: Array
+    samples: int
     residuals: Array
+    variance: float
     starts: Array
     explained: Array
     basis: Array
@@ -95,21 +99,29 @@ class White:
     @classmethod
     def of(cls, point: Point, echoes: Echoes | None = None) -> White:
         """That of a point of the search."""
-        root = np.linalg.inv(np.linalg.cholesky(point.errors.T @ point.errors / len(point.errors)))
-        psi = (point.psi @ root.T).reshape(len(point.psi), -1).T
-        explained = np.column_stack([point.near.directions, psi])
-        residuals, starts = (point.errors @ root.T).ravel(), point.near.directions
-        none = np.zeros(point.theta.size)
-        found = cls(root, residuals, starts, explained, _orthonormal(_scaled(explained)), none)
+        near, none = point.near, np.zeros(point.theta.size)
+        errors, psi = near.all_errors, near.all_psi
+        root = np.linalg.inv(np.linalg.cholesky(errors.T @ errors / len(near.errors)))
+        explained = np.column_stack([near.directions, (psi @ root.T).reshape(len(psi), -1).T])
+        found = cls(
+            root,
+            len(near.errors),
+            (errors @ root.T).ravel(),
+            near.errors.size / max(near.freedom, 1),
+            near.directions,
+            explained,
+            _orthonormal(_scaled(explained)),
+            none,
+        )
         for index, through in echoes or ():
             none[index] = found.echoes(through)
         return found
 
-    @property
-    def variance(self) -> float:
-        """Of the noise, in these units: residuals lack what unknown starts explain."""
-        size = self.residuals.size
-        return size / max(size - self.starts.shape[1], 1)
+    def columns(self, signals: NDArray[np.float64]) -> Array:
+        """((N + M) p, m): signals (m, N, p) in units of the residuals, zero before the records."""
+        found = np.zeros((self.residuals.size, len(signals)))
+        found[: signals[0].size] = (signals @ self.root.T).reshape(len(signals), -1).T
+        return found
 
     def echoes(self, through: Callable[[Array], Array]) -> float:
         """The mean of the score of a signal that is made of the residuals themselves.
@@ -122,7 +134,7 @@ class White:
         """
         outputs, back = len(self.root), np.linalg.inv(self.root).T
         found = 0.0
-        for direction in self.starts.T:
+        for direction in self.starts[: self.samples * outputs].T:
             own = direction.reshape(-1, outputs)
             found += float(np.sum((through(own @ back) @ self.root.T) * own))
         return -self.variance * found
@@ -140,17 +152,6 @@ class White:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
 
 
-def by_chance(point: Point, signals: NDArray[np.float64]) -> float:
-    """The probability that signals (m, N, p) explain so much of a right model's residuals; one of none."""
-    if not len(signals):
-        return 1.0
-    white = White.of(point)
-    columns = _scaled((signals @ white.root.T).reshape(len(signals), -1).T)
-    basis = _orthonormal(white.unexplained(columns))
-    statistic = float(np.sum((basis.T @ white.residuals) ** 2)) / white.variance
-    return float(scipy.special.chdtrc(basis.shape[1], statistic)) if basis.size else 1.0
-
-
 def score_tests(
     records: Records, point: Point, *, recent: int, feedback: bool = False, echoes: Echoes | None = None
 ) -> tuple[ScoreTest, ...]:
@@ -162,11 +163,10 @@ def score_tests(
         recent: the lag up to which the structure looks at the inputs.
         feedback: whether u(t) answers y(t); then past inputs begin with u(t - 1).
     """
-    n, p = point.errors.shape
     white = White.of(point, echoes)
     tests = []
     for signals in _tried(records, point, recent, int(feedback)):
-        columns = np.einsum("pnm,qp->nqpm", signals.columns, white.root).reshape(n * p, -1)
+        columns = white.columns(_of_outputs(signals.columns))
         norms = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         regressors = white.unexplained(columns / norms)
         own = np.zeros(norms.size)
@@ -218,10 +218,19 @@ def _tried(records: Records, point: Point, recent: int, first: int) -> list[_Sig
     return [*found, _Signals("trend", "drift", records.whitened(point.theta, trends))]
 
 
+def _of_outputs(signals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(p m, N, p): signals (p, N, m), each of its output and zero of the others."""
+    p, samples, m = signals.shape
+    found = np.zeros((p, m, samples, p))
+    for output, own in enumerate(signals):
+        found[output, :, :, output] = own.T
+    return found.reshape(p * m, samples, p)
+
+
 def _mean_scores(records: Records, white: White, lags: Sequence[int]) -> Array:
     """(p lags,): see `White.echoes`, of the residuals of every output at every lag, for every output."""
     p = len(white.root)
-    starts = white.starts.reshape(white.residuals.size // p, p, white.starts.shape[1])
+    starts = white.starts.reshape(white.residuals.size // p, p, -1)[: white.samples]
     here = np.einsum("nqm,qp->nmp", starts, white.root)
     there = np.einsum("nqm,qp->nmp", starts, np.linalg.inv(white.root).T)
     each = [

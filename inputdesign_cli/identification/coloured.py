@@ -21,6 +21,7 @@ from inputdesign_cli.identification.of_model import OfModel, OverRecord
 from inputdesign_cli.identification.records import Record, Records
 from inputdesign_cli.identification.search import Search
 from inputdesign_cli.identification.stability import is_stable, reflected
+from inputdesign_cli.identification.start import Start, density, differences, noise_before
 from inputdesign_cli.identification.starts import noise_polynomials
 from inputdesign_cli.plant import Coloured
 from inputdesign_cli.plant.filtering import filtered
@@ -56,53 +57,40 @@ class ColouredRecord(OverRecord):
                     psi[index, parameter.power :, i] = late[: len(errors) - parameter.power]
         return errors, psi
 
-    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): those of the plant, filtered, and impulses through 1 / C for past noise."""
-        model = self.structure.at(theta)
+    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
+        """What the past adds to those of the plant, filtered, and by noise before the record through C/D."""
+        raw = self.record.starts(self._of_plant(theta), free=free)
         found = []
-        raw = self.record.free_responses(self._of_plant(theta))
-        for responses, (above, below) in zip(raw, model.inverse_filters, strict=True):
-            past = _impulses(max(above.size, below.size) - 1, below, len(self.y))
-            found.append(np.concatenate([filtered(above, below, responses), past]))
+        for start, (D, C) in zip(raw, self.structure.at(theta).inverse_filters, strict=True):
+            through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
+            past = np.concatenate([noise, noise_before(C, D, len(self.y))])
+            zeros = start.zeros + density(C) if C.size > 1 else start.zeros
+            found.append(Start(through, start.disturbance, past, zeros))
         return tuple(found)
-
-    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what the plant's own adds, filtered, and impulses through 1 / C."""
-        raw = self.record.past_noise(self._of_plant(theta))
-        return tuple(
-            np.concatenate(
-                [
-                    filtered(above, below, responses),
-                    _impulses(max(above.size, below.size) - 1 if below.size > 1 else 0, below, len(self.y)),
-                ]
-            )
-            for responses, (above, below) in zip(raw, self.structure.at(theta).inverse_filters, strict=True)
-        )
 
     def lateness(self, theta: Array) -> int:
         """That of the plant."""
         return self.record.lateness(self._of_plant(theta))
 
-    @property
-    def in_starts(self) -> NDArray[np.int64]:
+    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
         """Those of the plant, and C and D."""
         own = np.arange(len(self.structure.plant.parameters), self.size)
-        return np.concatenate([self.record.in_starts, own])
+        return np.concatenate([self.record.in_starts(free=free), own])
 
-    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
-        """The derivatives of the free responses: of C and D by central differences."""
-        first = len(self.structure.plant.parameters)
-        if index < first:
-            filters = self.structure.at(theta).inverse_filters
-            slopes = self.record.free_slopes(self._of_plant(theta), index)
-            none = [np.zeros((max(a.size, b.size) - 1, len(self.y))) for a, b in filters]
-            return tuple(
-                np.concatenate([filtered(*own, x), zero])
-                for own, x, zero in zip(filters, slopes, none, strict=True)
-            )
-        step = _STEP * np.eye(self.size)[index]
-        ends = self.free_responses(theta + step), self.free_responses(theta - step)
-        return tuple((a - b) / (2.0 * _STEP) for a, b in zip(*ends, strict=True))
+    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+        """The derivatives of the starts: of C and D by central differences."""
+        if index >= len(self.structure.plant.parameters):
+            step = _STEP * np.eye(self.size)[index]
+            above, below = (self.starts(theta + sign * step, free=free) for sign in (1.0, -1.0))
+            return differences(above, below, 2.0 * _STEP)
+        filters = self.structure.at(theta).inverse_filters
+        found = []
+        slopes = self.record.start_slopes(self._of_plant(theta), index, free=free)
+        for start, (D, C) in zip(slopes, filters, strict=True):
+            through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
+            none = np.zeros((max(D.size, C.size) - 1, len(self.y)))
+            found.append(Start(through, start.disturbance, np.concatenate([noise, none]), start.zeros))
+        return tuple(found)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): none; no instruments are used."""
@@ -259,11 +247,6 @@ class ColouredKind(OfModel):
 
 def _coloured(record: Callable[[Array, Array], Record], model: Coloured, u: Array, y: Array) -> Record:
     return ColouredRecord(record(u, y), model)
-
-
-def _impulses(number: int, below: Array, samples: int) -> NDArray[np.float64]:
-    """(number, samples), each a sample later, through 1 / C."""
-    return np.asarray(filtered([1.0], below, np.eye(number, samples)))
 
 
 def _of_plant(records: Records, plant: Kind) -> tuple[Record, ...]:

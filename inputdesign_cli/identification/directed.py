@@ -126,7 +126,7 @@ def directed_tests(
     white = White.of(point, echoes)
     groups: list[list[_Tried]] = []
     for alternative in alternatives:
-        column = (alternative.column(records) @ white.root.T).ravel()
+        column = white.columns(alternative.column(records)[None])[:, 0]
         through = None if echoes is None else alternative.echo(records.lengths)
         own = np.array([0.0 if through is None else white.echoes(through)])
         mean = float(white.mean_left(column[:, None], own)[0])
@@ -150,7 +150,7 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
             group = [tried for _, tried in known] + [tried for end, tried in ends if end is None]
             # A likelihood ratio has no mean to be compared with.
             if abs(best.mean) <= _LITTLE * best.size:
-                statistic = max(statistic, _ratio(records, without, cost) / white.variance)
+                statistic = max(statistic, _ratio(records, point, without, cost))
     first = group[0]
     scale = np.maximum(np.linalg.norm(white.explained, axis=0), 1e-300)
     explained = np.linalg.lstsq(white.explained / scale, first.column, rcond=1e-12)[0] / scale
@@ -168,11 +168,11 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
     )
 
 
-def _ratio(records: Records, cost: float, less: float) -> float:
+def _ratio(records: Records, point: Point, cost: float, less: float) -> float:
     """-2 log of the likelihood ratio of two minima."""
     if records.weights is not None:
         return cost - less
-    return float(records.y.size * np.log(cost / max(less, 1e-300)))
+    return float(point.near.freedom * np.log(cost / max(less, 1e-300)))
 
 
 def _probability(statistic: float) -> float:

@@ -195,8 +195,9 @@ def concluded(
 def noise_of(point: Point, own: Array) -> Array:
     """(p, p) covariance of e: the parameters `own` (p,) of every output count, and unknown starts."""
     samples, outputs = point.errors.shape
-    left = np.sqrt(np.maximum(samples - own - point.near.directions.shape[1] / outputs, 1.0))
-    return np.asarray(point.errors.T @ point.errors / np.outer(left, left))
+    left = np.sqrt(np.maximum(samples - own - point.near.unknowns / outputs, 1.0))
+    every = point.near.all_errors
+    return np.asarray(every.T @ every / np.outer(left, left))
 
 
 def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Array) -> Array:
@@ -209,13 +210,13 @@ def factor_at(names: tuple[str, ...], records: Records, point: Point, noise: Arr
 
 
 def _gradients(records: Records, point: Point, noise: Array) -> tuple[Array, Array]:
-    """psi (N p, k) in units of the noise, and the same at parameters that differ in their last digits.
+    """psi ((N + M) p, k) in units of the noise, and the same at parameters that differ in their last digits.
 
     What is known besides the data counts as further rows.
     """
     root = np.linalg.cholesky(_weights(records, noise)).T
     last = _LAST_DIGITS * np.resize([1.0, -1.0], point.theta.size)
-    found = [point.psi, records.at(point.theta * (1.0 + last)).psi]
+    found = [point.near.all_psi, records.at(point.theta * (1.0 + last)).all_psi]
     rows, again = ((psi @ root.T).reshape(len(psi), -1).T for psi in found)
     if records.earlier is None:
         return rows, again
@@ -225,8 +226,7 @@ def _gradients(records: Records, point: Point, noise: Array) -> tuple[Array, Arr
 
 def information_of(records: Records, point: Point, noise: Array) -> Array:
     """(k, k): sum over the samples of psi noise^-1 psi^T."""
-    at_noise = replace(point, weights=_weights(records, noise), known=np.zeros_like(point.known))
-    return at_noise.hessian
+    return replace(point.of_errors, weights=_weights(records, noise)).hessian
 
 
 def _weights(records: Records, noise: Array) -> Array:

@@ -61,9 +61,7 @@ class Extension:
 
     def column(self, records: Records) -> NDArray[np.float64]:
         """(N, p): minus the derivative of the prediction errors with respect to the new parameter."""
-        theta = self.model.theta
-        gradients = [part.errors_and_gradient(theta)[1] for part in self.records(records).parts]
-        return np.concatenate([gradient[self.index] for gradient in gradients])
+        return self.records(records).gradient(self.model.theta, self.index)
 
     def echo(self, lengths: Sequence[int]) -> Echo | None:
         """What past errors add to `column` in records of these lengths; None where they add nothing."""

@@ -1,19 +1,27 @@
-"""Levels and starts that nobody knows, eliminated from prediction errors (variable projection).
+"""Starts that nobody knows, eliminated from prediction errors (variable projection, and its determinant).
 
 Each acts on one output of one record alone. Their responses are made orthonormal there; only the weights of
 the errors tie the outputs together.
+
+The likelihood is that of what the starts leave open, [harville-1977]: unknowns are integrated over, not only
+estimated, which the determinant stands for. Without it a noise model with a zero on the unit circle, which
+forgets no start, would explain short records too well. Directions of what free unknowns cause before the
+inverse of the noise model are made orthonormal first, so that the measure is not one of the parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant.polynomial import Array
 
 # Directions of the unknown starts that are smaller than this, columns scaled, are the same as others.
@@ -24,12 +32,12 @@ _ALIKE = 1e-6
 
 
 class Elimination(NamedTuple):
-    """What the starts are likely to be.
+    """What the starts are likely to be, of records of N samples and M independent unknowns of past noise.
 
     Attributes:
-        coefficients: (m,) of every block of responses.
+        coefficients: of every block (m + n,), its free unknowns first.
         root: R (p, p), R^T R being the weights of the errors up to a factor.
-        directions: (N p, m) orthonormal, the errors in units of R that the starts can explain.
+        directions: ((N + M) p, m + n) orthonormal, the errors in units of R that the starts can explain.
     """
 
     coefficients: tuple[Array, ...]
@@ -38,47 +46,151 @@ class Elimination(NamedTuple):
 
 
 class _Basis(NamedTuple):
-    """Orthonormal directions (n, m) of one block, and the coefficients (K, m) that they are made by."""
+    """What one start of N samples can explain: orthonormal directions (N + n, m + n).
 
-    rows: slice
-    output: int
+    Attributes:
+        coefficients: (K, m + n), of its unknowns for each direction.
+        span: (N, m), of the disturbance that free unknowns cause, orthonormal; `by` (K, m) of these.
+        inverse: of the factor R of Z = Q R, Z being the responses to directions of `span` and past noise.
+        determinant: log det Z^T Z; `of_noise`, the same of past noise alone.
+    """
+
     directions: Array
     coefficients: Array
+    span: Array
+    by: Array
+    inverse: Array
+    determinant: float
+    of_noise: float
+
+    def slope(self, start: Start) -> float:
+        """The derivative of the determinant, `start` being that of the start."""
+        Z = np.zeros(self.directions.shape)
+        Z[: start.noise.shape[1]] = np.concatenate([self.by.T @ start.free, start.noise]).T
+        own = 2.0 * float(np.sum(self.directions * (Z @ self.inverse)))
+        return own - 2.0 * float(np.sum(self.span * (start.disturbance.T @ self.by)))
+
+
+class _Block(NamedTuple):
+    """One output of one record: its rows among all errors, its start and what that can explain."""
+
+    rows: NDArray[np.int64]
+    output: int
+    start: Start
+    basis: _Basis
+
+    @property
+    def samples(self) -> NDArray[np.int64]:
+        """The rows of the record; the others are of past noise."""
+        return self.rows[: self.start.free.shape[1]]
 
 
 @dataclass(frozen=True)
 class FreeStarts:
-    """The responses (m, n) of the unknowns, record by record (of these `lengths`) and output by output."""
+    """The starts of records of these `lengths`; those of the longest, output by output.
+
+    Rows of errors are the samples of all records, then M for the unknowns of past noise, which outputs share:
+    as large as an error each, they are errors of their own.
+    """
 
     lengths: tuple[int, ...]
-    responses: Sequence[Sequence[NDArray[np.float64]]]
+    starts: Sequence[Start]
 
     @property
     def finite(self) -> bool:
         """Whether all are."""
-        return all(bool(np.all(np.isfinite(block))) for _, _, block in self._blocks())
+        return all(start.finite for start in self.starts)
 
-    def combined(self, coefficients: Sequence[Array]) -> Array:
-        """(N, p): the responses by coefficients (m,) of every block."""
-        found = np.zeros((sum(self.lengths), len(self.responses[0])))
-        for (rows, output, block), own in zip(self._blocks(), coefficients, strict=True):
-            found[rows, output] = own @ block
+    @property
+    def any(self) -> bool:
+        """Whether anything is unknown."""
+        return any(len(start.free) + len(start.noise) for start in self.starts)
+
+    @property
+    def past(self) -> int:
+        """M: of every record the most unknowns of past noise that an output has."""
+        return len(self.lengths) * self._past
+
+    @cached_property
+    def unknowns(self) -> int:
+        """Number m of free unknowns, those that are the same as others left out."""
+        return sum(block.basis.span.shape[1] for block in self._blocks)
+
+    @cached_property
+    def determinant(self) -> float:
+        """log det Z^T Z, which integrating over all unknowns adds to -2 log likelihood, and `Start.zeros`.
+
+        Records share the noise model and its zeros.
+        """
+        zeros = sum(float(start.zeros) for start in self.starts)
+        return zeros + sum(block.basis.determinant for block in self._blocks)
+
+    @property
+    def of_noise(self) -> float:
+        """The part of that which is due to past noise, whose unknowns have a density of their own."""
+        return sum(block.basis.of_noise for block in self._blocks)
+
+    def slopes(self, starts: Sequence[Start]) -> Array:
+        """(parts,): the derivatives of the terms of the determinant, given those of the starts."""
+        zeros = [float(start.zeros) for start in starts]
+        own = {
+            (length, i): basis.slope(starts[i].cropped(length)) for (length, i), basis in self._bases.items()
+        }
+        return np.array([*zeros, *(own[length, i] for length in self.lengths for i in range(len(starts)))])
+
+    @property
+    def parts(self) -> int:
+        """Of how many terms the determinant is the sum."""
+        return len(self.starts) * (1 + len(self.lengths))
+
+    def combined(
+        self,
+        coefficients: Sequence[Array],
+        *,
+        starts: Sequence[Start] | None = None,
+        free: bool = True,
+        noise: bool = True,
+    ) -> Array:
+        """(N, p): the responses by the coefficients of every block, to free unknowns and to past noise.
+
+        Args:
+            starts: in place of these, their derivatives.
+        """
+        found = np.zeros((sum(self.lengths), len(self.starts)))
+        for block, own in zip(self._blocks, coefficients, strict=True):
+            known, start = len(block.start.free), block.start
+            if starts is not None:
+                start = starts[block.output].cropped(len(block.samples))
+            if free:
+                found[block.samples, block.output] += own[:known] @ start.free
+            if noise:
+                found[block.samples, block.output] += own[known:] @ start.noise
+        return found
+
+    def errors_of_past(self, coefficients: Sequence[Array]) -> Array:
+        """(M, p): the unknowns of past noise as errors, of outputs that have fewer zero."""
+        found = np.zeros((self.past, len(self.starts)))
+        for block, own in zip(self._blocks, coefficients, strict=True):
+            past = block.rows[len(block.samples) :] - sum(self.lengths)
+            found[past, block.output] = -own[len(block.start.free) :]
         return found
 
     def eliminated(self, errors: Array, weights: Array | None) -> Elimination:
         """The likeliest starts of errors (N, p), weighed by W (p, p); None: as the covariance left asks."""
-        bases = [_orthonormal(*block) for block in self._blocks()]
-        at = [slice(*ends) for ends in pairwise(np.cumsum([0, *(len(b.directions.T) for b in bases)]))]
-        overlap = _overlaps(bases, at)
-        outputs = np.concatenate([[basis.output] * len(basis.directions.T) for basis in bases])
+        errors = np.concatenate([errors, np.zeros((self.past, errors.shape[1]))])
+        blocks = self._blocks
+        sizes = [block.basis.directions.shape[1] for block in blocks]
+        at = [slice(*ends) for ends in pairwise(np.cumsum([0, *sizes]))]
+        overlap = _overlaps(blocks, at)
+        outputs = np.repeat([block.output for block in blocks], sizes)
 
         def projected(weighed: Array) -> Array:
-            return np.concatenate([b.directions.T @ weighed[b.rows, b.output] for b in bases])
+            return np.concatenate([b.basis.directions.T @ weighed[b.rows, b.output] for b in blocks])
 
         def spread(step: Array) -> Array:
             found = np.zeros_like(errors)
-            for basis, own in zip(bases, at, strict=True):
-                found[basis.rows, basis.output] += basis.directions @ step[own]
+            for block, own in zip(blocks, at, strict=True):
+                found[block.rows, block.output] += block.basis.directions @ step[own]
             return found
 
         # Output by output first: levels alone would make all errors look alike.
@@ -98,26 +210,50 @@ class FreeStarts:
                 break
             previous = size
         columns = np.zeros((*errors.shape, len(gram)))
-        for basis, own in zip(bases, at, strict=True):
-            columns[basis.rows, :, own] = basis.directions[:, None] * scaled[:, basis.output, None]
-        coefficients = (basis.coefficients @ shares[own] for basis, own in zip(bases, at, strict=True))
+        for block, own in zip(blocks, at, strict=True):
+            columns[block.rows, :, own] = block.basis.directions[:, None] * scaled[:, block.output, None]
+        coefficients = (b.basis.coefficients @ shares[own] for b, own in zip(blocks, at, strict=True))
         return Elimination(tuple(coefficients), root, _orthogonal(columns.reshape(-1, len(gram)), gram))
 
-    def _blocks(self) -> Iterator[tuple[slice, int, NDArray[np.float64]]]:
-        begin = 0
-        for length, own in zip(self.lengths, self.responses, strict=True):
-            for output, block in enumerate(own):
-                yield slice(begin, begin + length), output, block
-            begin += length
+    @property
+    def _past(self) -> int:
+        return max(len(start.noise) for start in self.starts)
+
+    @cached_property
+    def _bases(self) -> dict[tuple[int, int], _Basis]:
+        """Records of one length have the same."""
+        return {
+            (length, i): _orthonormal(start.cropped(length))
+            for length in sorted(set(self.lengths))
+            for i, start in enumerate(self.starts)
+        }
+
+    @cached_property
+    def _blocks(self) -> list[_Block]:
+        found, begin, past = [], 0, sum(self.lengths)
+        for length in self.lengths:
+            for i, start in enumerate(self.starts):
+                rows = (np.arange(begin, begin + length), np.arange(past, past + len(start.noise)))
+                own = (start.cropped(length), self._bases[length, i])
+                found.append(_Block(np.concatenate(rows), i, *own))
+            begin, past = begin + length, past + self._past
+        return found
 
 
-def _orthonormal(rows: slice, output: int, responses: NDArray[np.float64]) -> _Basis:
-    """The directions of responses (m, n), those that are the same as others left out."""
-    norm = np.linalg.norm(responses, axis=1)
+def _orthonormal(start: Start) -> _Basis:
+    """The directions of one start, those of free unknowns that are the same as others left out."""
+    norm = np.linalg.norm(start.disturbance, axis=1)
     scale = np.where(norm > 0.0, norm, np.inf)  # a start that no output shows is left at zero
-    U, s, V = np.linalg.svd(responses.T / scale, full_matrices=False)
-    kept = s > _DEPENDENT * s[0]
-    return _Basis(rows, output, U[:, kept], (V[kept].T / s[kept]) / scale[:, None])
+    span, s, V = np.linalg.svd(start.disturbance.T / scale, full_matrices=False)
+    kept = s > _DEPENDENT * np.max(s, initial=0.0)
+    by, past = (V[kept].T / s[kept]) / scale[:, None], len(start.noise)
+    Z = np.block([[(by.T @ start.free).T, start.noise.T], [np.zeros((past, by.shape[1])), np.eye(past)]])
+    Q, R = np.linalg.qr(Z)
+    inverse = np.linalg.inv(R)
+    chosen = scipy.linalg.block_diag(by, np.eye(past))
+    of_noise = float(np.linalg.slogdet(np.eye(past) + start.noise @ start.noise.T)[1])
+    whole = 2.0 * float(np.sum(np.log(np.abs(np.diag(R)))))
+    return _Basis(Q, chosen @ inverse, span[:, kept], by, inverse, whole, of_noise)
 
 
 def _orthogonal(columns: Array, gram: Array) -> Array:
@@ -129,14 +265,15 @@ def _orthogonal(columns: Array, gram: Array) -> Array:
     return np.asarray(columns @ np.linalg.inv(np.linalg.cholesky(gram)).T)
 
 
-def _overlaps(bases: Sequence[_Basis], at: Sequence[slice]) -> Array:
+def _overlaps(blocks: Sequence[_Block], at: Sequence[slice]) -> Array:
     """(m, m): the products of all directions, as if of one output; of different records they are zero."""
     found = np.eye(at[-1].stop)
-    for j, (one, own) in enumerate(zip(bases, at, strict=True)):
-        for other, beside in zip(bases[:j], at[:j], strict=True):
-            if other.rows == one.rows:
-                found[own, beside] = one.directions.T @ other.directions
-                found[beside, own] = found[own, beside].T
+    for j, (one, own) in enumerate(zip(blocks, at, strict=True)):
+        first = j - one.output
+        for other, beside in zip(blocks[first:j], at[first:j], strict=True):
+            both = min(len(one.rows), len(other.rows))
+            found[own, beside] = one.basis.directions[:both].T @ other.basis.directions[:both]
+            found[beside, own] = found[own, beside].T
     return found
 
 

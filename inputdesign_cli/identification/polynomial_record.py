@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.identification.orders import OutputOrders
 from inputdesign_cli.identification.predictor import errors_and_gradient
 from inputdesign_cli.identification.problem import PredictionErrors
+from inputdesign_cli.identification.start import Start, density, noise_before
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.polynomial import Array
@@ -45,23 +46,17 @@ class PolynomialRecord:
             errors[:, i], psi[place, :, i] = e[:, 0], own[:, :, 0]
         return errors, psi
 
-    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): a level, and as many impulses as the filters remember samples.
+    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
+        """What the past of each output adds.
 
-        (D/C)(A y - sum_j (B_j/F_j) u_j) is off by impulses through 1/C where y, u and the noise before the
-        record are missing, by impulses through D/(C F_j) where the state of an entry is, and by a step
+        The noise model D/C is applied to A y - sum_j (B_j/F_j) u_j, which is off by impulses where y and u
+        before the record are missing, by impulses through 1/F_j where the state of an entry is, and by a step
         through it where the level of its input is: of a stable F_j the others make that up, of one that
-        integrates or nearly does they cannot.
+        integrates or nearly does they cannot. From rest only y is missing, which noise has moved, and only if
+        the predictor remembers it beyond its order.
         """
         return tuple(
-            _responses(row, theta[place], len(self.y))
-            for row, place in zip(self.structure.rows, self.structure.places, strict=True)
-        )
-
-    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): impulses through 1/C, if there is a C."""
-        return tuple(
-            _past_noise(row, theta[place], len(self.y))
+            _start(row, theta[place], len(self.y), free=free)
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
         )
 
@@ -79,22 +74,22 @@ class PolynomialRecord:
         """The same: the delay is known, and among what the filters remember."""
         return self
 
-    @property
-    def in_starts(self) -> NDArray[np.int64]:
-        """Those of C, D and F."""
+    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
+        """Those of C and D; of F as well if the states are free."""
         found = [
             place[block.columns]
             for row, place in zip(self.structure.rows, self.structure.places, strict=True)
-            for letter in "cdf"
+            for letter in ("cdf" if free else "cd")
             for block in row.by_letter[letter]
         ]
-        return np.unique(np.concatenate(found))
+        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *found]))
 
-    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
         """By a step along the imaginary axis, which loses no digits to a difference ([squire-trapp-1998])."""
         step = np.zeros(theta.size, dtype=complex)
         step[index] = 1j * _STEP
-        return tuple(responses.imag / _STEP for responses in self.free_responses(theta + step))
+        found = self.starts(theta + step, free=free)
+        return tuple(Start(*(block.imag / _STEP for block in start)) for start in found)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): nothing; no instruments are used."""
@@ -113,18 +108,18 @@ class PolynomialRecord:
         return self.problem.stabilised(theta[None])[0]
 
 
-def _responses(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.float64]:
+def _start(row: OutputOrders, theta: Array, samples: int, *, free: bool) -> Start:
     p = row.polynomials(theta[None])
-    older = max([row.a, *(entry.b - entry.f for entry in row.entries)])
-    impulses = np.eye(max([older + row.d, *(entry.f for entry in row.entries)], default=0), samples)
-    through = [(p.D[0], p.C[0], np.ones((1, samples))), (np.ones(1), p.C[0], impulses[: older + row.d])]
-    for entry, F in zip(row.entries, p.F, strict=True):
-        if entry.f:
-            entering = np.concatenate([impulses[: entry.f], np.ones((1, samples))])
-            through.append((p.D[0], np.convolve(p.C[0], F[0]), entering))
-    return np.concatenate([filtered(b, a, x) for b, a, x in through if len(x)])
-
-
-def _past_noise(row: OutputOrders, theta: Array, samples: int) -> NDArray[np.float64]:
-    impulses = np.eye(max(row.c, row.a + row.d) if row.c else 0, samples)
-    return np.asarray(filtered(np.ones(1), row.polynomials(theta[None]).C[0], impulses))
+    C, D = p.C[0], p.D[0]
+    if free:
+        parts = [np.ones((1, samples))]
+        parts.append(np.eye(max([row.a, *(entry.b - entry.f for entry in row.entries)]), samples))
+        for entry, F in zip(row.entries, p.F, strict=True):
+            if entry.f:
+                entering = np.concatenate([np.eye(entry.f, samples), np.ones((1, samples))])
+                parts.append(filtered([1.0], F[0], entering))
+        disturbance = np.concatenate(parts)
+    else:
+        disturbance = np.eye(row.a if row.c else 0, samples, dtype=theta.dtype)
+    zeros = density(C) if row.c else np.zeros(())
+    return Start(filtered(D, C, disturbance), disturbance, noise_before(C, D, samples), zeros)

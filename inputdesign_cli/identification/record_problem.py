@@ -4,8 +4,10 @@ With S = sum e(t) e(t)^T / N the cost is N det(S)^(1/p), as in `problem.py`. It 
 Gaussian noise of unknown covariance; minus half its gradient is sum psi(t) W e(t), half its Hessian sum
 psi W psi^T up to what vanishes at the minimum, with W = cost / (p N) S^-1. Known weights are kept.
 
-An earlier estimate at a distance q, -2 log of its density, multiplies that cost by exp(q / (N p)), which adds
-q to -2 log likelihood; with known weights it is added as it is.
+What unknown starts explain is taken off. Of the n = N p - m errors that m free unknowns leave, n log cost is
+-2 log likelihood. Integrating over the starts adds a determinant to that, and an earlier estimate at a
+distance q, -2 log of its density, adds q: they multiply the cost by exp(q / n); with known weights they are
+added.
 """
 
 from __future__ import annotations
@@ -29,8 +31,8 @@ class Point:
     """Records at theta (k,): their errors and gradient, W (p, p), cost.
 
     Attributes:
-        known: (k, k), what half the Hessian has from an earlier estimate; `towards` (k,), minus half the
-            gradient.
+        known: (k, k), half the Hessian of what is known from an earlier estimate and of what integrating over
+            unknown starts adds; `towards` (k,), minus half the gradient.
     """
 
     theta: Array
@@ -53,21 +55,26 @@ class Point:
     @property
     def slope(self) -> Array:
         """(k,): minus half the gradient of the cost."""
-        return np.asarray(self._weighed.reshape(self.theta.size, -1) @ self.errors.ravel() + self.towards)
+        near = self.near
+        return np.asarray(self._weighed(near.all_psi) @ near.all_errors.ravel() + self.towards)
 
     @property
     def hessian(self) -> Array:
         """(k, k): half that of the cost, to first order."""
-        return self.against(self.psi)
+        every = self.near.all_psi
+        return np.asarray(self._weighed(every) @ every.reshape(len(every), -1).T + self.known)
 
     def against(self, regressors: NDArray[np.float64]) -> Array:
-        """(k, k): the same with regressors phi (k, N, p) in place of one psi."""
-        k = self.theta.size
-        return np.asarray(self._weighed.reshape(k, -1) @ regressors.reshape(k, -1).T + self.known)
+        """(k, k): the same with regressors phi (k, N, p) in place of one psi; none of past noise."""
+        return np.asarray(self._weighed(self.psi) @ regressors.reshape(len(regressors), -1).T + self.known)
 
     @property
-    def _weighed(self) -> NDArray[np.float64]:
-        return np.asarray(self.psi @ self.weights)
+    def of_errors(self) -> Point:
+        """The same without what is known besides the errors."""
+        return replace(self, known=np.zeros_like(self.known), towards=np.zeros_like(self.towards))
+
+    def _weighed(self, psi: NDArray[np.float64]) -> Array:
+        return (psi @ self.weights).reshape(len(psi), -1)
 
 
 def rounding(records: Records) -> Array:
@@ -79,41 +86,42 @@ def evaluate(records: Records, theta: Array) -> Point:
     """The cost of records; infinite where it overflows, zero where all errors are rounding."""
     with np.errstate(over="ignore", invalid="ignore"):
         near = records.at(theta)
-        S = near.errors.T @ near.errors / records.samples
+        S = near.all_errors.T @ near.all_errors / records.samples
     none, nowhere = np.zeros((theta.size, theta.size)), np.zeros(theta.size)
-    if not (np.all(np.isfinite(S)) and np.all(np.isfinite(near.psi))):
-        nothing = replace(near, errors=np.zeros(near.errors.shape), psi=np.zeros(near.psi.shape))
+    if not all(np.all(np.isfinite(x)) for x in (S, near.psi, near.determinant, near.slope)):
+        nothing = Linearised.at_rest(np.zeros(near.errors.shape), np.zeros(near.psi.shape))
         return Point(theta, nothing, np.eye(len(S)), np.inf, none, nowhere)
     floor = rounding(records)
     if np.all(np.diag(S) <= np.diag(floor)):
         return Point(theta, near, np.eye(len(S)), 0.0, none, nowhere)
     if records.weights is not None:
         cost = records.samples * float(np.sum(records.weights * S))
-        return _with_earlier(records, Point(theta, near, records.weights, cost, none, nowhere))
+        return _with_known(records, Point(theta, near, records.weights, cost, none, nowhere))
     inverse, logarithm = inverses((S + floor)[None])
     root = float(np.exp(logarithm[0] / len(S)))
     weights = root / len(S) * inverse[0]
-    return _with_earlier(records, Point(theta, near, weights, records.samples * root, none, nowhere))
+    return _with_known(records, Point(theta, near, weights, records.samples * root, none, nowhere))
 
 
-def _with_earlier(records: Records, point: Point) -> Point:
-    """A point of the data with what is known besides."""
-    earlier = records.earlier
-    if earlier is None:
-        return point
-    q, towards = earlier.q(point.theta), -earlier.slope(point.theta)
+def _with_known(records: Records, point: Point) -> Point:
+    """A point of the data with what is known besides: of the starts, and from an earlier estimate."""
+    near, earlier = point.near, records.earlier
+    q, towards, known = near.determinant, -near.slope, near.curvature
+    if earlier is not None:
+        q, towards = q + earlier.q(point.theta), towards - earlier.slope(point.theta)
+        known = known + earlier.information
     if records.weights is not None:
-        return replace(point, cost=point.cost + q, known=earlier.information, towards=towards)
+        return replace(point, cost=point.cost + q, known=known, towards=towards)
     with np.errstate(over="ignore"):
-        factor = float(np.exp(q / records.y.size))
+        factor = float(np.exp(q / near.freedom))
     if not np.isfinite(factor * point.cost):
         return replace(point, cost=np.inf)
-    share = factor * point.cost / records.y.size
+    share = factor * point.cost / near.freedom
     return replace(
         point,
         weights=factor * point.weights,
         cost=factor * point.cost,
-        known=share * earlier.information,
+        known=share * known,
         towards=share * towards,
     )
 

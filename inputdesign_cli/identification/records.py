@@ -1,8 +1,8 @@
 """One or several experiments on one system, of which a single model is estimated.
 
-The parts share theta. Each begins from rest, or, where the start is `free`, in a state of its own about a
-level of its own: what these can cause is linear in so many unknowns, which are eliminated from errors and
-gradient for every theta (variable projection, [golub-pereyra-1973]).
+The parts share theta. Each begins with the plant at rest, or, where the start is `free`, in a state of its
+own about a level of its own. What these and the noise before it can cause is linear in unknowns, which are
+eliminated from errors and gradient for every theta (variable projection, [golub-pereyra-1973]).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.free_starts import FreeStarts
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant.polynomial import Array
 
 _MOST_STARTED = 3
@@ -40,13 +41,11 @@ class Record(Protocol):
     def errors_and_gradient(self, theta: Array) -> tuple[Array, NDArray[np.float64]]:
         """Prediction errors (N, p) from rest, and psi = -d errors / d theta (k, N, p)."""
 
-    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what m unknowns, its level and its past, add to its prediction errors."""
+    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
+        """Of each output what the past of the record adds to its prediction errors.
 
-    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what noise before the record adds to its prediction errors from rest.
-
-        None where the predictor forgets it within its order.
+        Args:
+            free: whether level and states are unknown; else the plant is at rest at zero, and noise is not.
         """
 
     def lateness(self, theta: Array) -> int:
@@ -59,12 +58,11 @@ class Record(Protocol):
     def remembering(self, late: int) -> Self:
         """The same, with free responses of inputs before it that act for so many samples."""
 
-    @property
-    def in_starts(self) -> NDArray[np.int64]:
-        """The parameters on which the free responses depend."""
+    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
+        """The parameters on which the starts depend."""
 
-    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
-        """The derivatives of the free responses with respect to one of them."""
+    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+        """The derivatives of the starts with respect to one of them."""
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): what measured outputs in place of the model's add to psi."""
@@ -80,17 +78,55 @@ class Record(Protocol):
 class Linearised:
     """Prediction errors near one theta.
 
+    What noise before the records is likely to have been counts as M more errors of each output.
+
     Attributes:
         errors: (N, p), what unknown starts explain taken off.
         psi: (k, N, p) = -d errors / d theta, the starts following.
-        begun: (N, p), what the starts explain.
-        directions: (N p, m) orthonormal, the errors in white units that they can explain.
+        past: (M, p), errors before the records, and `past_psi` (k, M, p).
+        begun: (N, p), what levels and states at the start explain.
+        directions: ((N + M) p, m) orthonormal, the errors in white units that unknown starts can explain.
+        unknowns: how many of these are levels and states, of which nothing is known.
+        determinant: what integrating over the starts adds to -2 log likelihood; `slope` (k,), half its
+            gradient; `curvature` (k, k), about half its Hessian; `of_noise`, the part that belongs to noise
+            before the records.
     """
 
     errors: Array
     psi: NDArray[np.float64]
+    past: Array
+    past_psi: NDArray[np.float64]
     begun: Array
     directions: Array
+    unknowns: int
+    determinant: float
+    slope: Array
+    curvature: Array
+    of_noise: float
+
+    @classmethod
+    def at_rest(cls, errors: Array, psi: NDArray[np.float64]) -> Linearised:
+        """Without unknown starts."""
+        k, p = len(psi), errors.shape[1]
+        begun, slope, curvature = np.zeros_like(errors), np.zeros(k), np.zeros((k, k))
+        past, directions = np.zeros((0, p)), np.zeros((errors.size, 0))
+        nothing = np.zeros((k, 0, p))
+        return cls(errors, psi, past, nothing, begun, directions, 0, 0.0, slope, curvature, 0.0)
+
+    @property
+    def freedom(self) -> int:
+        """Number of errors that levels and states leave."""
+        return self.errors.size - self.unknowns
+
+    @property
+    def all_errors(self) -> Array:
+        """(N + M, p)."""
+        return np.concatenate([self.errors, self.past])
+
+    @property
+    def all_psi(self) -> NDArray[np.float64]:
+        """(k, N + M, p)."""
+        return np.concatenate([self.psi, self.past_psi], axis=1)
 
 
 @dataclass(frozen=True)
@@ -154,39 +190,57 @@ class Records:
         found = [part.errors_and_gradient(theta) for part in self.parts]
         errors = np.concatenate([e for e, _ in found])
         psi = np.concatenate([gradient for _, gradient in found], axis=1)
-        at_rest = Linearised(errors, psi, np.zeros_like(errors), np.zeros((errors.size, 0)))
-        if not self.free or not all(np.all(np.isfinite(x)) for x in (errors, psi)):
+        at_rest = Linearised.at_rest(errors, psi)
+        if not all(np.all(np.isfinite(x)) for x in (errors, psi)):
             return at_rest
-        starts = FreeStarts(self.lengths, [part.free_responses(theta) for part in self.parts])
-        if not starts.finite:
+        starts = self._starts(theta)
+        if not (starts.any and starts.finite):
             return at_rest
         coefficients, root, directions = starts.eliminated(errors, self.weights)
-        begun = starts.combined(coefficients)
-        for k in self.parts[0].in_starts:
-            slopes = [part.free_slopes(theta, int(k)) for part in self.parts]
-            psi[k] += FreeStarts(self.lengths, slopes).combined(coefficients)
+        slopes = np.zeros((theta.size, starts.parts))
+        for k in self.parts[0].in_starts(free=self.free):
+            change = self._start_slopes(theta, int(k))
+            psi[k] += starts.combined(coefficients, starts=change)
+            slopes[k] = 0.5 * starts.slopes(change)
+        past = np.zeros((starts.past, errors.shape[1]))
+        psi = np.concatenate([psi, np.zeros((len(psi), *past.shape))], axis=1)
         flat = (psi @ root.T).reshape(len(psi), -1)
         flat = flat - (flat @ directions) @ directions.T
         psi = flat.reshape(psi.shape) @ np.linalg.inv(root).T
-        return Linearised(errors - begun, psi, begun, directions)
+        return Linearised(
+            errors - starts.combined(coefficients),
+            psi[:, : self.samples],
+            starts.errors_of_past(coefficients),
+            psi[:, self.samples :],
+            starts.combined(coefficients, noise=False),
+            directions,
+            starts.unknowns,
+            starts.determinant,
+            slopes.sum(axis=1),
+            slopes @ slopes.T,
+            starts.of_noise,
+        )
 
-    def past_noise(self, theta: Array) -> NDArray[np.float64]:
-        """(m, N, p): what noise before the records adds to errors; none beside unknown starts, its part."""
-        if self.free:
-            return np.zeros((0, *self.y.shape))
-        return self._placed([part.past_noise(theta) for part in self.parts])
+    def gradient(self, theta: Array, index: int) -> Array:
+        """(N, p): minus the derivative of the errors by one parameter, past noise being as estimated."""
+        found = [part.errors_and_gradient(theta) for part in self.parts]
+        psi = np.concatenate([gradient[index] for _, gradient in found])
+        starts = self._starts(theta)
+        if index not in self.parts[0].in_starts(free=self.free) or not (starts.past and starts.finite):
+            return psi
+        coefficients, _, _ = starts.eliminated(np.concatenate([e for e, _ in found]), self.weights)
+        return psi + starts.combined(coefficients, starts=self._start_slopes(theta, index), free=False)
 
-    def _placed(self, found: Sequence[tuple[NDArray[np.float64], ...]]) -> NDArray[np.float64]:
-        """Responses of every part and output as (m, N, p)."""
-        columns, begin = [], 0
-        for part, own in zip(self.parts, found, strict=True):
-            end = begin + len(part.y)
-            for output, responses in enumerate(own):
-                block = np.zeros((len(responses), *self.y.shape))
-                block[:, begin:end, output] = responses
-                columns.append(block)
-            begin = end
-        return np.concatenate(columns)
+    @cached_property
+    def _longest(self) -> Record:
+        """The past acts on all records alike; on shorter ones for fewer samples."""
+        return max(self.parts, key=lambda part: len(part.y))
+
+    def _starts(self, theta: Array) -> FreeStarts:
+        return FreeStarts(self.lengths, self._longest.starts(theta, free=self.free))
+
+    def _start_slopes(self, theta: Array, index: int) -> tuple[Start, ...]:
+        return self._longest.start_slopes(theta, index, free=self.free)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p), see `Record`."""
@@ -202,7 +256,7 @@ class Records:
 
     def stabilised(self, theta: Array) -> Array:
         """theta with a stable predictor."""
-        return max(self.parts, key=lambda part: len(part.y)).stabilised(theta)
+        return self._longest.stabilised(theta)
 
 
 def shifted(x: Array, lag: int, lengths: Sequence[int]) -> Array:

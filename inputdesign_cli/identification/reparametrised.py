@@ -22,6 +22,7 @@ from inputdesign_cli.identification.of_model import OfModel, OverRecord
 from inputdesign_cli.identification.record_problem import Point, evaluate
 from inputdesign_cli.identification.records import Records
 from inputdesign_cli.identification.search import Search
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import Parametrisation, Reparametrised
 from inputdesign_cli.plant.polynomial import Array
 
@@ -51,9 +52,9 @@ class ReparametrisedRecord(OverRecord):
         errors, psi = self.record.errors_and_gradient(here.coefficients)
         return errors, np.tensordot(here.jacobian, psi, axes=(0, 0))
 
-    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what an unknown start adds."""
-        return self.record.free_responses(self.parametrisation.at(theta).coefficients)
+    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
+        """Those at the coefficients."""
+        return self.record.starts(self.parametrisation.at(theta).coefficients, free=free)
 
     @property
     def dead_times(self) -> NDArray[np.int64]:
@@ -61,28 +62,28 @@ class ReparametrisedRecord(OverRecord):
         rows = self.parametrisation.jacobian[self.record.dead_times]
         return np.flatnonzero(np.any(rows != 0.0, axis=0))
 
-    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """That at the coefficients."""
-        return self.record.past_noise(self.parametrisation.at(theta).coefficients)
-
     def lateness(self, theta: Array) -> int:
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)
 
-    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
-        """The derivatives of the free responses with respect to one parameter, by the chain rule."""
+    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+        """The derivatives of the starts with respect to one parameter, by the chain rule."""
         here = self.parametrisation.at(theta)
-        moved = [c for c in self.record.in_starts if here.jacobian[c, index] != 0.0]
-        slopes = [self.record.free_slopes(here.coefficients, int(c)) for c in moved]
-        if not slopes:
-            return tuple(np.zeros_like(x) for x in self.free_responses(theta))
+        moved = [c for c in self.record.in_starts(free=free) if here.jacobian[c, index] != 0.0]
+        if not moved:
+            none = self.starts(theta, free=free)
+            return tuple(Start(*(np.zeros_like(block) for block in start)) for start in none)
         weights = here.jacobian[moved, index]
-        return tuple(np.tensordot(weights, np.array(parts), 1) for parts in zip(*slopes, strict=True))
+        slopes = [self.record.start_slopes(here.coefficients, int(c), free=free) for c in moved]
+        return tuple(
+            Start(*(np.tensordot(weights, np.array(blocks), 1) for blocks in zip(*same, strict=True)))
+            for same in zip(*slopes, strict=True)
+        )
 
-    @property
-    def in_starts(self) -> NDArray[np.int64]:
-        """Those that move a coefficient on which the free responses depend."""
-        return np.flatnonzero(np.any(self.parametrisation.moves[self.record.in_starts], axis=0))
+    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
+        """Those that move a coefficient on which the starts depend."""
+        moved = self.parametrisation.moves[self.record.in_starts(free=free)]
+        return np.flatnonzero(np.any(moved, axis=0))
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p), see `Record`."""

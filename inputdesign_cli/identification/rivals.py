@@ -39,7 +39,7 @@ def rivals(records: Records, point: Point, found: Minimum) -> tuple[Rival, ...]:
         cost = float(found.cost[run])
         if not np.isfinite(cost):
             break
-        excess = cost - point.cost if records.weights is not None else _log_excess(records, cost, point.cost)
+        excess = cost - point.cost if records.weights is not None else _log_excess(point, cost)
         if excess > _NEARLY:
             break
         theta = np.asarray(found.theta[run], dtype=float)
@@ -67,9 +67,9 @@ def spread_out(records: Records, points: Sequence[Point], most: int) -> list[int
 
 def distance(records: Records, point: Point, step: Array) -> float:
     """The square of a `step` (k,) in standard deviations of the parameters at a point."""
-    unit = 1.0 if records.weights is not None else records.y.size / point.cost
+    unit = 1.0 if records.weights is not None else point.near.freedom / point.cost
     return unit * float(step @ point.hessian @ step)
 
 
-def _log_excess(records: Records, cost: float, least: float) -> float:
-    return records.y.size * float(np.log(cost / least))
+def _log_excess(point: Point, cost: float) -> float:
+    return point.near.freedom * float(np.log(cost / point.cost))

@@ -9,7 +9,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from inputdesign_cli.identification.adequacy import by_chance
 from inputdesign_cli.identification.gauss_newton import MOST_STEPS, best_run, minimise
 from inputdesign_cli.identification.record_problem import Point, RecordProblem, evaluate
 from inputdesign_cli.identification.records import Records
@@ -18,10 +17,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 # A record that begins at rest is taken for one that does not with this probability.
 _MISTAKEN = 0.01
-# Noise before the record matters where residuals show it with a smaller probability, or where this share of
-# the power that it leaves comes after the first tenth.
-_SILENT = 0.1
-_REMEMBERED = 0.1
+# A step that promises to take off nearly all promises too much.
+_MOST_PROMISED = 0.999
 # Above this probability nothing is searched for.
 _UNLIKELY = 0.2
 # Settled: the step squared, in standard deviations; how far beside a kink the cost is looked at, in those.
@@ -39,10 +36,9 @@ class Search:
     """Where the search from the best of `starts` points ended.
 
     Attributes:
-        first: (parts, p), the first residuals if each record began at rest about zero.
+        first: (parts, p), the first residuals if each record began at rest about zero, noise as well.
         rivals: other minima that explain the records nearly as well.
-        rest_refuted: whether the records say that they do not begin at rest about zero; where only noise from
-            before them matters to the model, the start is unknown although nothing says so.
+        rest_refuted: whether the records say that they do not begin at rest about zero.
     """
 
     records: Records
@@ -74,9 +70,8 @@ def search(
     if not converged and not quick and np.isfinite(point.cost):
         kinked = settled_at_kinks(records, point)
         point, converged = (point, False) if kinked is None else (kinked, True)
-    first = point.errors[np.cumsum((0, *records.lengths[:-1]))]
     others = () if quick else rivals(records, point, found)
-    return Search(records, point, converged, steps, starts, first, others)
+    return Search(records, point, converged, steps, starts, _first(records, point.theta), others)
 
 
 def settled_at_kinks(records: Records, point: Point) -> Point | None:
@@ -141,12 +136,16 @@ def _unit(size: int, index: int) -> NDArray[np.bool_]:
     return np.arange(size) == index
 
 
-def _noise_before(records: Records, point: Point) -> bool:
-    """Whether noise before the records matters to residuals from rest."""
-    found = records.past_noise(point.theta)
-    power = np.sum(found**2, axis=(0, 2))
-    later = np.concatenate([np.arange(length) > 0.1 * length for length in records.lengths])
-    return bool(np.sum(power[later]) > _REMEMBERED * np.sum(power)) or by_chance(point, found) < _SILENT
+def _first(records: Records, theta: Array) -> Array:
+    return np.array([part.errors_and_gradient(theta)[0][0] for part in records.parts])
+
+
+def _deviance(records: Records, point: Point) -> float:
+    """-2 log of the likelihood at the likeliest levels and states, up to a constant."""
+    products = point.near.all_errors.T @ point.near.all_errors
+    if records.weights is not None:
+        return float(np.sum(records.weights * products)) + point.near.of_noise
+    return float(records.samples * np.linalg.slogdet(products)[1]) + point.near.of_noise
 
 
 def from_rest_or_free(
@@ -158,9 +157,8 @@ def from_rest_or_free(
 ) -> Search:
     """The search from rest, unless unknown starts explain what it leaves better than chance.
 
-    The likelihood ratio of the two is N p log(cost / cost), chi-squared with as many degrees of freedom as
-    there are unknowns. Noise never rests: where its zeros remember what was before the record, the start is
-    free as well.
+    The likelihood ratio of the two is chi-squared with as many degrees of freedom as there are more unknowns.
+    Noise never rests: what was before the record is unknown either way.
 
     Args:
         records: from rest.
@@ -176,8 +174,7 @@ def from_rest_or_free(
         # The dead time may come out another than was thought when the unknown inputs were counted.
         if abs(now - late) > _SPARE:
             found = searched(deviations.begun_freely(now), found.point.theta)
-        errors = records.at(found.point.theta).errors
-        return replace(found, first=errors[np.cumsum((0, *records.lengths[:-1]))])
+        return replace(found, first=_first(records, found.point.theta))
 
     def later(theta: Array) -> int:
         late = deviations.lateness(theta)
@@ -189,21 +186,22 @@ def from_rest_or_free(
     if rest or at_rest.point.cost <= 0.0:
         return at_rest
     late = later(at_rest.point.theta)
-    noisy = _noise_before(records, at_rest.point)
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
-    unknowns = near.near.directions.shape[1]
-    if records.y.size <= records.size + 2 * unknowns:
+    unknowns = near.near.unknowns - at_rest.point.near.unknowns
+    if records.y.size <= records.size + 2 * near.near.unknowns or unknowns <= 0:
         return at_rest
+    from_rest = _deviance(records, at_rest.point)
 
-    def probability(cost: float) -> float:
-        ratio = records.y.size * np.log(at_rest.point.cost / max(cost, 1e-300))
-        return float(scipy.special.chdtrc(unknowns, ratio))
+    def probability(point: Point, gain: float = 0.0) -> float:
+        return float(scipy.special.chdtrc(unknowns, max(from_rest - _deviance(free, point) + gain, 0.0)))
 
-    # What one step promises is about what the search would find.
-    step = np.linalg.lstsq(near.hessian, near.slope, rcond=1e-12)[0]
-    if not noisy and probability(near.cost - float(near.slope @ step)) > _UNLIKELY:
+    # What errors promise of one step is about what the search would find. Near the edge of stability the
+    # determinant allows short steps only.
+    errors = near.of_errors
+    step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
+    share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED)
+    if probability(near, -near.near.freedom * np.log1p(-share)) > _UNLIKELY:
         return at_rest
     begun = begun_free(at_rest.point.theta, late)
-    refuted = probability(begun.point.cost) < _MISTAKEN
-    return replace(begun, rest_refuted=refuted) if noisy or refuted else at_rest
+    return replace(begun, rest_refuted=True) if probability(begun.point) < _MISTAKEN else at_rest

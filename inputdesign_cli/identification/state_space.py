@@ -16,6 +16,7 @@ from inputdesign_cli.identification.kind import Part, Starts
 from inputdesign_cli.identification.of_model import OfModel
 from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.identification.search import Search
+from inputdesign_cli.identification.start import Start, differences
 from inputdesign_cli.identification.transfer_record import late_samples
 from inputdesign_cli.plant import StateSpaceModel
 from inputdesign_cli.plant.model import DELAY
@@ -77,36 +78,45 @@ class StateSpaceRecord:
         psi = found[:, p:].reshape(len(found), len(slopes), p)
         return self.y - found[:, :p], np.moveaxis(psi, 1, 0)
 
-    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what levels of the outputs and the states at the start add.
+    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
+        """What the past adds: levels of the outputs, and the states at the start.
 
         Levels of inputs, which move the states of a model that integrates for ever, are unknown as well.
         Inputs before the record that come late by the dead time move the states, sample by sample, along the
-        directions in which inputs do; what they do at once, through D, is not counted.
+        directions in which inputs do; what they do at once, through D, is not counted. From rest, only noise
+        has moved the states, and as far as nobody knows.
         """
         model = self.structure.at(theta)
         m, n, p = model.matrices, model.order, model.outputs
         A, early, later = model.held
-        closed = A - m.K @ m.C
+        coloured = self._coloured
         pushes = np.eye(n) if n <= 2 * model.inputs else np.concatenate([early, later], axis=1).T
-        late = min(self.late, len(self.y) - 1)
-        steady = n if np.any(np.abs(model.poles - 1.0) < _INTEGRATES) else 0
-        size = n + p + late * len(pushes) + steady
+        if free:
+            late = min(self.late, len(self.y) - 1)
+            steady = n if np.any(np.abs(model.poles - 1.0) < _INTEGRATES) else 0
+            size, levels = n + p + late * len(pushes) + steady, p
+        else:
+            late, steady, size, levels = 0, 0, n if coloured else 0, 0
         x, level, driven = np.zeros((size, n)), np.zeros((size, p)), np.zeros((size, n))
-        x[:n], level[n : n + p], driven[size - steady :] = np.eye(n), np.eye(p), np.eye(steady, n)
-        found = np.empty((size, len(self.y), p))
-        for t in range(len(self.y)):
-            if 0 < t <= late:
-                first = n + p + (t - 1) * len(pushes)
-                x[first : first + len(pushes)] += pushes
-            found[:, t] = level - x @ m.C.T
-            x = x @ closed.T + level @ m.K.T + driven
-        return tuple(found[:, :, i] for i in range(p))
+        x[:n], driven[size - steady :] = np.eye(size, n)[:n], np.eye(steady, n)
+        level[n : n + levels] = np.eye(levels, p)
 
-    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): what states at the start add, if past noise moves them."""
-        states = self.structure.order if np.any(self.structure.at(theta).matrices.K) else 0
-        return tuple(responses[:states] for responses in self.free_responses(theta))
+        def responses(K: Array) -> NDArray[np.float64]:
+            found, state, onward = np.empty((size, len(self.y), p)), x.copy(), (A - K @ m.C).T
+            for t in range(len(self.y)):
+                if 0 < t <= late:
+                    first = n + p + (t - 1) * len(pushes)
+                    state[first : first + len(pushes)] += pushes
+                found[:, t] = level - state @ m.C.T
+                state = state @ onward + level @ K.T + driven
+            return found
+
+        through = responses(m.K)
+        # What an unstable plant does without its predictor grows beyond all numbers.
+        stable = bool(np.all(np.abs(model.poles) < 1.0 + _MARGIN))
+        before = responses(np.zeros_like(m.K)) if coloured and stable else through
+        none = np.zeros((0, len(self.y)))
+        return tuple(Start(through[:, :, i], before[:, :, i], none, np.zeros(())) for i in range(p))
 
     def lateness(self, theta: Array) -> int:
         """The dead time in samples, one that is begun counted whole."""
@@ -122,19 +132,26 @@ class StateSpaceRecord:
         """The same, where unknown inputs act for so many samples."""
         return replace(self, late=late)
 
-    @property
-    def in_starts(self) -> NDArray[np.int64]:
+    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
         """Those of A, C and K; of B where it is no matter of course which way inputs push the states."""
-        pushed = self.late > 0 and self.structure.order > 2 * self.structure.inputs
+        if not (free or self._coloured):
+            return np.zeros(0, dtype=np.int64)
+        pushed = free and self.late > 0 and self.structure.order > 2 * self.structure.inputs
         letters = ("A", "C", "K", *(("B", "delay") if pushed else ()))
         return np.flatnonzero([letter in letters for letter, _, _ in self.structure.entries])
 
-    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
+    @property
+    def _coloured(self) -> bool:
+        """Whether noise moves the states."""
+        estimated = any(letter == "K" for letter, _, _ in self.structure.entries)
+        return estimated or bool(np.any(self.structure.matrices.K))
+
+    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
         """By central differences."""
         size = _STEP * max(abs(theta[index]), _STEP)
         step = size * np.eye(self.size)[index]
-        above, below = self.free_responses(theta + step), self.free_responses(theta - step)
-        return tuple((a - b) / (2.0 * size) for a, b in zip(above, below, strict=True))
+        above, below = (self.starts(theta + sign * step, free=free) for sign in (1.0, -1.0))
+        return differences(above, below, 2.0 * size)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): nothing; no instruments are used."""

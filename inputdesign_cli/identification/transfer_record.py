@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant import ContinuousModel, Intersample
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.held import HeldEntry, integrators, polynomial_roots
@@ -65,18 +66,20 @@ class TransferRecord:
                     psi[index, :, i] += columns @ entry.gradient(parameter.letter, parameter.power)
         return errors, psi
 
-    def free_responses(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """Of each output (m, N): a level, and what the states of its entries do without an input.
+    def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
+        """What the past of each output adds: a level, and what the states of its entries do without an input.
 
         A level of the input is unknown as well: level and states make it up where poles are stable, not the
         ramp that an integrator makes of it, nor nearly. Inputs before the record that come late by a dead
         time move the states, sample by sample, as if from anywhere.
         """
+        if not free:
+            return (Start.white(np.zeros((0, self.samples))),) * self.structure.outputs
         model = self.structure.at(theta)
         found = [[np.ones((1, self.samples))] for _ in range(model.outputs)]
         for i, j in model.active:
             found[i].append(self._begun(model, i, j))
-        return tuple(np.concatenate(parts) for parts in found)
+        return tuple(Start.white(np.concatenate(parts)) for parts in found)
 
     def _entering(self, order: int) -> NDArray[np.float64]:
         """(m, N): what an entry of so many poles may have been moved by."""
@@ -92,10 +95,6 @@ class TransferRecord:
         poles = np.poly(entry.transition[: entry.order, : entry.order]) if entry.order else np.ones(1)
         return filtered([1.0], poles, entering)
 
-    def past_noise(self, theta: Array) -> tuple[NDArray[np.float64], ...]:
-        """None: the noise is white."""
-        return (np.zeros((0, self.samples)),) * self.structure.outputs
-
     def lateness(self, theta: Array) -> int:
         """The longest dead time, in samples, those that are begun counted whole."""
         return late_samples(self.structure.at(theta).memory, self.intersample.sample_time)
@@ -109,13 +108,12 @@ class TransferRecord:
         """The same, where unknown inputs act for so many samples."""
         return replace(self, late=late)
 
-    @property
-    def in_starts(self) -> NDArray[np.int64]:
+    def in_starts(self, *, free: bool) -> NDArray[np.int64]:
         """Those of the denominators."""
-        return np.flatnonzero([parameter.letter == "a" for parameter in self.structure.parameters])
+        return np.flatnonzero([free and parameter.letter == "a" for parameter in self.structure.parameters])
 
-    def free_slopes(self, theta: Array, index: int) -> tuple[NDArray[np.float64], ...]:
-        """By central differences."""
+    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+        """By central differences; of no start from rest."""
         parameter = self.structure.parameters[index]
         i, j = parameter.places[0]
         order = self._order(i, j)
@@ -130,7 +128,7 @@ class TransferRecord:
                 found[place[0]].append((above - below) / (2.0 * size))
             else:
                 found[place[0]].append(np.zeros_like(self._entering(self._order(*place))))
-        return tuple(np.concatenate(parts) for parts in found)
+        return tuple(Start.white(np.concatenate(parts)) for parts in found)
 
     def whitened(self, theta: Array, signals: Array) -> NDArray[np.float64]:
         """(p, N, m): the signals (N, m) as they are, for the noise is white."""

@@ -21,8 +21,10 @@ _FINE = 0.01
 _LENGTHS = 24
 _FALLS = 0.9  # of what seemed to be needed before
 _BEYOND = 1.25  # times the longest that is looked for: not to be made up for by chance
-# A way that missed nearby, and by so much, is not tried: other phases change a ratio by less.
+# A way that missed nearby, and by so much, is not tried: other phases change a ratio by less as a rule.
 _NEARBY, _HOPELESS = 1.2, 1.15
+# Whether a record meets is a matter of luck near the shortest: so far below one that does all are tried.
+_BELOW = (0.96, 0.9)
 
 
 class Way(Protocol):
@@ -62,6 +64,7 @@ class ShortestRecord:
     longest: int
     needed: float = 0.0  # samples that would do, by the records that missed
     _missed: dict[int, Record] = field(default_factory=dict)  # by way, its latest
+    _tried: set[tuple[int, int]] = field(default_factory=set)  # ways and lengths
 
     def search(self, misses: Sequence[Record]) -> Made | None:
         """The shortest record that meets the accuracy, to one per cent; None when none is found.
@@ -96,21 +99,34 @@ class ShortestRecord:
                     break
                 tried = self._met(middle)
                 low, high, found = (middle, high, found) if tried is None else (low, middle, tried)
+            below = [*_BELOW]
+            while found is not None and below and lengths < _LENGTHS:
+                shorter = int(below.pop(0) * high / self.block) * self.block
+                if 0 < shorter < high:
+                    lengths += 1
+                    tried = self._met(shorter, hopeless=np.inf)
+                    if tried is not None:
+                        high, found, below = shorter, tried, [*_BELOW]
         except OutOfTimeError:
             if found is None:
                 raise
         return found
 
-    def _met(self, samples: int) -> Made | None:
-        """A record of this length that meets the accuracy, the most promising way tried first."""
+    def _met(self, samples: int, hopeless: float = _HOPELESS) -> Made | None:
+        """A record of this length that meets the accuracy, the most promising way tried first.
+
+        Args:
+            hopeless: how many times as long a way's record nearby would have to be for it not to be tried.
+        """
         for number in sorted(range(len(self.ways)), key=self._promise):
             missed = self._missed.get(number)
-            if (
+            if (number, samples) in self._tried or (
                 missed is not None
                 and samples < _NEARBY * len(missed.samples)
-                and samples * _HOPELESS < reach(missed)
+                and samples * hopeless < reach(missed)
             ):
                 continue
+            self._tried.add((number, samples))
             made = self.ways[number](samples)
             if made is None or made.record is None:
                 continue

@@ -34,16 +34,21 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
     B, C, F = [0.0, 0.0, 0.0, *theta[:3]], [1.0, theta[3]], [1.0, *theta[4:]]
     filtered = scipy.signal.lfilter([1], np.convolve(C, F), u[0, :, 0])
     second = -scipy.signal.lfilter(np.convolve(B, [1]), F, filtered)
-    errors = scipy.signal.lfilter([1], C, y[0, :, 0] - scipy.signal.lfilter(B, F, u[0, :, 0]))
-    third = scipy.signal.lfilter([1], C, errors)
+    # The noise before the record, w, is an unknown of its own, an error as large as the others.
+    impulse = np.eye(1, 400)[0]
+    of_w = np.append(-theta[3] * scipy.signal.lfilter([1], C, impulse), 1.0)
+    errors = np.append(scipy.signal.lfilter([1], C, y[0, :, 0] - scipy.signal.lfilter(B, F, u[0, :, 0])), 0.0)
+    w = -(errors @ of_w) / (of_w @ of_w)
+    errors = (errors + w * of_w)[:-1]
+    third = scipy.signal.lfilter([1], C, np.concatenate([[w], errors[:-1]]))
 
     def delayed(x, lag):
-        return np.concatenate([np.zeros(lag), x[: x.size - lag]])
+        return np.concatenate([np.zeros(lag), x[: x.size - lag], [0.0]])
 
-    lags = [(filtered, 3), (filtered, 4), (filtered, 5), (third, 1), (second, 1), (second, 2), (second, 3)]
-    psi = np.array([delayed(x, lag) for x, lag in lags]).T
+    lags = [(filtered, 3), (filtered, 4), (filtered, 5), (third, 0), (second, 1), (second, 2), (second, 3)]
+    psi = np.array([*(delayed(x, lag) for x, lag in lags), of_w]).T
     half = np.linalg.inv(np.linalg.qr(psi, mode="r"))
-    expected = found.noise[0, 0] * half @ half.T
+    expected = (found.noise[0, 0] * half @ half.T)[:7, :7]
     np.testing.assert_allclose(np.diag(found.covariance), np.diag(expected), rtol=1e-5)
 
 

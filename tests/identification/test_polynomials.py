@@ -135,7 +135,7 @@ def test_outputs_that_share_nothing_and_have_independent_noise_are_fitted_alone(
         own = PolynomialModel(
             model.B[i : i + 1], model.A, model.F[i : i + 1], (model.C[i],), model.D, np.eye(1)
         )
-        alone = identify(own, u, y[:, i : i + 1])
+        alone = identify_polynomials(own, u, y[:, i : i + 1], noise=model.covariance[i : i + 1, i : i + 1])
         mine = [k for k, p in enumerate(model.parameters) if p.places[0][0] == i]
         np.testing.assert_allclose(both.theta[mine], alone.theta, atol=1e-5)
 

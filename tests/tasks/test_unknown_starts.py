@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-import scipy.signal
+import scipy
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.identification import information_begun_anywhere
@@ -72,22 +72,23 @@ def test_a_plant_that_forgets_its_start_has_no_note():
 @pytest.mark.parametrize("D", [[1.0], [1.0, -0.6]], ids=["white", "coloured"])
 @pytest.mark.parametrize("F", [[1.0, -0.8], [1.0, -1.0], [1.0, -1.5, 0.7]], ids=["lag", "tank", "spring"])
 def test_what_is_told_from_anywhere(F, D):
-    """Gradients of B and F by differences of filtered outputs; starts are all states of the filters."""
+    """Gradients by differences, weighed by the covariance of the noise; starts are all states of 1/F."""
     text = f"plant: {{B: [0, 0.5], F: {F}}}\nnoise: {{D: {D}, variance: 0.3, known: [d1]}}\n"
     model = build_model(parse_spec(text.replace(", known: [d1]", "") if len(D) == 1 else text, design=False))
     u = np.random.default_rng(4).standard_normal(80)
 
     def output(theta):
-        return scipy.signal.lfilter(D, [1.0], scipy.signal.lfilter([0, theta[0]], [1.0, *theta[1:]], u))
+        return scipy.signal.lfilter([0, theta[0]], [1.0, *theta[1:]], u)
 
     theta, step = np.array([0.5, *F[1:]]), 1e-6
     psi = np.array([(output(theta + d) - output(theta - d)) / (2 * step) for d in step * np.eye(theta.size)])
-    # A level, the states of 1/F, outputs before the record through D; where 1/F integrates a level of u.
-    begun = [scipy.signal.lfilter([1.0], F, row) for row in np.eye(len(F) - 1, 80)]
-    begun += [scipy.signal.lfilter([1.0], F, np.ones(80))] if sum(F) == 0.0 else []
-    starts = [scipy.signal.lfilter(D, [1.0], row) for row in [np.ones(80), *begun]]
-    starts = np.array([*starts, *np.eye(len(D) - 1, 80)]).T
-    rest = psi - (starts @ np.linalg.lstsq(starts, psi.T, rcond=None)[0]).T
+    pole = -D[-1] if len(D) > 1 else 0.0
+    V = 0.3 / (1.0 - pole**2) * scipy.linalg.toeplitz(pole ** np.arange(80))
+    white = np.linalg.inv(np.linalg.cholesky(V))
+    # A level, the states of 1/F; where that integrates, a level of u.
+    X = [np.ones(80), *(scipy.signal.lfilter([1.0], F, row) for row in np.eye(len(F) - 1, 80))]
+    X = np.array([*X, *([scipy.signal.lfilter([1.0], F, np.ones(80))] if sum(F) == 0.0 else [])]).T
+    rest = white @ (psi.T - X @ np.linalg.lstsq(white @ X, white @ psi.T, rcond=None)[0])
     y = scipy.signal.lfilter([0, 0.5], F, u)
     found = information_begun_anywhere(model, u[:, None], y[:, None], 1.0)
-    assert found[: theta.size, : theta.size] == pytest.approx(rest @ rest.T / 0.3, rel=1e-5)
+    assert found[: theta.size, : theta.size] == pytest.approx(rest.T @ rest, rel=1e-5)

@@ -129,9 +129,9 @@ def simulate_free(model: Model, u: Array, y: Array) -> tuple[Array, int]:
     late = record.lateness(error_form.theta)
     with np.errstate(over="ignore", invalid="ignore"):
         caused, _ = error_form.simulate(u, np.zeros(y.shape), 1.0)
-        starts = record.remembering(late).free_responses(error_form.theta)
-        for i, responses in enumerate(starts):
-            caused[:, i] += begun(responses, y[:, i] - caused[:, i])
+        starts = record.remembering(late).starts(error_form.theta, free=True)
+        for i, start in enumerate(starts):
+            caused[:, i] += begun(start.free, y[:, i] - caused[:, i])
     return caused, late
 
 

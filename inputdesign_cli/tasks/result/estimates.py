@@ -81,32 +81,23 @@ def _lag(test: ScoreTest) -> dict[str, Json]:
     return {} if test.lag is None else {"lag": test.lag}
 
 
-def _free_start(estimate: Estimate, *, at_the_edge: bool) -> list[str]:
-    """Where the levels and starts of the records were estimated: why, with the largest first residual.
-
-    Args:
-        at_the_edge: whether a root of the estimate is on the unit circle, for all that the samples tell. What
-            it remembers for ever looks like a start that is not at rest.
-    """
+def _free_start(estimate: Estimate) -> list[str]:
+    """Where the levels and starts of the records were estimated: why, with the largest first residual."""
     if not estimate.free:
         return []
     along = "the level of every output and the state at the start were estimated along"
+    single = len(estimate.first) == 1
+    if not estimate.rest_refuted:
+        return [
+            f"whether {'the record begins' if single else 'the records begin'} at rest was not asked: {along}"
+        ]
     ratio = np.abs(estimate.first) / np.sqrt(np.diag(estimate.noise))
     which, output = np.unravel_index(np.argmax(ratio), ratio.shape)
     first, noise = estimate.first[which, output], np.sqrt(estimate.noise[output, output])
-    single, seen_at_once = len(estimate.first) == 1, bool(np.max(ratio) > _SEEN_AT_ONCE)
-    if at_the_edge and not seen_at_once:
-        begins = "the record begins" if single else "the records begin"
-        return [
-            f"whether {begins} at rest about zero cannot be told next to a root on the unit circle: {along}"
-        ]
-    if not estimate.rest_refuted:
-        record = "the record" if single else "the records"
-        return [f"noise from before {record} matters to this model: {along}"]
     records = "the record does" if single else "the records do"
     seen = (
         f"a first residual of {first:.3g} where the noise has {noise:.3g}"
-        if seen_at_once
+        if np.max(ratio) > _SEEN_AT_ONCE
         else "the first residuals together are larger than noise would make them"
     )
     return [f"{records} not begin at rest about zero ({seen}): {along}"]
@@ -127,7 +118,7 @@ def identification_notes(
         for letter, polynomials in predictor.items()
         if any(np.any(np.abs(roots_in_z(without_integrators(p))) > 1.0 - 1.0 / samples) for p in polynomials)
     ]
-    notes += [*unsettled(estimate), *_free_start(estimate, at_the_edge=bool(at_the_edge))]
+    notes += [*unsettled(estimate), *_free_start(estimate)]
     if at_the_edge:
         notes.append(
             f"{' and '.join(at_the_edge)} has a root on the unit circle, as far as {samples} "

@@ -1,0 +1,120 @@
+"""What nobody knows of the past of a record: its level, the states of the plant, the noise before it.
+
+Level and states are unknown numbers. The noise before a record is as random as that in it: of stationary
+noise C/D e, what it adds later has a covariance that C and D tell ([ljung-1999], Section 10.5, on initial
+conditions; [brockwell-davis-1991], Chapter 8, on the exact likelihood).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.filtering import filtered
+from inputdesign_cli.plant.polynomial import Array
+
+# Roots on the circle, which may be known, are taken for some so far inside: noise would have no stationary
+# start, and its zeros no density.
+_INSIDE = 1e-5
+
+
+class Start(NamedTuple):
+    """What the past adds to the N prediction errors of one output, each row by one unknown.
+
+    Attributes:
+        free: (m, N), by the level and states, of which nothing is known.
+        disturbance: (m, N), the same before the inverse of the noise model.
+        noise: (n, N), by independent unknowns of the variance of e.
+        zeros: -2 log of a density of the zeros of the noise model, see `density`; a scalar.
+    """
+
+    free: NDArray[np.float64]
+    disturbance: NDArray[np.float64]
+    noise: NDArray[np.float64]
+    zeros: NDArray[np.float64]
+
+    @classmethod
+    def white(cls, free: NDArray[np.float64]) -> Start:
+        """Where the noise is white: it has no past."""
+        return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
+
+    def cropped(self, samples: int) -> Start:
+        """What it is of a shorter record."""
+        free, disturbance, noise = (block[:, :samples] for block in self[:3])
+        return Start(free, disturbance, noise, self.zeros)
+
+    @property
+    def finite(self) -> bool:
+        """Whether all are."""
+        return all(bool(np.all(np.isfinite(block))) for block in self)
+
+
+def differences(above: Sequence[Start], below: Sequence[Start], span: float) -> tuple[Start, ...]:
+    """(above - below) / span, output by output."""
+    return tuple(
+        Start(*((a - b) / span for a, b in zip(*ends, strict=True)))
+        for ends in zip(above, below, strict=True)
+    )
+
+
+def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
+    """(n, samples): what stationary noise C/D e before a record adds to (D/C) of what is in it.
+
+    With n the larger order, C (errors - e) is off by r(t) = sum_k>t (c_k e(t - k) - d_k v(t - k)) in the
+    first n samples. Both e = D q and v = C q follow from q = e / D, an autoregression, whose last n values
+    are made of independent ones by the predictors of every order. Real and complex coefficients alike.
+    """
+    n = max(C.size, D.size) - 1
+    if n == 0:
+        return np.zeros((0, samples))
+    c, d = np.pad(C, (0, n + 1 - C.size)), np.pad(D, (0, n + 1 - D.size))
+    later = [scipy.linalg.hankel(p[1:]) for p in (c, d)]
+    made = [scipy.linalg.toeplitz(np.append(p[:1], np.zeros(n - 1)), p[:n]) for p in (c, d)]
+    r = (later[0] @ made[1] - later[1] @ made[0]) @ _autoregression(d)[::-1]
+    entering = np.zeros((n, samples), dtype=r.dtype)
+    entering[:, : min(n, samples)] = r.T[:, :samples]
+    return filtered([1.0], C, entering)
+
+
+def density(C: Array) -> NDArray[np.float64]:
+    """-2 log of a density of the zeros of C, up to a constant: 2 log of the variance of e / C.
+
+    It vanishes on the unit circle and is all but flat elsewhere, 1 - c_1^2 for one zero. The likelihood has
+    no slope across the circle, and in short records it is often largest there: noise seems to vanish at a
+    frequency, and the model to be exact ([sargan-bhargava-1983]). [chung-2013] treat variances that come out
+    zero alike. A zero z moves by about 2 z / N.
+    """
+    return np.asarray(2.0 * np.log(_step_down(_inside(C))[1][0]))
+
+
+def _autoregression(d: Array) -> NDArray:
+    """(n, n): n values in a row of e / D, oldest first, made of independent ones of the variance of e."""
+    predictors, variances = _step_down(_inside(d))
+    n = d.size - 1
+    onto = np.eye(n, dtype=d.dtype)
+    for order, predictor in enumerate(predictors):
+        onto[order, :order] = predictor[:0:-1]
+    return np.asarray(np.linalg.solve(onto, np.diag(np.sqrt(variances))))
+
+
+def _inside(d: Array) -> Array:
+    return d * (1.0 - _INSIDE) ** np.arange(d.size)
+
+
+def _step_down(d: Array) -> tuple[list[Array], NDArray]:
+    """The predictors of the orders 0 to n - 1 of e / D, and the variances (n,) of their errors.
+
+    By the recursion of [brockwell-davis-1991], Section 5.2, from the predictor of order n, which is D.
+    """
+    predictor, variance = d, np.ones((), dtype=d.dtype)
+    found = []
+    while predictor.size > 1:
+        last = predictor[-1]
+        left = 1.0 - last**2
+        predictor, variance = ((predictor - last * predictor[::-1]) / left)[:-1], variance / left
+        found.append((predictor, variance))
+    return [p for p, _ in found[::-1]], np.array([v for _, v in found[::-1]])
