@@ -18,7 +18,7 @@ from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.columns import (
     other_units,
     reference_columns,
-    time_unit_of,
+    time_unit_in,
     unused_columns,
     with_headers,
     with_names,
@@ -282,14 +282,16 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         DataError: `data-wrong-unit` or `data-not-uniform`.
     """
     sheet = signals.sheet
-    unit = None if signals.dated or preparation.time_unit else time_unit_of(signals.name)
+    unit = None if signals.dated or preparation.time_unit else time_unit_in(sheet, signals.name)
     if unit is not None and unit != units.time_unit:
-        message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
+        message = f"the times of {sheet.path.name} are in {unit}, but the spec counts in {units.time_unit}"
         hint = f"add --time-unit {unit} to convert them, or set time_unit: {unit} (and sample_time in it)"
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
     stated = stated_step(sheet, preparation)
+    if stated is not None and preparation.time_unit is not None:
+        stated *= SECONDS[preparation.time_unit] / SECONDS[units.time_unit]
     typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
     if abs(typical - units.sample_time) <= (EVEN if stated else MOST_JITTER) * units.sample_time:
         return

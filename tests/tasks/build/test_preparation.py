@@ -186,3 +186,15 @@ def test_a_column_that_may_hold_the_times_is_told(tmp_path):
     (first, second, *_) = read_log(path, Preparation()).steps
     assert first.startswith("the file has no times")
     assert second.startswith("Sekunden rises by even steps")
+
+
+def test_a_stated_sample_time_is_converted_as_times_are(tmp_path):
+    """Thirty seconds are half a minute, whether the file or the user says so."""
+    units = Units("s", 30.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+    np.savez(tmp_path / "a.npz", u=U, y=Y, Ts=0.5)
+    np.savez(tmp_path / "b.npz", u=U, y=Y)
+    assert read_data([tmp_path / "a.npz"], units, Preparation(time_unit="min")).lengths == (N,)
+    stated = Preparation(time_unit="min", sample_time=0.5)
+    assert read_data([tmp_path / "b.npz"], units, stated).lengths == (N,)
+    with pytest.raises(DataError, match=r"sampled every 0\.5 s"):
+        read_data([tmp_path / "a.npz"], units, Preparation())
