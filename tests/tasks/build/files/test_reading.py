@@ -453,3 +453,29 @@ def test_times_that_contradict_the_sample_time_are_told(tmp_path):
     found = read_log(path, Preparation())
     assert found.step == 2.0
     assert "log.npz states the sample time 0.5, and its times advance by 2: they count" in found.steps
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (b"\x00", r"1 control character \(code 0\)"),
+        (b"\x00" * 4096, r"4096 control characters \(code 0\)"),
+        (b"\x07", r"1 control character \(code 7\)"),
+        (b"\x81", "bytes that are no letters in UTF-8 or Windows-1252"),
+    ],
+    ids=["NUL", "many", "bell", "undecodable"],
+)
+def test_characters_that_no_text_has_are_told_with_their_line(fault, told, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(table(",").encode().replace(b"\n2,", b"\n" + fault + b"2,"))
+    with pytest.raises(DataError, match=f"line 4 has {told}") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location.line == 4
+
+
+def test_bytes_of_any_kind_are_no_text(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(np.random.default_rng(1).bytes(5000))
+    with pytest.raises(DataError, match="is no text") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location is None
