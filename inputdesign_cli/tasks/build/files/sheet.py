@@ -19,13 +19,18 @@ Array = NDArray[np.float64]
 class Column:
     """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
 
-    Dates and times are `dated`: seconds since the first. What is `wrong` with a fault goes into messages.
+    Dates and times are `dated`: seconds since the first. What is `wrong` with a fault, and how to mend it,
+    goes into messages.
     """
 
     numbers: Array
     fault: tuple[int, str] | None = None
     dated: bool = False
     wrong: str = "is not a finite number"
+    hint: str = (
+        "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands, one "
+        "row a line; dates as 2024-03-12 10:15:00"
+    )
 
 
 @dataclass(frozen=True)

@@ -477,3 +477,32 @@ def test_bytes_of_any_kind_are_no_text(tmp_path):
     with pytest.raises(DataError, match="is no text") as caught:
         read_sheet(path, key="")
     assert caught.value.diagnostics[0].location is None
+
+
+CLOCK = [f"12.03.2024 10:15:0{k}" for k in range(6)]
+NO_DATES = {
+    "no such day": ([*CLOCK[:4], "31.02.2024 10:15:04", CLOCK[5]], 6, "as those above are"),
+    "another kind": ([*CLOCK[:2], "2024-03-12 10:15:02", *CLOCK[3:]], 4, "as those above are"),
+    "a number": ([*CLOCK[:2], "45363.5", *CLOCK[3:]], 4, "as those above are"),
+    "more than a date": ([f"{date} CET" for date in CLOCK], 2, "that can be read"),
+    "month in words": ([f"Tue Mar 12 2024 10:15:0{k}" for k in range(6)], 2, "that can be read"),
+}
+
+
+@pytest.mark.parametrize(("dates", "line", "told"), NO_DATES.values(), ids=NO_DATES)
+def test_the_date_that_cannot_be_read_is_told_with_its_line(dates, line, told, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u,y\n" + "\n".join(f"{date},{k},1.5" for k, date in enumerate(dates)) + "\n")
+    with pytest.raises(DataError) as caught:
+        columns_of(read_sheet(path, key=""), {"time": "time"})
+    (found,) = caught.value.diagnostics
+    assert found.location.line == line
+    assert found.message == f"{dates[line - 2]!r} in column time is no date or time {told}"
+    assert "2024-03-12 10:15:00" in found.hint
+
+
+def test_a_date_that_is_missing_is_missing(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u\n" + "\n".join(f"{date},1" for date in [*CLOCK[:2], "", *CLOCK[3:]]) + "\n")
+    found = columns_of(read_sheet(path, key=""), {"time": "time"})["time"]
+    np.testing.assert_array_equal(found, [0, 1, np.nan, 3, 4, 5])
