@@ -23,6 +23,7 @@ from inputdesign_cli.tasks.build.columns import (
     with_headers,
     with_names,
 )
+from inputdesign_cli.tasks.build.far_off import outliers, strange_values
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.passed_over import passed_over
 from inputdesign_cli.tasks.build.preparation import (
@@ -32,9 +33,7 @@ from inputdesign_cli.tasks.build.preparation import (
     Segment,
     jitter,
     limits_of_sensor,
-    outliers,
     resampled,
-    standing_alone,
     trend,
     whole_segments,
 )
@@ -146,14 +145,13 @@ def prepared(
     """
     sheet, rows, told = signals.sheet, signals.sheet.lines, list[str]()
     time = signals.time if signals.name else signals.time * step
-    for names, values in ((signals.inputs, signals.u), (signals.outputs, signals.y)):
-        for name, x in zip(names, values.T, strict=True):
-            there = ~np.isnan(x)
-            far = outliers(name, x[there], rows[there])
-            told += far
-            if names is signals.outputs:
-                told += [] if far else standing_alone(name, x[there], rows[there])
-                told += limits_of_sensor(name, x[there])
+    for name, x in zip(signals.inputs, signals.u.T, strict=True):
+        there = ~np.isnan(x)
+        told += outliers(name, x[there], rows[there])
+    for name, x in zip(signals.outputs, signals.y.T, strict=True):
+        there = ~np.isnan(x)
+        told += strange_values(name, x[there], signals.u[there], rows[there])
+        told += limits_of_sensor(name, x[there])
     apart, lines = passed_over(sheet, timed=bool(signals.name))
     segments, cuts = whole_segments(
         time, signals.u, signals.y, step, apart, rows, resample=preparation.resample

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.build import rows
-from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
 
 Detrend = Literal["none", "constant", "linear", "auto"]
 DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
@@ -22,8 +21,6 @@ MOST_JITTER = 0.1
 # A longer step is a gap; with `resample` it may be longer before it is one.
 _GAP, _LONG_GAP = 1.5, 3.0
 _SHORTEST = 10
-# Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
-_OUTLYING = 8.0
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
 _COARSE = 0.1
@@ -149,36 +146,6 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
         if kind == "linear" or np.sum((x - line) ** 2) < 0.5 * np.sum((x - level) ** 2):
             return line, f"a line from {line[0]:.6g} to {line[-1]:.6g}"
     return level, f"the mean {level[0]:.6g}"
-
-
-def outliers(name: str, x: Array, lines: NDArray[np.int64]) -> list[str]:
-    """Values far from the median of a signal x (n,), with their rows in the file."""
-    middle, spread = np.median(x), spread_of(x)
-    if spread <= 0.0:
-        return []
-    found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
-    if not found.size or found.size > OFTEN * x.size:
-        return []
-    return [
-        f"{name} has {found.size} outlying value{'s' * (found.size > 1)} ({rows.told(lines[found])}): "
-        "look at the record"
-    ]
-
-
-def standing_alone(name: str, x: Array, lines: NDArray[np.int64]) -> list[str]:
-    """More values of a measured signal x (n,) than outliers are, each far from its neighbours: spikes."""
-    if x.size < _SHORTEST:
-        return []
-    near = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
-    off = np.abs(x[2:-2] - near)
-    found = 2 + np.flatnonzero(off > _OUTLYING * 1.4826 * np.median(off))
-    if not np.median(off) > 0.0 or found.size <= OFTEN * x.size:
-        return []
-    return [
-        f"{name} has {found.size} values ({100 * found.size / x.size:.2g} %) far from their neighbours "
-        f"({rows.told(lines[found])}): spikes? Look at the record, and empty the cells that are faults of "
-        "measurement"
-    ]
 
 
 def limits_of_sensor(name: str, x: Array) -> list[str]:
