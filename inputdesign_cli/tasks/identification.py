@@ -143,7 +143,7 @@ def speaking_against(units: Units, found: Identified) -> list[str]:
     """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
     return faults(units, found.estimate, found.data) or [
         *refutations(found.model, found.estimate),
-        *repetitions(found.estimate, found.data.files),
+        *(repetitions(found.estimate, found.data.files) or found.data.repeated),
     ]
 
 

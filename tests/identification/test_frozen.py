@@ -93,7 +93,9 @@ def test_an_input_that_rests_and_flickers_does_not_move():
     held = np.concatenate([[[False]], np.abs(y[1:] - y[:-1]) < 0.01])
     flicker = u + 0.01 * rng.integers(0, 2, u.shape)
     errors = rng.standard_normal(u.shape)
-    seen = [frozen(held, np.array([0.01]), v, errors, errors, 0.0 * y, [600]) for v in (flicker, 10.0 * flicker)]
+    seen = [
+        frozen(held, np.array([0.01]), v, errors, errors, 0.0 * y, [600]) for v in (flicker, 10.0 * flicker)
+    ]
     assert seen == [[], []]
     moved = u + rng.uniform(-2.0, 2.0, u.shape)
     assert frozen(held, np.array([0.01]), moved, errors, errors, 0.0 * y, [600])

@@ -23,6 +23,7 @@ from inputdesign_cli.tasks.build.columns import (
     with_headers,
     with_names,
 )
+from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.far_off import outliers, strange_values
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.passed_over import passed_over
@@ -45,11 +46,13 @@ class Recorded:
     """The outputs as they stand in the files.
 
     Attributes:
+        values: (samples, r + p), of inputs and outputs as they stand in the file.
         rows: (samples,), where each sample stands; the nearest one, where times were evened out.
         held: (samples, p), whether a value is that of the sample before.
         resolution: (p,), the step in which each is recorded.
     """
 
+    values: Array
     rows: NDArray[np.int64]
     held: NDArray[np.bool_]
     resolution: Array
@@ -58,6 +61,7 @@ class Recorded:
     def together(cls, parts: Sequence[Recorded]) -> Recorded:
         """Those of several files, one after the other."""
         return cls(
+            np.concatenate([part.values for part in parts]),
             np.concatenate([part.rows for part in parts]),
             np.concatenate([part.held for part in parts]),
             np.max([part.resolution for part in parts], axis=0),
@@ -65,7 +69,7 @@ class Recorded:
 
     def at(self, samples: NDArray[np.int64]) -> Recorded:
         """Those of some samples."""
-        return replace(self, rows=self.rows[samples], held=self.held[samples])
+        return replace(self, values=self.values[samples], rows=self.rows[samples], held=self.held[samples])
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,7 @@ class Data:
         notes: what was done to the record and what was seen in it.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
         recorded: of the outputs; None: not known.
+        repeated: what is said of files that have samples in common.
     """
 
     u: Array
@@ -91,6 +96,7 @@ class Data:
     notes: tuple[str, ...]
     means: Array | None = None
     recorded: Recorded | None = None
+    repeated: tuple[str, ...] = ()
 
 
 def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Data:
@@ -116,7 +122,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
                     hint=f"its channels are {', '.join(channels)}: write {option}",
                 )
     parts = [_read(path, units, preparation, named=len(paths) > 1) for path in paths]
-    _check_different(paths, parts)
+    recorded = [part.recorded for part in parts if part.recorded is not None]
     references = [part.r for part in parts if part.r is not None]
     return Data(
         np.concatenate([part.u for part in parts]),
@@ -127,7 +133,8 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
         np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
-        Recorded.together([part.recorded for part in parts if part.recorded is not None]),
+        Recorded.together(recorded),
+        tuple(check_different(paths, [one.values for one in recorded])),
     )
 
 
@@ -231,27 +238,9 @@ def recorded_in(signals: Signals, step: float, segments: Sequence[Segment]) -> R
     times = np.concatenate([part.time for part in segments])
     nearest = np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)
     held = np.concatenate([part.held for part in segments])
-    return Recorded(signals.sheet.lines[stamped[nearest]], held, resolution_of(signals.y))
-
-
-def _check_different(paths: Sequence[Path], parts: Sequence[Data]) -> None:
-    """No file holds the samples of another: information counts once.
-
-    Raises:
-        DataError: `data-repeated`.
-    """
-    whole = [np.column_stack([part.u, part.y]).tobytes() for part in parts]
-    for later in range(1, len(parts)):
-        for first in range(later):
-            if whole[later] in whole[first] or whole[first] in whole[later]:
-                raise DataError.because(
-                    "data-repeated",
-                    f"{paths[later].name} and {paths[first].name} hold the same samples: counted twice, "
-                    "they would make the estimate look surer than it is",
-                    "give each record once",
-                    "",
-                    Location(str(paths[later]), 1, 1, ""),
-                )
+    at = stamped[nearest]
+    values = np.column_stack([signals.u, signals.y])[at]
+    return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
 
 
 @contextmanager
