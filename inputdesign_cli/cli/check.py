@@ -26,8 +26,8 @@ def check(
         list[Path] | None,
         typer.Argument(
             metavar="[GOLDEN]...",
-            help="Golden files, or names of those of the package; the default is golden/*.yaml, or else all of "
-            "the package.",
+            help="Golden files, or names of those of the package; the default is golden/*.yaml, or else all "
+            "of the package.",
         ),
     ] = None,
     junit: Annotated[
