@@ -26,7 +26,8 @@ def check(
         list[Path] | None,
         typer.Argument(
             metavar="[GOLDEN]...",
-            help="Golden files; the default is golden/*.yaml, or else those of the package.",
+            help="Golden files, or names of those of the package; the default is golden/*.yaml, or else all "
+            "of the package.",
         ),
     ] = None,
     junit: Annotated[
@@ -44,7 +45,8 @@ def check(
     seconds: dict[tuple[str, str], float] = {}
     stopped: IdesignError | None = None
     try:
-        _compare(files or _default_files(), rows, seconds, quiet=quiet)
+        named = [_found(path) for path in files or ()]
+        _compare(named or _default_files(), rows, seconds, quiet=quiet)
     except IdesignError as error:
         stopped = error
     if junit is not None:
@@ -85,6 +87,22 @@ def _compare(
                 results[run.name] = execute(golden, run)
             seconds[golden.file.stem, run.name] = time.perf_counter() - started
         rows += compare(golden, results)
+
+
+def _found(path: Path) -> Path:
+    """The file of this name, or else that of the package, with or without its ending.
+
+    Raises:
+        DataError: `golden-missing`, there is neither.
+    """
+    if path.exists():
+        return path
+    own = {one.stem: one for one in sorted((shipped() / "golden").glob("*.yaml"))}
+    found = own.get(path.name.removesuffix(".yaml")) if path.parent == Path() else None
+    if found is None:
+        hint = f"check the name and the folder; the package has {', '.join(own)}" if own else "check the name"
+        raise DataError.because("golden-missing", f"there is no golden file {path}", hint)
+    return found
 
 
 def _default_files() -> list[Path]:

@@ -1,6 +1,7 @@
 """From samples to models: prediction-error estimates with their covariance, and tests of the residuals."""
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
+from inputdesign_cli.identification.control_law import Shift as Shift, shifted as shifted
 from inputdesign_cli.identification.directed import (
     Alternative as Alternative,
     Directed as Directed,

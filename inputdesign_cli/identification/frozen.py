@@ -26,6 +26,9 @@ _CHANCE = 1e-4
 _DENSITY = 0.52
 # A filter of two differences passes so much of the mean square of rounding, d^2 / 12.
 _ROUNDING = 6.0 / 12.0
+# A measured input that rests may flicker by a step of its rounding, which moves no output: this share of its
+# standard deviation says nothing.
+_MOVES = 0.1
 # The errors of a simulation hardly span so many of their robust standard deviations.
 _SPAN = 8.0
 
@@ -59,7 +62,7 @@ def frozen(
         simulated: (samples, p).
         lengths: of the stretches without gaps.
     """
-    ends = np.cumsum([0, *lengths])
+    ends, moves = np.cumsum([0, *lengths]), _MOVES * np.std(u, axis=0)
     found = []
     for output, d in enumerate(resolution.tolist()):
         stays = _likely(errors[:, output], d)
@@ -67,7 +70,7 @@ def frozen(
         for start, end in pairwise(ends.tolist()):
             for first, length in _runs(held[start:end, output]):
                 run = slice(start + first, start + first + length)
-                if not np.any(np.diff(u[run][:-1], axis=0)):
+                if not np.any(np.ptp(u[run][:-1], axis=0) > moves):
                     continue
                 by_chance = len(u) * stays ** (length - 1)
                 if by_chance < _CHANCE or np.ptp(simulated[run, output]) > d + _SPAN * size:

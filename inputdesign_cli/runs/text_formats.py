@@ -67,10 +67,15 @@ def csv_text(table: Table) -> str:
     return "\n".join([",".join(columns), *map(",".join, rows)]) + "\n"
 
 
+def shortest(value: float) -> str:
+    """The shortest text of a number from which it can be read back, a whole one without its point."""
+    return repr(value).removesuffix(".0")
+
+
 def _shortest(values: Array) -> list[str]:
     """The shortest text of each of (n,) numbers, a whole one without its point."""
     if not np.all(np.isfinite(values)):
-        return [repr(value).removesuffix(".0") for value in values.tolist()]
+        return [shortest(value) for value in values.tolist()]
     if not values.size:
         return []
     native = np.ascontiguousarray(

@@ -81,9 +81,12 @@ def every_direction(price: NDArray, value: NDArray) -> tuple[Array, ComplexArray
         # Where the price vanishes (S at DC under integral action) the ratio is defined by its limit.
         ratios = np.where(price > 0, quotient, -np.inf)
         return ratios[:, None], np.ones((price.size, 1, 1), dtype=complex)
-    size = np.einsum("naa->n", price).real
+    each = np.einsum("naa->na", price).real
+    size = each.sum(axis=1)
     free = size <= _NOTHING
-    P = price + (_SINGULAR * size + free)[:, None, None] * np.eye(price.shape[-1])
+    # Channel by channel: a share of what a dear one costs would be many times the price of a cheap one.
+    little = _SINGULAR * np.where(each > 0.0, each, size[:, None]) + free[:, None]
+    P = price + little[:, :, None] * np.eye(price.shape[-1])
     inverse = np.linalg.inv(np.linalg.cholesky(P))
     ratios, vectors = np.linalg.eigh(inverse @ value @ inverse.conj().swapaxes(1, 2))
     directions = (inverse.conj().swapaxes(1, 2) @ vectors).swapaxes(1, 2)

@@ -7,6 +7,7 @@ import io
 from collections.abc import Callable, Iterator, Mapping
 
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.text_formats import shortest
 from inputdesign_cli.sweep.plan import Plan
 
 Read = Callable[[str], Mapping[str, Json] | None]
@@ -86,7 +87,7 @@ def scalars(value: Json, path: str = "") -> dict[str, Json]:
 def _cell(value: Json) -> str:
     if value is None:
         return ""
-    return f"{value:.17g}" if isinstance(value, float) else str(value)
+    return shortest(value) if isinstance(value, float) else str(value)
 
 
 def _line(cells: list[str]) -> str:

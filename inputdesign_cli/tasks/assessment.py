@@ -125,7 +125,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
     causes = {
         "unsettled": unsettled(found.estimate),
         "contradicted": [
-            *speaking_against(task.header.units, found),
+            *speaking_against(task, found),
             *differences(found.estimate, [name for name, _ in found.data.files]),
             *contradictions(found.estimate),
             *(notes if met else []),  # more parameters miss it all the more

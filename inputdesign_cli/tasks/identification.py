@@ -13,10 +13,10 @@ from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.identification import Earlier, Estimate, identify as estimate_model
 from inputdesign_cli.information import Experiment
-from inputdesign_cli.plant import Model
+from inputdesign_cli.plant import Model, TransferMatrix
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
-from inputdesign_cli.runs.units import Header, Units
+from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.confidence import Confidence
@@ -27,7 +27,7 @@ from inputdesign_cli.tasks.result.estimates import (
     model_text,
     prior_notes,
 )
-from inputdesign_cli.tasks.result.faults import faults
+from inputdesign_cli.tasks.result.faults import faults, loop_faults
 from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_notes
 
@@ -67,6 +67,7 @@ class Identification:
         operating_point: by channel, what the spec says that signals vary about.
         earlier: the prior as an estimate, which counts along; None where it has no values.
         has_prior: whether it states prior information.
+        controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
     """
@@ -77,6 +78,7 @@ class Identification:
     operating_point: Mapping[str, float]
     earlier: Earlier | None
     has_prior: bool
+    controller: TransferMatrix | None
     at: Callable[[Model, int, Array, str], ModelQuestion]
 
 
@@ -139,11 +141,13 @@ def told(error: IdesignError) -> str:
     return "; ".join(f"{d.message}{f' ({d.hint})' if d.hint else ''}" for d in error.diagnostics)
 
 
-def speaking_against(units: Units, found: Identified) -> list[str]:
+def speaking_against(task: Identification, found: Identified) -> list[str]:
     """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
-    return faults(units, found.estimate, found.data) or [
-        *refutations(found.model, found.estimate),
-        *repetitions(found.estimate, found.data.files),
+    data, estimate = found.data, found.estimate
+    measured = [*faults(task.header.units, estimate, data), *loop_faults(task.controller, data)]
+    return measured or [
+        *refutations(found.model, estimate),
+        *(repetitions(estimate, data.files) or data.repeated),
     ]
 
 
@@ -160,7 +164,7 @@ def identification_results(task: Identification, found: Identified, started: flo
     elif found.preparation.levels:
         result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
-    against = speaking_against(header.units, found)
+    against = speaking_against(task, found)
     notes = identification_notes(found.data.notes, found.model, estimate, against)
     notes += differences(estimate, [name for name, _ in found.data.files])
     notes += prior_notes(estimate, stated=task.has_prior)

@@ -89,6 +89,19 @@ def test_check_of_an_infeasible_run_says_why(run, failing, tmp_path):
     assert out.count("the plant is unstable") == 2
 
 
+@pytest.mark.parametrize("name", ["own", "own.yaml"])
+def test_check_takes_golden_files_of_the_package_by_name(name, run, verbs, monkeypatch, tmp_path):
+    (tmp_path / "package" / "golden").mkdir(parents=True)
+    (tmp_path / "package" / "golden" / "own.yaml").write_text(GOLDEN % "0.2585")
+    monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "package")
+    code, out, _ = run("check", name)
+    assert (code, "2 of 2 quantities agree" in out) == (0, True)
+    code, _, err = run("check", "other.yaml")
+    assert code == 2
+    assert "there is no golden file other.yaml" in err
+    assert "the package has own" in err
+
+
 def test_check_without_golden_files(run, monkeypatch, tmp_path):
     monkeypatch.setattr(sys.modules["inputdesign_cli.cli.check"], "shipped", lambda: tmp_path / "nowhere")
     code, _, err = run("check", "--junit", "report.xml")

@@ -82,3 +82,20 @@ def test_without_noise_or_without_an_input_that_moves_nothing_is_said():
     assert frozen(held, np.array([1e-3]), still, noise, noise, zero, [200]) == []
     assert frozen(held, np.array([1e-3]), noise, zero, zero, zero, [200]) == []
     assert len(frozen(held, np.array([1e-3]), noise, noise, noise, zero, [200])) == 20
+
+
+def test_an_input_that_rests_and_flickers_does_not_move():
+    """A plant at rest under a measured input: neither moves but for the last digit of the input."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.uniform(0.0, 10.0, 20), 30)[:, None]
+    y = scipy.signal.lfilter([0.3], [1, -0.7], u[:, 0])[:, None]
+    y[::30] += rng.standard_normal((20, 1))  # what happens, happens at the steps
+    held = np.concatenate([[[False]], np.abs(y[1:] - y[:-1]) < 0.01])
+    flicker = u + 0.01 * rng.integers(0, 2, u.shape)
+    errors = rng.standard_normal(u.shape)
+    seen = [
+        frozen(held, np.array([0.01]), v, errors, errors, 0.0 * y, [600]) for v in (flicker, 10.0 * flicker)
+    ]
+    assert seen == [[], []]
+    moved = u + rng.uniform(-2.0, 2.0, u.shape)
+    assert frozen(held, np.array([0.01]), moved, errors, errors, 0.0 * y, [600])

@@ -1,9 +1,10 @@
 """The best directions of power at each frequency."""
 
 import numpy as np
+import pytest
 import scipy.linalg
 
-from inputdesign_cli.spectrum.directions import best_directions
+from inputdesign_cli.spectrum.directions import best_directions, every_direction
 
 
 def test_each_frequency_is_judged_by_itself_and_one_without_a_price_is_left_out():
@@ -19,3 +20,24 @@ def test_each_frequency_is_judged_by_itself_and_one_without_a_price_is_left_out(
         np.testing.assert_allclose(np.abs(direction[0] @ directions[n].conj()), 1.0)
     expected = [scipy.linalg.eigh(value[n], price[n], eigvals_only=True)[-1] for n in range(1, 6)]
     np.testing.assert_allclose(ratios[1:], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e-15, 1e9])
+def test_ratios_do_not_depend_on_the_units_of_the_channels(unit):
+    """v^* value v / v^* price v is the same for v and for the same input in another unit."""
+    rng = np.random.default_rng(11)
+    roots = rng.standard_normal((2, 5, 3, 3)) + 1j * rng.standard_normal((2, 5, 3, 3))
+    price, value = roots @ roots.conj().swapaxes(2, 3)
+    expected = np.array(
+        [scipy.linalg.eigh(v, p, eigvals_only=True) for v, p in zip(value, price, strict=True)]
+    )
+    scale = np.diag([1.0, unit, 1.0])
+    ratios, _ = every_direction(scale @ price @ scale, scale @ value @ scale)
+    np.testing.assert_allclose(ratios, expected, rtol=1e-9)
+
+
+def test_a_dear_channel_does_not_make_a_cheap_one_dearer():
+    """By adding a share of what all cost to each, a bound on every spectrum was off by 2e6."""
+    price, value = np.diag([1e30, 1.0])[None], np.diag([1e30, 2.0])[None]
+    ratios, _ = best_directions(price, value)
+    np.testing.assert_allclose(ratios, 2.0, rtol=1e-9)

@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +12,7 @@ from inputdesign_cli.compute.processes import Processes
 from inputdesign_cli.errors import DataError, InfeasibleError, OutputError, SpecError
 from inputdesign_cli.sweep.layout import Layout
 from inputdesign_cli.sweep.running import list_points, sweep
-from inputdesign_cli.sweep.table import scalars
+from inputdesign_cli.sweep.table import scalars, table_lines
 from tests.support.processes import running
 from tests.support.sweep_files import rows, timeless_files, timeless_rows
 
@@ -211,6 +212,24 @@ def test_the_table_holds_short_lists_and_no_long_ones():
         "a[0]": 1.0, "a[1]": 2.0, "moments.R[0][0]": 1.0, "moments.R[0][1]": 2.0,
         "moments.R[1][0]": 2.0, "moments.R[1][1]": 3.0,
     }  # fmt: skip
+
+
+def test_a_number_has_the_fewest_digits_that_can_be_read_back():
+    """0.1 and a third in the digits of Python, a whole number without its point."""
+    plan = SimpleNamespace(grid=Points(), key=lambda index: str(index))
+    result = {"status": "optimal", "a": 0.1, "b": 1 / 3, "c": 2.0, "n": 7}
+    head, row = table_lines(plan, lambda key: result)
+    found = dict(zip(head.strip().split(","), row.strip().split(","), strict=True))
+    assert [found[name] for name in "abcn"] == ["0.1", "0.3333333333333333", "2", "7"]
+
+
+class Points(list):
+    """A grid of one point along one axis."""
+
+    axes = (SimpleNamespace(key="samples"),)
+
+    def __init__(self):
+        super().__init__([("100",)])
 
 
 def test_processes_give_what_one_process_gives(spec, tmp_path):

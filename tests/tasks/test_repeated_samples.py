@@ -5,6 +5,10 @@ import pytest
 import scipy.signal
 
 from inputdesign_cli import assess, parse_spec
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.tasks import explore
+from inputdesign_cli.tasks.build.copies import shared
+from inputdesign_cli.tasks.build.preparation import Preparation
 
 SPEC = """
 plant: {B: [0, 3.6], F: [1, -0.7]}
@@ -53,3 +57,42 @@ def test_the_same_input_applied_twice_counts_twice(saved):
     second[:, 0] = first[:, 0]
     found = assess(parse_spec(SPEC), [saved("a.csv", first), saved("b.csv", second)])
     assert found.verdict == "met"
+
+
+def with_empty_cells(rows, every):
+    emptied = rows.copy()
+    emptied[::every, 1] = np.nan
+    return emptied
+
+
+@pytest.mark.parametrize("every", [12, 25, 60])
+@pytest.mark.parametrize("options", [{}, {"preparation": Preparation(detrend="constant")}])
+def test_a_copy_with_empty_cells_is_refused(every, options, saved):
+    rows = rows_of(3)
+    files = [saved("a.csv", rows), saved("b.csv", with_empty_cells(rows, every))]
+    for given in (files, files[::-1]):
+        with pytest.raises(DataError, match="hold the same samples") as caught:
+            assess(parse_spec(SPEC), given, **options)
+        assert caught.value.diagnostics[0].code == "data-repeated"
+    with pytest.raises(DataError, match="hold the same samples"):
+        explore(files)
+
+
+def test_a_part_with_empty_cells_leaves_the_verdict_open(saved):
+    first, second = rows_of(3), rows_of(4)
+    second[200:400] = with_empty_cells(first, 25)[100:300]
+    found = assess(parse_spec(SPEC), [saved("a.csv", first), saved("b.csv", second)])
+    assert found.verdict == "undecided"
+    (told, *_) = [r for r in found.results.result["assessment"]["undecided"] if "stand in a.csv too" in r]
+    assert told.startswith("192 of 492 samples of b.csv")
+
+
+def test_rests_and_coarse_steps_come_again_by_themselves():
+    """Rows that are alike by rounding, and an input that is applied twice, make no copy."""
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)[:, None]
+    y = scipy.signal.lfilter([0.2], [1, -0.8], u, axis=0)
+    one, other = (np.column_stack([u, np.round(y + 0.5 * rng.standard_normal(y.shape))]) for _ in range(2))
+    assert shared(one, other).mean() < 0.05
+    rest = np.zeros((100, 2))
+    assert not shared(np.concatenate([rest, one]), np.concatenate([rest, other[::-1]]))[:100].any()

@@ -81,6 +81,22 @@ def time_unit_of(name: str) -> str | None:
     return _UNITS.get(words[-1]) if len(words) > 1 else None
 
 
+def time_unit_in(sheet: Sheet, name: str) -> str | None:
+    """The unit of times that a file states: in the name of their column, or beside its sample time.
+
+    Raises:
+        DataError: `data-wrong-unit`, it is none of ours.
+    """
+    said = sheet.pace.unit
+    if time_unit_of(name) or not said:
+        return time_unit_of(name)
+    unit = _UNITS.get(said.strip().lower())
+    if unit is None:
+        message = f"{sheet.path.name} states its times in {said!r}, which is none of {', '.join(TIME_UNITS)}"
+        raise DataError(sheet.error("data-wrong-unit", message, "say which it is: --time-unit s"))
+    return unit
+
+
 def with_names(sheet: Sheet, units: Units, preparation: Preparation) -> Preparation:
     """Columns that are called as the spec calls a channel are its columns, where nothing else says which."""
     named = {}

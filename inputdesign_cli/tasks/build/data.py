@@ -18,11 +18,13 @@ from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.columns import (
     other_units,
     reference_columns,
-    time_unit_of,
+    time_unit_in,
     unused_columns,
     with_headers,
     with_names,
 )
+from inputdesign_cli.tasks.build.copies import check_different
+from inputdesign_cli.tasks.build.far_off import outliers, strange_values
 from inputdesign_cli.tasks.build.files import read_sheet
 from inputdesign_cli.tasks.build.passed_over import passed_over
 from inputdesign_cli.tasks.build.preparation import (
@@ -32,9 +34,7 @@ from inputdesign_cli.tasks.build.preparation import (
     Segment,
     jitter,
     limits_of_sensor,
-    outliers,
     resampled,
-    standing_alone,
     trend,
     whole_segments,
 )
@@ -46,11 +46,13 @@ class Recorded:
     """The outputs as they stand in the files.
 
     Attributes:
+        values: (samples, r + p), of inputs and outputs as they stand in the file.
         rows: (samples,), where each sample stands; the nearest one, where times were evened out.
         held: (samples, p), whether a value is that of the sample before.
         resolution: (p,), the step in which each is recorded.
     """
 
+    values: Array
     rows: NDArray[np.int64]
     held: NDArray[np.bool_]
     resolution: Array
@@ -59,6 +61,7 @@ class Recorded:
     def together(cls, parts: Sequence[Recorded]) -> Recorded:
         """Those of several files, one after the other."""
         return cls(
+            np.concatenate([part.values for part in parts]),
             np.concatenate([part.rows for part in parts]),
             np.concatenate([part.held for part in parts]),
             np.max([part.resolution for part in parts], axis=0),
@@ -66,7 +69,7 @@ class Recorded:
 
     def at(self, samples: NDArray[np.int64]) -> Recorded:
         """Those of some samples."""
-        return replace(self, rows=self.rows[samples], held=self.held[samples])
+        return replace(self, values=self.values[samples], rows=self.rows[samples], held=self.held[samples])
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,7 @@ class Data:
         notes: what was done to the record and what was seen in it.
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
         recorded: of the outputs; None: not known.
+        repeated: what is said of files that have samples in common.
     """
 
     u: Array
@@ -92,6 +96,7 @@ class Data:
     notes: tuple[str, ...]
     means: Array | None = None
     recorded: Recorded | None = None
+    repeated: tuple[str, ...] = ()
 
 
 def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Data:
@@ -117,7 +122,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
                     hint=f"its channels are {', '.join(channels)}: write {option}",
                 )
     parts = [_read(path, units, preparation, named=len(paths) > 1) for path in paths]
-    _check_different(paths, parts)
+    recorded = [part.recorded for part in parts if part.recorded is not None]
     references = [part.r for part in parts if part.r is not None]
     return Data(
         np.concatenate([part.u for part in parts]),
@@ -128,7 +133,8 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         tuple(file for part in parts for file in part.files),
         tuple(note for part in parts for note in part.notes),
         np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
-        Recorded.together([part.recorded for part in parts if part.recorded is not None]),
+        Recorded.together(recorded),
+        tuple(check_different(paths, [one.values for one in recorded])),
     )
 
 
@@ -146,16 +152,17 @@ def prepared(
     """
     sheet, rows, told = signals.sheet, signals.sheet.lines, list[str]()
     time = signals.time if signals.name else signals.time * step
-    for names, values in ((signals.inputs, signals.u), (signals.outputs, signals.y)):
-        for name, x in zip(names, values.T, strict=True):
-            there = ~np.isnan(x)
-            far = outliers(name, x[there], rows[there])
-            told += far
-            if names is signals.outputs:
-                told += [] if far else standing_alone(name, x[there], rows[there])
-                told += limits_of_sensor(name, x[there])
+    for name, x in zip(signals.inputs, signals.u.T, strict=True):
+        there = ~np.isnan(x)
+        told += outliers(name, x[there], rows[there])
+    for name, x in zip(signals.outputs, signals.y.T, strict=True):
+        there = ~np.isnan(x)
+        told += strange_values(name, x[there], signals.u[there], rows[there])
+        told += limits_of_sensor(name, x[there])
     apart, lines = passed_over(sheet, timed=bool(signals.name))
-    segments, cuts = whole_segments(time, signals.u, signals.y, step, apart, resample=preparation.resample)
+    segments, cuts = whole_segments(
+        time, signals.u, signals.y, step, apart, rows, resample=preparation.resample
+    )
     told = [*lines, *cuts, *told]
     off = jitter(segments, step)
     if off > EVEN:
@@ -231,27 +238,9 @@ def recorded_in(signals: Signals, step: float, segments: Sequence[Segment]) -> R
     times = np.concatenate([part.time for part in segments])
     nearest = np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)
     held = np.concatenate([part.held for part in segments])
-    return Recorded(signals.sheet.lines[stamped[nearest]], held, resolution_of(signals.y))
-
-
-def _check_different(paths: Sequence[Path], parts: Sequence[Data]) -> None:
-    """No file holds the samples of another: information counts once.
-
-    Raises:
-        DataError: `data-repeated`.
-    """
-    whole = [np.column_stack([part.u, part.y]).tobytes() for part in parts]
-    for later in range(1, len(parts)):
-        for first in range(later):
-            if whole[later] in whole[first] or whole[first] in whole[later]:
-                raise DataError.because(
-                    "data-repeated",
-                    f"{paths[later].name} and {paths[first].name} hold the same samples: counted twice, "
-                    "they would make the estimate look surer than it is",
-                    "give each record once",
-                    "",
-                    Location(str(paths[later]), 1, 1, ""),
-                )
+    at = stamped[nearest]
+    values = np.column_stack([signals.u, signals.y])[at]
+    return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
 
 
 @contextmanager
@@ -282,7 +271,7 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         DataError: `data-wrong-unit` or `data-not-uniform`.
     """
     sheet = signals.sheet
-    unit = None if signals.dated or preparation.time_unit else time_unit_of(signals.name)
+    unit = None if signals.dated or preparation.time_unit else time_unit_in(sheet, signals.name)
     if unit is not None and unit != units.time_unit:
         message = f"the times are in {unit}, but the spec counts in {units.time_unit}"
         hint = f"add --time-unit {unit} to convert them, or set time_unit: {unit} (and sample_time in it)"
@@ -290,6 +279,8 @@ def _check_steps(signals: Signals, units: Units, preparation: Preparation) -> No
         raise DataError.because("data-wrong-unit", message, hint, "time_unit", place)
     steps = np.diff(signals.time[~np.isnan(signals.time)]) if signals.name else np.zeros(0)
     stated = stated_step(sheet, preparation)
+    if stated is not None and preparation.time_unit is not None:
+        stated *= SECONDS[preparation.time_unit] / SECONDS[units.time_unit]
     typical = stated or (float(np.median(steps)) if steps.size else units.sample_time)
     if abs(typical - units.sample_time) <= (EVEN if stated else MOST_JITTER) * units.sample_time:
         return

@@ -15,6 +15,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
+from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
@@ -43,6 +44,7 @@ def build_identification(spec: Spec) -> Identification:
     stated = stated_prior(spec)
     if stated is not None:
         stated.over(spec, nominal.names)  # says what does not fit before any data are read
+    controller = spec.experiment.controller
     record_step(spec)  # says where samples are too far apart for the plant
     return Identification(
         header=build_header(spec),
@@ -51,6 +53,9 @@ def build_identification(spec: Spec) -> Identification:
         operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
+        controller=None
+        if controller is None
+        else controller_matrix(controller, spec.sample_time, (nominal.inputs, nominal.outputs)),
         at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
     )
 

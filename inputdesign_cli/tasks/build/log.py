@@ -11,7 +11,8 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.columns import time_unit_of, with_headers
+from inputdesign_cli.tasks.build.columns import time_unit_in, with_headers
+from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
@@ -66,11 +67,16 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = with_headers(sheet, replace(preparation, columns=columns))
     signals = signals_of(sheet, counts["u"], counts["y"], given)
-    unit = "s" if signals.dated else preparation.time_unit or time_unit_of(signals.name) or "s"
+    unit = "s" if signals.dated else preparation.time_unit or time_unit_in(sheet, signals.name) or "s"
     told = []
     stated = stated_step(sheet, preparation)
     if signals.name and not preparation.sample_time:
         step = _typical(signals.time)
+        if stated and abs(step - stated) > _ROUND * stated:
+            told.append(
+                f"{path.name} states the sample time {stated:g}, and its times advance by {step:g}: "
+                "they count"
+            )
     elif stated:
         step = stated
         _check_apart(sheet, signals, step)
@@ -177,7 +183,7 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
     """Several files of the same channels and sample time, one after the other.
 
     Raises:
-        DataError: see `read_log`; or the files differ.
+        DataError: see `read_log`; the files differ, or hold the same samples.
     """
     logs = [read_log(path, preparation) for path in paths]
     first = logs[0]
@@ -198,10 +204,13 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
         first.names,
         first.step,
         first.time_unit,
-        tuple(
-            f"{path.name}: {step}" if len(paths) > 1 else step
-            for path, log in zip(paths, logs, strict=True)
-            for step in log.steps
+        (
+            *check_different(paths, [log.recorded.values for log in logs]),
+            *(
+                f"{path.name}: {step}" if len(paths) > 1 else step
+                for path, log in zip(paths, logs, strict=True)
+                for step in log.steps
+            ),
         ),
         Recorded.together([log.recorded for log in logs]),
     )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from inputdesign_cli.tasks.build import rows
 from inputdesign_cli.tasks.build.files import Sheet
 from inputdesign_cli.tasks.build.files.layout import BLANK, COMMENT, COMMENTED, LEFT_OUT, SPACING
 
-_SHOWN = 5
 _WORDS = {
     BLANK: ("blank line", "blank lines"),
     COMMENTED: ("row that is commented out", "rows that are commented out"),
@@ -31,8 +31,7 @@ def passed_over(sheet: Sheet, *, timed: bool) -> tuple[NDArray[np.bool_], list[s
         cuts = kind in LEFT_OUT and not timed
         if cuts:
             apart[np.searchsorted(sheet.lines, lines)] = True
-        listed = ", ".join(map(str, lines[:_SHOWN])) + (", .." if len(lines) > _SHOWN else "")
-        at = f"line{'s' * (len(lines) > 1)} {listed}"
+        at = rows.told(lines, "line")
         what = f"{len(lines)} {one if len(lines) == 1 else several} between the numbers ({at})"
         if cuts:
             told.append(f"{what}: samples may be missing there, so the record is cut")

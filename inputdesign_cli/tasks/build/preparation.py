@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
+from inputdesign_cli.tasks.build import rows
 
 Detrend = Literal["none", "constant", "linear", "auto"]
 DETRENDS: dict[str, Detrend] = {"none": "none", "constant": "constant", "linear": "linear", "auto": "auto"}
@@ -21,9 +21,6 @@ MOST_JITTER = 0.1
 # A longer step is a gap; with `resample` it may be longer before it is one.
 _GAP, _LONG_GAP = 1.5, 3.0
 _SHORTEST = 10
-# Farther from the median than this many (robust) standard deviations: most likely not of this experiment.
-_OUTLYING = 8.0
-_SHOWN = 5
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
 _COARSE = 0.1
@@ -79,7 +76,14 @@ class Segment:
 
 
 def whole_segments(
-    time: Array, u: Array, y: Array, step: float, apart: NDArray[np.bool_], *, resample: bool
+    time: Array,
+    u: Array,
+    y: Array,
+    step: float,
+    apart: NDArray[np.bool_],
+    lines: NDArray[np.int64],
+    *,
+    resample: bool,
 ) -> tuple[list[Segment], list[str]]:
     """The stretches between gaps: missing numbers, steps of time that are too long, and where they are apart.
 
@@ -90,24 +94,27 @@ def whole_segments(
         u, y: (n, r), (n, p), NaN where a number is missing.
         step: the sample time.
         apart: (n,), whether a stretch ends before a row, whatever its time.
+        lines: (n,), the number of each row in the file.
     """
     told = []
     whole = ~np.isnan(np.column_stack([time, u, y])).any(axis=1)
-    missing = int((~whole).sum())
+    missing = lines[~whole]
     kept = np.flatnonzero(whole)
     cut = (np.diff(kept) > 1) | apart[kept[1:]]
     long = np.diff(time[kept]) > (_LONG_GAP if resample else _GAP) * step
     parts = np.split(kept, np.flatnonzero(cut | long) + 1)
-    if missing:
-        told.append(f"{missing} rows with a missing number were left out")
-    if int((long & ~cut).sum()):
-        told.append(f"the time has {int((long & ~cut).sum())} gaps")
+    if missing.size:
+        count, were = ("1 row", "was") if missing.size == 1 else (f"{missing.size} rows", "were")
+        told.append(f"{count} with a missing number {were} left out ({rows.told(missing)})")
+    gaps = lines[kept[1:]][long & ~cut]
+    if gaps.size:
+        told.append(f"the time has {gaps.size} gap{'s' * (gaps.size > 1)} (before {rows.told(gaps)})")
     if len(parts) > 1:
         longer = [part for part in parts if len(part) >= _SHORTEST] or [max(parts, key=len)]
-        left = sum(map(len, parts)) - sum(map(len, longer))
+        left = [line for part in parts if not any(part is one for one in longer) for line in lines[part]]
         told.append(
             f"the record is {len(longer)} segment{'s' * (len(longer) > 1)}, each with a start of its own"
-            + (f"; {left} samples in shorter ones were left out" if left else "")
+            + (f"; {len(left)} samples in shorter ones were left out ({rows.told(left)})" if left else "")
         )
         parts = longer
     return [Segment.recorded(time[part], u[part], y[part]) for part in parts], told
@@ -139,36 +146,6 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
         if kind == "linear" or np.sum((x - line) ** 2) < 0.5 * np.sum((x - level) ** 2):
             return line, f"a line from {line[0]:.6g} to {line[-1]:.6g}"
     return level, f"the mean {level[0]:.6g}"
-
-
-def outliers(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
-    """Values far from the median of a signal x (n,), with their rows in the file."""
-    middle, spread = np.median(x), spread_of(x)
-    if spread <= 0.0:
-        return []
-    found = np.flatnonzero(np.abs(x - middle) > _OUTLYING * spread)
-    if not found.size or found.size > OFTEN * x.size:
-        return []
-    listed = ", ".join(str(rows[i]) for i in found[:_SHOWN]) + (", .." if found.size > _SHOWN else "")
-    return [
-        f"{name} has {found.size} outlying value{'s' * (found.size > 1)} (row {listed}): look at the record"
-    ]
-
-
-def standing_alone(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
-    """More values of a measured signal x (n,) than outliers are, each far from its neighbours: spikes."""
-    if x.size < _SHORTEST:
-        return []
-    near = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
-    off = np.abs(x[2:-2] - near)
-    found = 2 + np.flatnonzero(off > _OUTLYING * 1.4826 * np.median(off))
-    if not np.median(off) > 0.0 or found.size <= OFTEN * x.size:
-        return []
-    listed = ", ".join(str(rows[i]) for i in found[:_SHOWN])
-    return [
-        f"{name} has {found.size} values ({100 * found.size / x.size:.2g} %) far from their neighbours (row "
-        f"{listed}, ..): spikes? Look at the record, and empty the cells that are faults of measurement"
-    ]
 
 
 def limits_of_sensor(name: str, x: Array) -> list[str]:

@@ -58,7 +58,7 @@ def signals_of(
             raise DataError(sheet.error("data-not-a-number", message, "is it another column?", 0))
     rows = np.arange(min(preparation.skip, len(sheet.lines)), len(sheet.lines))
     time = found.get("time", np.arange(len(sheet.lines), dtype=float))
-    scale = 1.0 if "time" in found else preparation.sample_time or sheet.sample_time or 1.0
+    scale = 1.0 if "time" in found else preparation.sample_time or sheet.pace.sample_time or 1.0
     if preparation.span is not None:
         begin, end = preparation.span
         rows = rows[(time[rows] * scale >= begin) & (time[rows] * scale <= end)]
@@ -122,10 +122,15 @@ def stated_step(sheet: Sheet, preparation: Preparation) -> float | None:
     Raises:
         DataError: `data-not-uniform`, that of the file is no length of time.
     """
-    stated = preparation.sample_time or sheet.sample_time
-    if stated is None or 0.0 < stated < np.inf:
+    if preparation.sample_time:
+        return preparation.sample_time
+    stated, fault = sheet.pace.sample_time, sheet.pace.fault
+    if not fault and (stated is None or 0.0 < stated < np.inf):
         return stated
-    message = f"{sheet.path.name} states the sample time {stated:g}, which is no positive number"
+    wrong = (
+        f"no sample time: {fault}" if fault else f"the sample time {stated:g}, which is no positive number"
+    )
+    message = f"{sheet.path.name} states {wrong}"
     hint = "mend it in the file, or give the one that holds: --sample-time 0.5"
     raise DataError(sheet.error("data-not-uniform", message, hint))
 

@@ -101,11 +101,7 @@ def columns_of(sheet: Sheet, wanted: Mapping[str, str]) -> dict[str, Array]:
             row, text = fault
             shown = repr(text) if sheet.shown else "a value"
             message = f"{shown} in column {wanted[role]} {sheet.columns[at].wrong}"
-            hint = (
-                "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between "
-                "thousands, one row a line; dates as 2024-03-12 10:15:00"
-            )
-            raise DataError(sheet.error("data-not-a-number", message, hint, row))
+            raise DataError(sheet.error("data-not-a-number", message, sheet.columns[at].hint, row))
     return {role: sheet.columns[at].numbers for role, (at,) in found.items()}
 
 

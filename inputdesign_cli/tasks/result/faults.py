@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from inputdesign_cli.identification import Estimate, frozen, spikes
+from inputdesign_cli.identification import Estimate, frozen, shifted, spikes
+from inputdesign_cli.plant import TransferMatrix
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.build.data import Data
 
@@ -40,6 +41,25 @@ def _frozen(units: Units, estimate: Estimate, data: Data) -> list[str]:
             "these cells, which cuts the record there, and try again"
         )
     return told
+
+
+def loop_faults(controller: TransferMatrix | None, data: Data) -> list[str]:
+    """A sentence where signals obey the controller of the loop at another time than they were logged at."""
+    if controller is None or data.r is None:
+        return []
+    told = []
+    for one in shifted(controller, data.u, data.y, data.r, data.lengths):
+        several = data.u.shape[1] > 1 and one.letter != "y"
+        name = f"{one.letter}{one.channel + 1}" if several else one.letter
+        count = abs(one.lag)
+        when = f"{count} sample{'s' * (count > 1)} {'late' if one.lag > 0 else 'early'}"
+        told.append(
+            f"{name} was logged {when}: the controller of the spec, u = r - C y, leaves "
+            f"{100 * one.left:.3g} % of u as the columns stand, and {100 * one.then:.2g} % with {name} "
+            "moved; a model of the loop would take the shift for a delay: move the column, or mend the "
+            "controller of the spec"
+        )
+    return list(dict.fromkeys(told))
 
 
 def _file(data: Data, at: int) -> str:

@@ -30,9 +30,20 @@ def test_missing_numbers_and_gaps_cut_the_record(tmp_path):
     assert found.lengths == (20, 19, 20)
     np.testing.assert_allclose(found.y[:, 0], np.delete(Y, 20))
     told = " ".join(found.notes)
-    assert "1 rows with a missing number" in told
-    assert "1 gaps" in told
+    # Line 1 of the file is the header.
+    assert "1 row with a missing number was left out (row 22)" in told
+    assert "1 gap (before row 42)" in told
     assert "3 segments" in told
+
+
+def test_what_is_left_out_is_told_with_its_rows(tmp_path):
+    y = Y.copy()
+    y[[5, 6, 7, 20, 50, 55]] = np.nan
+    told = read(tmp_path / "a.csv", y=y).notes
+    assert "6 rows with a missing number were left out (rows 7 to 9, 22, 52, 57)" in told
+    assert any(
+        "13 samples in shorter ones were left out (rows 2 to 6, 53 to 56, 58 to 61)" in t for t in told
+    )
 
 
 def test_an_even_record_is_left_alone(tmp_path):
@@ -112,7 +123,7 @@ BETWEEN = {
     "": ((20,), (20,), ""),
     "\n": ((10, 10), (20,), "1 blank line between the numbers (line 12)"),
     "\n  \n": ((10, 10), (20,), "2 blank lines between the numbers (lines 12, 13)"),
-    ",,\n": ((10, 10), (10, 10), "1 rows with a missing number"),
+    ",,\n": ((10, 10), (10, 10), "1 row with a missing number was left out (row 12)"),
     "# 10.2,1.0,2.0\n": ((10, 10), (20,), "1 row that is commented out between the numbers (line 12)"),
     "# a pause\n": ((20,), (20,), "1 comment between the numbers (line 12) passed over"),
 }
@@ -186,3 +197,15 @@ def test_a_column_that_may_hold_the_times_is_told(tmp_path):
     (first, second, *_) = read_log(path, Preparation()).steps
     assert first.startswith("the file has no times")
     assert second.startswith("Sekunden rises by even steps")
+
+
+def test_a_stated_sample_time_is_converted_as_times_are(tmp_path):
+    """Thirty seconds are half a minute, whether the file or the user says so."""
+    units = Units("s", 30.0, sampled=True, closed_loop=False, inputs=1, outputs=1)
+    np.savez(tmp_path / "a.npz", u=U, y=Y, Ts=0.5)
+    np.savez(tmp_path / "b.npz", u=U, y=Y)
+    assert read_data([tmp_path / "a.npz"], units, Preparation(time_unit="min")).lengths == (N,)
+    stated = Preparation(time_unit="min", sample_time=0.5)
+    assert read_data([tmp_path / "b.npz"], units, stated).lengths == (N,)
+    with pytest.raises(DataError, match=r"sampled every 0\.5 s"):
+        read_data([tmp_path / "a.npz"], units, Preparation())

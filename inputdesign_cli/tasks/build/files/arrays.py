@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import isolated
+from inputdesign_cli.tasks.build.files.pace import is_sample_time, pace_of
 from inputdesign_cli.tasks.build.files.sheet import Sheet, of_arrays, unreadable
 
 _MOST_BYTES = 2**30
 _SHOWN = 5
 _OBJECT = "an object"
-_SAMPLE_TIMES = ("ts", "sample_time", "dt")
 _CONVERT = (
     "in MATLAB: s = struct('u', data.InputData, 'y', data.OutputData, 'Ts', data.Ts);  "
     "then: save('data.mat', '-struct', 's', '-v7')"
@@ -42,8 +42,7 @@ def read_npz(path: Path, key: str, raw: bytes) -> Sheet:
     except Exception:  # whatever a broken archive leads the reader to
         hint = "write it with numpy.savez(file, u=.., y=..)"
         raise unreadable(path, key, "is no .npz file of numbers", hint) from None
-    kept, left_out = isolated.divided(arrays)
-    return _sheet(path, key, isolated.Arrays(kept, left_out=left_out))
+    return _sheet(path, key, isolated.divided(arrays))
 
 
 def _loaded(archive: Mapping[str, NDArray], name: str) -> NDArray:
@@ -70,18 +69,16 @@ def read_mat(path: Path, key: str, raw: bytes) -> Sheet:
 
 
 def _sheet(path: Path, key: str, found: isolated.Arrays) -> Sheet:
-    """Scalars called Ts, sample_time or dt are the sample time; the signals are what has several rows.
+    """The signals are what has several rows.
 
     Raises:
         DataError: `data-unreadable`, nothing has.
     """
-    signals, times, left_out = [], list[float](), dict(found.left_out)
+    signals, left_out = [], dict(found.left_out)
     for name, value in found.arrays.items():
         if value.size > 1:
             signals.append((name, value))
-        elif name.lower() in _SAMPLE_TIMES:
-            times.append(float(np.ravel(value)[0]))
-        else:
+        elif not is_sample_time(name):
             left_out[name] = "a single number"
     if found.opaque:
         left_out[_OBJECT] = "what only MATLAB reads"
@@ -91,5 +88,4 @@ def _sheet(path: Path, key: str, found: isolated.Arrays) -> Sheet:
         raise unreadable(path, key, f"holds no arrays of numbers{f' ({told})' if told else ''}", hint)
     if found.opaque:
         left_out[_OBJECT] += f" ({_CONVERT})"
-    sheet = of_arrays(path, key, signals, times[0] if times else None)
-    return replace(sheet, left_out=left_out)
+    return replace(of_arrays(path, key, signals), left_out=left_out, pace=pace_of(found))

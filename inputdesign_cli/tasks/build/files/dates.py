@@ -18,6 +18,12 @@ _DAYS = (
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S,%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M %p")
 # How they all begin, those of ISO 8601 included.
 _BEGIN = re.compile(r"\d{1,4}([./-]\d|[- ]\w{3}[- ]|:\d\d)|\d{8}T|\d{4}-?W\d")
+# What to write, for messages.
+AS_DATES = (
+    "write all of them in one way, the year first: 2024-03-12 10:15:00; or 12.03.2024 10:15:00, 03/12/2024 "
+    "10:15 AM, 12-Mar-2024 10:15:00, where they tell day from month; or as seconds"
+)
+_CLOCK = re.compile(r"\d:\d\d")
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,11 @@ def moments_of(cells: Sequence[str]) -> Moments | None:
         if moments is not None and not any(np.array_equal(moments, other) for other in found):
             found.append(moments)
     return Moments(found[0] if len(found) == 1 else None) if found else None
+
+
+def seems_moment(text: str) -> bool:
+    """Whether a text begins as dates and times do, or has a time of a day in it."""
+    return _BEGIN.match(text) is not None or _CLOCK.search(text) is not None
 
 
 def is_moment(text: str) -> bool:

@@ -20,7 +20,10 @@ _MARKS = (
 _LOOKED_AT = 4096
 # Digits and Latin letters in UTF-16 have a zero in one of their two bytes.
 _MOSTLY, _HARDLY = 0.4, 0.05
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1b]")
+# Stretches of characters that no text has, and of what stands in place of bytes that are no text.
+_CONTROL, _UNDECODED = re.compile(r"([\x00-\x08\x0e-\x1b])\1*"), re.compile("\ufffd+")
+# More of them, and more than this share, are no faults in a text: it is none.
+_FEW, _RARE = 3, 0.01
 # What some loggers leave where a file ended early, or where DOS ended it.
 _FILLING = "\x00\x1a"
 
@@ -31,16 +34,16 @@ def decoded(path: Path, key: str, raw: bytes) -> str:
     Raises:
         DataError: `data-unreadable`; it is no text.
     """
-    text = None
-    for encoding in _encodings(raw):
+    encodings = _encodings(raw)
+    for encoding in encodings:
         try:
             text = raw.decode(encoding).rstrip(_FILLING)
-            break
         except UnicodeDecodeError:
             continue
-    if text is None or _CONTROL.search(text):
-        raise _no_text(path, key)
-    return text
+        if _CONTROL.search(text):
+            raise _no_text(path, key, text, _CONTROL)
+        return text
+    raise _no_text(path, key, raw.decode(encodings[-1], errors="replace"), _UNDECODED)
 
 
 def _encodings(raw: bytes) -> list[str]:
@@ -56,10 +59,21 @@ def _encodings(raw: bytes) -> list[str]:
     return ["utf-8", "cp1252"]
 
 
-def _no_text(path: Path, key: str) -> DataError:
-    return unreadable(
-        path,
-        key,
-        "is no text (in UTF-8, UTF-16 or Windows-1252)",
-        "name a CSV file; arrays have the ending .mat or .npz, tables .xlsx or .parquet",
+def _no_text(path: Path, key: str, text: str, wrong: re.Pattern[str]) -> DataError:
+    """The error about what is no text at all, or a text with a few faults: the line of the first."""
+    others = sum(1 for one in (_CONTROL, _UNDECODED) for _ in one.finditer(text))
+    if others > max(_FEW, _RARE * len(text)):
+        what = "is no text (in UTF-8, UTF-16 or Windows-1252)"
+        hint = "name a CSV file; arrays have the ending .mat or .npz, tables .xlsx or .parquet"
+        return unreadable(path, key, what, hint)
+    first = next(wrong.finditer(text))
+    line = len(f"{text[: first.start()]}|".splitlines())
+    count = len(first[0])
+    character = f"{count} control character{'s' * (count > 1)} (code {ord(first[0][0])})"
+    if wrong is _UNDECODED:
+        character = "bytes that are no letters in UTF-8 or Windows-1252"
+    hint = (
+        "a logger that lost its power leaves such characters: take the line out, with times or a blank line "
+        "to tell that samples are missing there; or save the file as UTF-8"
     )
+    return unreadable(path, key, f"is no clean text: line {line} has {character}", hint, line)

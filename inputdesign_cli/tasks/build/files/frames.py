@@ -34,8 +34,8 @@ def read_frame(path: Path, key: str, raw: bytes) -> Sheet:
     except Exception:  # whatever a broken file leads the reader to
         raise unreadable(path, key, f"is not {kind} that can be read", "save it as CSV") from None
     arrays = {str(name): np.asarray(frame[name]) for name in frame}
-    kept, left_out = divided({name: _bare(array) for name, array in arrays.items()})
-    return replace(of_arrays(path, key, list(kept.items())), left_out=left_out)
+    found = divided({name: _bare(array) for name, array in arrays.items()})
+    return replace(of_arrays(path, key, list(found.arrays.items())), left_out=found.left_out)
 
 
 def _bare(array: NDArray) -> NDArray:

@@ -8,13 +8,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 BROKEN, NEWER = "broken", "version 7.3"
+NOTHING, _TEXT = "nothing", "text"
 # The fields of a saved iddata, and how its columns are called here.
 _IDDATA = {"inputdata": "u", "outputdata": "y", "samplinginstants": "time"}
 _COMMAND = f"from {__name__} import answer; answer()"
@@ -24,13 +25,14 @@ _COMMAND = f"from {__name__} import answer; answer()"
 class Arrays:
     """The arrays of numbers in a file; a `fault` where it cannot be read, `opaque` if MATLAB alone can.
 
-    `left_out` says of the others, by name, what they hold.
+    `left_out` says of the others, by name, what they hold; `texts` are those that are a single text.
     """
 
     arrays: Mapping[str, NDArray] = field(default_factory=dict)
     fault: str = ""
     opaque: bool = False
     left_out: Mapping[str, str] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
 
 
 def arrays_of(raw: bytes) -> Arrays:
@@ -50,7 +52,7 @@ def arrays_of(raw: bytes) -> Arrays:
         return Arrays(fault=told["fault"])
     with np.load(io.BytesIO(rest), allow_pickle=False) as found:
         arrays = {name: found[f"arr_{i}"] for i, name in enumerate(told["names"])}
-    return Arrays(arrays, opaque=told["opaque"], left_out=told["left_out"])
+    return Arrays(arrays, opaque=told["opaque"], left_out=told["left_out"], texts=told["texts"])
 
 
 def answer() -> None:
@@ -61,6 +63,7 @@ def answer() -> None:
         "opaque": found.opaque,
         "names": list(found.arrays),
         "left_out": dict(found.left_out),
+        "texts": dict(found.texts),
     }
     sys.stdout.buffer.write(json.dumps(told).encode() + b"\n")
     buffer = io.BytesIO()
@@ -85,8 +88,7 @@ def _loaded(raw: bytes) -> Arrays:
         if not name.startswith("__"):
             plain = _plain(value)
             flat |= plain if isinstance(plain, Mapping) else {name: plain}
-    kept, left_out = divided(flat)
-    return Arrays(kept, opaque="__function_workspace__" in found, left_out=left_out)
+    return replace(divided(flat), opaque="__function_workspace__" in found)
 
 
 def _plain(value: Any) -> Any:
@@ -99,15 +101,18 @@ def _plain(value: Any) -> Any:
     return {_IDDATA.get(name, name): item for name, item in fields.items() if np.size(item)}
 
 
-def divided(values: Mapping[str, Any]) -> tuple[dict[str, NDArray], dict[str, str]]:
+def divided(values: Mapping[str, Any]) -> Arrays:
     """The arrays of numbers, or of times, with rows and columns at most; and what the others hold."""
     kept: dict[str, NDArray] = {}
     left_out: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for name, value in values.items():
         array = np.asarray(value) if not isinstance(value, list) else _of_cells(value)
         if array.dtype.names:
-            fields, others = divided({f"{own}": array[own] for own in array.dtype.names})
-            kept, left_out = kept | fields, left_out | others
+            fields = divided({f"{own}": array[own] for own in array.dtype.names})
+            kept |= fields.arrays
+            left_out |= fields.left_out
+            texts |= fields.texts
             continue
         while array.ndim > 2 and array.shape[-1] == 1:
             array = array[..., 0]
@@ -116,9 +121,11 @@ def divided(values: Mapping[str, Any]) -> tuple[dict[str, NDArray], dict[str, st
         wrong = _wrong(array)
         if wrong:
             left_out[name] = wrong
+            if wrong == _TEXT and array.size == 1:
+                texts[name] = str(array.item())
         else:
             kept[name] = array
-    return kept, left_out
+    return Arrays(kept, left_out=left_out, texts=texts)
 
 
 def _of_cells(value: list[Any]) -> NDArray:
@@ -130,14 +137,14 @@ def _of_cells(value: list[Any]) -> NDArray:
 def _wrong(array: NDArray) -> str:
     """What an array holds that is no column of numbers; nothing where it is one."""
     if array.size == 0:
-        return "nothing"
+        return NOTHING
     if array.dtype.kind == "c":
         return "complex numbers"
     if array.dtype.kind in "SU":
-        return "text"
+        return _TEXT
     if array.dtype.kind == "O":
         if any(isinstance(item, str) for item in array.ravel()):
-            return "text"
+            return _TEXT
         several = any(np.size(item) > 1 for item in array.ravel())
         return "cells, as those of several experiments (in MATLAB: getexp(data, 1))" if several else "objects"
     if array.dtype.kind not in "fiubmM":

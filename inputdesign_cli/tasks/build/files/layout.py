@@ -109,16 +109,17 @@ class LongFieldError(ValueError):
 
 
 def separator_of(lines: Sequence[str]) -> str | None:
-    """What stands between the fields: that by which most cells are numbers."""
+    """What stands between the fields: that by which most cells are numbers, then most rows alike."""
     used = [line for line in lines if line.strip() and not line.strip().startswith(COMMENTS)]
     sample = used[:_LOOKED_AT] + used[_LOOKED_AT:][-_LOOKED_AT:]
 
-    def numbers(mark: str | None) -> int:
+    def rank(mark: str | None) -> tuple[int, int]:
         rows = [line.split(mark) for line in sample]
-        return sum(is_plain(cell, comma=mark != ",") for row in rows if len(row) > 1 for cell in row)
+        numbers = sum(is_plain(cell, comma=mark != ",") for row in rows if len(row) > 1 for cell in row)
+        return numbers, max(Counter(map(len, rows)).values(), default=0)
 
-    best = max(_SEPARATORS, key=numbers)
-    return best if numbers(best) else next((m for m in "\t;" if used and m in used[0].strip()), ",")
+    best = max(_SEPARATORS, key=rank)
+    return best if rank(best)[0] else next((m for m in "\t;" if used and m in used[0].strip()), ",")
 
 
 def rows_of(text: str, separator: str | None) -> tuple[Rows, Passed]:

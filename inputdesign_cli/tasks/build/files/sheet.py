@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError, Diagnostic, Location
+from inputdesign_cli.tasks.build.files.pace import Pace
 
 Array = NDArray[np.float64]
 
@@ -18,13 +19,18 @@ Array = NDArray[np.float64]
 class Column:
     """Numbers (n,), NaN where a cell is empty; `fault` is the first row with something else, and its text.
 
-    Dates and times are `dated`: seconds since the first. What is `wrong` with a fault goes into messages.
+    Dates and times are `dated`: seconds since the first. What is `wrong` with a fault, and how to mend it,
+    goes into messages.
     """
 
     numbers: Array
     fault: tuple[int, str] | None = None
     dated: bool = False
     wrong: str = "is not a finite number"
+    hint: str = (
+        "write plain numbers such as -1234.5: digits 0 to 9, a decimal point, nothing between thousands, one "
+        "row a line; dates as 2024-03-12 10:15:00"
+    )
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,7 @@ class Sheet:
         head: line and text of the header, for diagnostics.
         texts: what the rows say, for diagnostics; empty where a file is no text.
         shown: whether messages may show what the file holds: it is a table of numbers, and no secret.
-        sample_time: as the file says itself; None where it does not.
+        pace: the sample time and its unit, as the file says itself.
         left_out: what the file holds besides that is no column, and what it holds instead of numbers.
         passed: lines between rows of numbers that are no rows, and what they are: see `layout`.
     """
@@ -52,7 +58,7 @@ class Sheet:
     head: tuple[int, str] = (1, "")
     texts: Sequence[str] = ()
     shown: bool = True
-    sample_time: float | None = None
+    pace: Pace = field(default_factory=Pace)
     passed: tuple[tuple[int, str], ...] = ()
     left_out: Mapping[str, str] = field(default_factory=dict)
 
@@ -86,9 +92,7 @@ def unreadable(path: Path, key: str, what: str, hint: str, line: int | None = No
     return DataError.because("data-unreadable", f"the file {path} {what}", hint, key, location)
 
 
-def of_arrays(
-    path: Path, key: str, arrays: Sequence[tuple[str, NDArray]], sample_time: float | None = None
-) -> Sheet:
+def of_arrays(path: Path, key: str, arrays: Sequence[tuple[str, NDArray]]) -> Sheet:
     """Named arrays, (n,) or (n, m), as columns: those of one array are called x1, x2, ..
 
     Raises:
@@ -112,13 +116,7 @@ def of_arrays(
         hint = "keep the signals of one experiment in a file, all of one length, a sample in each row"
         raise unreadable(path, key, f"holds arrays of different lengths ({told})", hint)
     return Sheet(
-        path,
-        key,
-        tuple(names),
-        tuple(columns),
-        np.arange(1, lengths.pop() + 1),
-        (1, ", ".join(names)),
-        sample_time=sample_time,
+        path, key, tuple(names), tuple(columns), np.arange(1, lengths.pop() + 1), (1, ", ".join(names))
     )
 
 

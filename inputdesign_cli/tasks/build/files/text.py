@@ -6,13 +6,14 @@ written is seen from the text; the rules are those of docs/identification.md.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.errors import DataError
-from inputdesign_cli.tasks.build.files.dates import moments_of
+from inputdesign_cli.tasks.build.files.dates import AS_DATES, moments_of, seems_moment
 from inputdesign_cli.tasks.build.files.layout import (
     COMMENTS,
     LongFieldError,
@@ -110,12 +111,27 @@ def _column(cells: list[str]) -> Column:
     if thousand is not None:
         wrong = "may have a mark between thousands, or three decimals: other cells have none"
         return Column(numbers, (thousand, cells[thousand].strip()), wrong=wrong)
-    moments = None if fault is None else moments_of(cells)
-    if moments is None:
-        return Column(numbers, fault)
-    if moments.seconds is None:
-        return Column(numbers, fault, wrong="may have the day or the month first")
-    return Column(moments.seconds, dated=True)
+    return Column(numbers, fault) if fault is None else _of_dates(cells, Column(numbers, fault))
+
+
+def _of_dates(cells: list[str], otherwise: Column) -> Column:
+    """The same where cells are dates or times, or the first seems to be one; empty ones are missing."""
+    there = [i for i, cell in enumerate(cells) if not is_missing(cell)]
+    written = [cells[i].strip() for i in there]
+    moments = moments_of(written)
+    if moments is not None and moments.seconds is not None:
+        seconds = np.full(len(cells), np.nan)
+        seconds[there] = moments.seconds
+        return Column(seconds, dated=True)
+    if moments is not None:
+        fault = (there[0], written[0])
+        return Column(otherwise.numbers, fault, wrong="may have the day or the month first", hint=AS_DATES)
+    if is_number(written[0]) or not seems_moment(written[0]):
+        return otherwise
+    # All cells up to one are dates of one kind, and with it they are not.
+    at = bisect_left(range(len(written)), 1, key=lambda i: moments_of(written[: i + 1]) is None)
+    wrong = "is no date or time as those above are" if at else "is no date or time that can be read"
+    return Column(otherwise.numbers, (there[at], written[at]), wrong=wrong, hint=AS_DATES)
 
 
 def _of_numbers(rows: Rows, columns: Sequence[Column]) -> bool:

@@ -84,7 +84,7 @@ def test_mat_files_hold_arrays_or_an_iddata(content, tmp_path):
     scipy.io.savemat(path, content)
     np.testing.assert_array_equal(read_columns(path, {"u": "u"}, key="")["u"], U)
     np.testing.assert_array_equal(read_columns(path, {"y": "y"}, key="")["y"], Y)
-    assert read_sheet(path, key="").sample_time == 0.5
+    assert read_sheet(path, key="").pace.sample_time == 0.5
 
 
 def test_wide_arrays_are_several_channels(tmp_path):
@@ -389,3 +389,120 @@ def test_dates_of_workbooks_are_times(tmp_path):
     np.testing.assert_array_equal(columns_of(sheet, {"time": "time"})["time"], TIME)
     assert sheet.columns[0].dated
     assert sheet.left_out == {"state": "text"}
+
+
+NO_SAMPLE_TIME = {
+    "Ts holds text ('0.5 s')": {"Ts": "0.5 s"},
+    "Ts holds complex numbers": {"Ts": 0.5 + 1j},
+    "Ts holds a truth value": {"Ts": np.array(True)},
+    "dt holds a date or a length of time": {"dt": np.timedelta64(500, "ms")},
+    "Ts says 0.5 and dt says 1": {"Ts": 0.5, "dt": 1.0},
+}
+
+
+@pytest.mark.parametrize(("told", "stated"), NO_SAMPLE_TIME.items(), ids=NO_SAMPLE_TIME)
+def test_a_sample_time_that_is_none_is_refused_unless_another_is_given(told, stated, tmp_path):
+    """`isolated.Arrays` is what both kinds of files come through; only .npz holds all of these."""
+    path = tmp_path / "log.npz"
+    np.savez(path, u=U, y=Y, **stated)
+    with pytest.raises(DataError) as caught:
+        read_log(path, Preparation())
+    (only,) = caught.value.diagnostics
+    assert only.message == f"log.npz states no sample time: {told}"
+    assert "--sample-time" in only.hint
+    assert read_log(path, Preparation(sample_time=0.5)).step == 0.5
+
+
+@pytest.mark.parametrize("stated", [{"Ts": "0.5"}, {"Ts": np.float32(0.5)}, {"Ts": 0.5, "dt": [[0.5]]}])
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+def test_a_sample_time_is_honoured_however_it_is_saved(kind, stated, tmp_path):
+    path = tmp_path / f"log.{kind}"
+    save(path, u=U, y=Y, **stated)
+    assert read_log(path, Preparation()).step == 0.5
+
+
+def save(path, **arrays):
+    (np.savez if path.suffix == ".npz" else lambda path, **arrays: scipy.io.savemat(path, arrays))(
+        path, **arrays
+    )
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+def test_an_empty_sample_time_says_nothing(kind, tmp_path):
+    """As in an iddata whose samples are not evenly spaced."""
+    path = tmp_path / f"log.{kind}"
+    save(path, u=U, y=Y, time=2.0 * TIME, Ts=np.zeros(0))
+    assert read_log(path, Preparation()).step == 2.0
+
+
+def test_the_unit_of_an_iddata_is_that_of_its_times(tmp_path):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"data": {**iddata(), "TimeUnit": "minutes"}})
+    assert read_log(path, Preparation()).time_unit == "min"
+    scipy.io.savemat(path, {"data": {**iddata(), "TimeUnit": "weeks"}})
+    with pytest.raises(DataError, match="states its times in 'weeks'"):
+        read_log(path, Preparation())
+    assert read_log(path, Preparation(time_unit="d")).time_unit == "d"
+
+
+def test_times_that_contradict_the_sample_time_are_told(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, u=U, y=Y, time=2.0 * TIME, Ts=0.5)
+    found = read_log(path, Preparation())
+    assert found.step == 2.0
+    assert "log.npz states the sample time 0.5, and its times advance by 2: they count" in found.steps
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        (b"\x00", r"1 control character \(code 0\)"),
+        (b"\x00" * 4096, r"4096 control characters \(code 0\)"),
+        (b"\x07", r"1 control character \(code 7\)"),
+        (b"\x81", "bytes that are no letters in UTF-8 or Windows-1252"),
+    ],
+    ids=["NUL", "many", "bell", "undecodable"],
+)
+def test_characters_that_no_text_has_are_told_with_their_line(fault, told, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(table(",").encode().replace(b"\n2,", b"\n" + fault + b"2,"))
+    with pytest.raises(DataError, match=f"line 4 has {told}") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location.line == 4
+
+
+def test_bytes_of_any_kind_are_no_text(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(np.random.default_rng(1).bytes(5000))
+    with pytest.raises(DataError, match="is no text") as caught:
+        read_sheet(path, key="")
+    assert caught.value.diagnostics[0].location is None
+
+
+CLOCK = [f"12.03.2024 10:15:0{k}" for k in range(6)]
+NO_DATES = {
+    "no such day": ([*CLOCK[:4], "31.02.2024 10:15:04", CLOCK[5]], 6, "as those above are"),
+    "another kind": ([*CLOCK[:2], "2024-03-12 10:15:02", *CLOCK[3:]], 4, "as those above are"),
+    "a number": ([*CLOCK[:2], "45363.5", *CLOCK[3:]], 4, "as those above are"),
+    "more than a date": ([f"{date} CET" for date in CLOCK], 2, "that can be read"),
+    "month in words": ([f"Tue Mar 12 2024 10:15:0{k}" for k in range(6)], 2, "that can be read"),
+}
+
+
+@pytest.mark.parametrize(("dates", "line", "told"), NO_DATES.values(), ids=NO_DATES)
+def test_the_date_that_cannot_be_read_is_told_with_its_line(dates, line, told, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u,y\n" + "\n".join(f"{date},{k},1.5" for k, date in enumerate(dates)) + "\n")
+    with pytest.raises(DataError) as caught:
+        columns_of(read_sheet(path, key=""), {"time": "time"})
+    (found,) = caught.value.diagnostics
+    assert found.location.line == line
+    assert found.message == f"{dates[line - 2]!r} in column time is no date or time {told}"
+    assert "2024-03-12 10:15:00" in found.hint
+
+
+def test_a_date_that_is_missing_is_missing(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,u\n" + "\n".join(f"{date},1" for date in [*CLOCK[:2], "", *CLOCK[3:]]) + "\n")
+    found = columns_of(read_sheet(path, key=""), {"time": "time"})["time"]
+    np.testing.assert_array_equal(found, [0, 1, np.nan, 3, 4, 5])

@@ -1,0 +1,60 @@
+"""Faults of measurement are told; what a plant answers to white, few-level or rare inputs is none."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from inputdesign_cli.tasks.build.far_off import outliers, strange_values
+
+N = 600
+LINES = np.arange(2, N + 2)
+
+
+def white(rng):
+    return rng.standard_normal(N)
+
+
+INPUTS = {
+    "white": white,
+    "uniform": lambda rng: rng.uniform(-1.0, 1.0, N),
+    "two levels": lambda rng: np.sign(rng.standard_normal(N)),
+    "three levels": lambda rng: rng.choice([-1.0, 0.0, 0.0, 0.0, 1.0], N),
+    "two levels, held": lambda rng: np.repeat(np.sign(rng.standard_normal(N)), 3)[:N],
+    "pulses": lambda rng: (rng.random(N) < 0.1) * rng.standard_normal(N),
+    "rare pulses": lambda rng: 1.0 * (rng.random(N) < 0.03),
+}
+
+
+@pytest.mark.parametrize("make", INPUTS.values(), ids=INPUTS)
+@pytest.mark.parametrize(("pole", "delay"), [(0.0, 0), (0.1, 7), (0.5, 1), (0.9, 20)])
+def test_what_the_input_explains_is_no_fault(make, pole, delay):
+    rng = np.random.default_rng(4)
+    for noise in (1e-4, 1e-2, 0.3):
+        u = make(rng)
+        y = 20.0 + scipy.signal.lfilter([*np.zeros(delay), 1.0], [1.0, -pole], u)
+        y += noise * rng.standard_normal(N)
+        assert strange_values("y", y, u[:, None], LINES) == []
+
+
+@pytest.mark.parametrize("make", [white, INPUTS["two levels"]], ids=["white", "two levels"])
+def test_faults_are_told_beside_a_white_input_too(make):
+    rng = np.random.default_rng(5)
+    u = np.column_stack([make(rng), make(rng)])
+    y = scipy.signal.lfilter([0.0, 1.0], [1.0, -0.8], u @ [1.0, 0.5]) + 0.05 * rng.standard_normal(N)
+    u[50] = np.nan  # a cell that is empty
+    assert strange_values("y", y, u, LINES) == []
+    at = np.arange(10, N - 12, 12)
+    few, many = y.copy(), y.copy()
+    few[at[:3]] += 80.0
+    many[at] += 40.0
+    (told,) = strange_values("y", few, u, LINES)
+    assert told == "y has 3 outlying values (rows 12, 24, 36): look at the record"
+    (told,) = strange_values("y", many, u, LINES)
+    assert told.startswith("y has 49 values (8.2 %) far from their neighbours (rows 12, 24, 36, 48, 60, ..)")
+
+
+def test_an_input_is_judged_by_itself():
+    u = np.sign(np.random.default_rng(6).standard_normal(N))
+    assert outliers("u", u, LINES) == []
+    u[40] = -9999.0
+    assert outliers("u", u, LINES) == ["u has 1 outlying value (row 42): look at the record"]
