@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inputdesign_cli.campaign.applied import LIKE, Match, matched
 from inputdesign_cli.campaign.memory import VERSION, Memory
 from inputdesign_cli.campaign.pictures import history
 from inputdesign_cli.errors import DataError, Diagnostic
@@ -23,8 +23,6 @@ from inputdesign_cli.runs.text_formats import csv_text, read_csv
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 
 Decide = Callable[[Past], Decision]
-# A record at another scale: the plan explains it to this correlation, and its size is off by more than this.
-_LIKE, _OFF, _UNLIKE = 0.9, 0.02, 0.5
 
 
 def begun(decide: Decide, folder: Path, directory: Path) -> Results:
@@ -54,11 +52,11 @@ def advanced(
 
     Args:
         given: the file of the user, and what was read of it.
-        unlike: whether to take a record that is not at the scale of its plan, or like another plan.
+        unlike: whether to take a record at another scale than its plan, like another plan, or like none.
 
     Raises:
         DataError: `campaign-over`; `data-repeated`, `record-too-long`, `record-other-part`,
-            `record-other-scale`; what is wrong with a record.
+            `record-other-scale`, `record-unlike`; what is wrong with a record.
     """
     records, files, notes = memory.records, dict(memory.files), list[str]()
     if given is not None and part is not None:
@@ -75,17 +73,6 @@ def advanced(
         return decided
     told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
     return replace(decided, result={**decided.result, "notes": list(told)})
-
-
-def _unlike(entry: Mapping[str, Json]) -> list[str]:
-    """That a record is hardly that of its plan."""
-    if abs(entry.get("likeness", 1.0)) >= _UNLIKE:
-        return []
-    return [
-        f"what was applied is hardly {entry['plan']} (correlation {entry['likeness']:.2f}): is it the record "
-        "of another part, or are rows missing at its start? Withdraw it with --withdraw if so; the estimate "
-        "goes by what was recorded"
-    ]
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
@@ -159,7 +146,7 @@ def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple
     """What is kept of a record, compared with its plan, and what is to be said of it.
 
     Raises:
-        DataError: `record-too-long`, `record-other-part`, `record-other-scale`.
+        DataError: `record-too-long`, `record-other-part`, `record-other-scale`, `record-unlike`.
     """
     plan = memory.plan
     assert plan is not None
@@ -171,29 +158,72 @@ def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple
         )
     entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
     if part.excitation is None:
-        return entry | {"energy": part.samples * plan["power"]}, []
-    applied, begins, scale, likeness = _matched(memory, plan, part, part.excitation)
-    samples = begins + part.samples
-    entry |= {"samples": samples}
-    other = _of_another(memory, plan, part, part.excitation, abs(likeness))
-    if other is not None and not unlike:
+        told = f"{given.name} has no column r: whether {plan['file']} was applied cannot be told"
+        return entry | {"energy": part.samples * plan["power"]}, [told]
+    applied = part.excitation - np.array(plan["offset"], dtype=float)
+    match = _matched(memory, plan, part, part.excitation)
+    samples = match.begins + part.samples
+    other = _of_another(memory, plan, part, part.excitation, match.likeness)
+    if not unlike:
+        _check_applied(given, plan, match, other)
+    energy = float(np.sum(applied**2)) * samples / len(part.rows)
+    entry |= {"samples": samples, "scale": match.scale} if match.likeness > LIKE else {"samples": samples}
+    entry |= {"energy": energy, "likeness": match.likeness}
+    return entry, _noted(plan, match, other)
+
+
+def _check_applied(given: Path, plan: Mapping[str, Json], match: Match, other: str | None) -> None:
+    """Raise `DataError` (`record-other-part`, `record-other-scale`, `record-unlike`) for what is no plan."""
+    due, forced = plan["file"], "--as-applied: the estimate goes by what was recorded"
+    if other is not None:
         raise DataError.because(
             "record-other-part",
-            f"what was applied in {given.name} is {other}, not {plan['file']}, which is due",
-            hint=f"give the record of {plan['file']}; if {other} was really applied once more, say "
-            "--as-applied: the estimate goes by what was recorded",
+            f"what was applied in {given.name} is {other}, not {due}, which is due",
+            hint=f"give the record of {due}; if {other} was really applied once more, say {forced}",
         )
-    if abs(likeness) > _LIKE and abs(scale - 1.0) > _OFF and not unlike:
+    if match.off:
         raise DataError.because(
             "record-other-scale",
-            f"{given.name} was applied at {scale:.4g} times the scale of {plan['file']}",
-            hint="mend the column if it is in another unit; if it was really applied so, say "
-            "--as-applied: the estimate goes by what was recorded",
+            f"{given.name} was applied at {match.scale:.4g} times the scale of {due}",
+            hint=f"mend the column if it is in another unit; if it was really applied so, say {forced}",
         )
-    entry |= {"scale": scale} if abs(likeness) > _LIKE else {}
-    energy = float(np.sum(applied**2)) * samples / len(part.rows)
-    entry |= {"energy": energy, "likeness": likeness}
-    return entry, [_once_more(entry, other)] if other is not None else _unlike(entry)
+    if match.exchanged is not None:
+        told = ", ".join(f"u{k}" for k in match.exchanged)
+        raise DataError.because(
+            "record-unlike",
+            f"the channels of {given.name} are not in the order of {due}: those of the plan are its {told}",
+            hint="say which column is which channel, --columns u1=NAME,u2=NAME,..; if they were really "
+            f"applied so, say {forced}",
+        )
+    if not match.follows:
+        raise DataError.because(
+            "record-unlike",
+            f"what was applied in {given.name} is not {due}: channel {match.channel} has a correlation of "
+            f"{match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted or lost)",
+            hint=f"give the record of {due}; is it another experiment, or another column (--columns)? If it "
+            f"was really applied in its place, say {forced}",
+        )
+
+
+def _noted(plan: Mapping[str, Json], match: Match, other: str | None) -> list[str]:
+    """What is to be said of a record that is taken."""
+    due, told = plan["file"], f"correlation {match.likeness:.2f}"
+    if other is not None:
+        return [
+            f"what was applied is {other} once more, not {due} ({told}): withdraw the record with --withdraw "
+            "if it was given by mistake, else samples count twice"
+        ]
+    if match.likeness > LIKE:
+        return []
+    if not match.follows:
+        return [
+            f"what was applied is hardly {due} ({told}): withdraw the record with --withdraw if it was given "
+            "by mistake; the estimate goes by what was recorded"
+        ]
+    return [
+        f"what was applied follows {due} only in part ({told}, {match.spliced:.2f} with samples shifted or "
+        "lost): it is taken as recorded"
+    ]
 
 
 def _check_going_on(memory: Memory) -> None:
@@ -206,49 +236,30 @@ def _check_going_on(memory: Memory) -> None:
         )
 
 
-def _once_more(entry: Mapping[str, Json], other: str) -> str:
-    """That a record is that of another plan."""
-    return (
-        f"what was applied is {other} once more, not {entry['plan']} (correlation {entry['likeness']:.2f}): "
-        "withdraw the record with --withdraw if it was given by mistake, else samples count twice"
-    )
-
-
-def _matched(
-    memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array
-) -> tuple[Array, int, float, float]:
-    """What was applied about the levels of a plan (m, r), where in the plan it begins, scale and likeness."""
+def _matched(memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array) -> Match:
+    """How what was applied (m, r) follows a plan, about its levels."""
     offset = np.array(plan["offset"], dtype=float)
     whole = np.stack(list(read_csv(memory.directory / plan["file"]).values())[1:], axis=1) - offset
-    applied = excitation - offset
-    begins = _begins(whole, applied, part.rows)
-    return applied, begins, *_compared(whole[begins + part.rows], applied)
+    strongest = max(float(each["power"]) for each in _plans(memory)) ** 0.5
+    return matched(whole, excitation - offset, part.rows, strongest)
+
+
+def _plans(memory: Memory) -> list[dict[str, Json]]:
+    return [entry["plan"] for entry in memory.campaign["rounds"] if entry.get("plan")]
 
 
 def _of_another(
     memory: Memory, due: Mapping[str, Json], part: Part, excitation: Array, likeness: float
 ) -> str | None:
     """The file of another plan that what was applied is, where that is nearer than the one that is due."""
-    rounds = memory.campaign["rounds"]
-    plans = {entry["plan"]["file"]: entry["plan"] for entry in rounds if entry.get("plan")}
     found = {
-        file: abs(_matched(memory, plan, part, excitation)[3])
-        for file, plan in plans.items()
-        if file != due["file"] and len(memory.files.get(file, b"").splitlines()) > part.samples
+        plan["file"]: abs(_matched(memory, plan, part, excitation).likeness)
+        for plan in _plans(memory)
+        if plan["file"] != due["file"]
+        and len(memory.files.get(plan["file"], b"").splitlines()) > part.samples
     }
     likest = max(found, key=found.__getitem__, default=None)
-    return likest if likest is not None and found[likest] > max(_LIKE, likeness) else None
-
-
-def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
-    """The sample of the plan (n, r) that a record (m, r) of these `rows` begins with, if not the first."""
-
-    def likeness(start: int) -> float:
-        return abs(_compared(plan[start + rows], applied)[1])
-
-    starts = range(len(plan) - int(rows[-1]))
-    best = max(starts, key=likeness)
-    return best if likeness(0) <= _LIKE < likeness(best) else 0
+    return likest if likest is not None and found[likest] > max(LIKE, abs(likeness)) else None
 
 
 def _check_new(
@@ -263,15 +274,6 @@ def _check_new(
                 hint="give each record once"
                 + (": it was withdrawn, and stays so" if record["withdrawn"] else ""),
             )
-
-
-def _compared(plan: Array, applied: Array) -> tuple[float, float]:
-    """The scale at which a plan (n, r) was applied, and the correlation of the two."""
-    size, own = float(np.linalg.norm(plan)), float(np.linalg.norm(applied))
-    if size == 0.0 or own == 0.0:
-        return 1.0, float(size == own)
-    product = float(np.sum(plan * applied))
-    return product / size**2, product / (size * own)
 
 
 def _decided(

@@ -72,10 +72,19 @@ class Rules:
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
 
+    def cap(self, first: float | None) -> float:
+        """Largest cost of a sample, where one of the first plan costs so much; infinite without either."""
+        return np.inf if self.power_cap is None or first is None else self.power_cap * first
+
     @property
     def end(self) -> int:
         """Samples after which the experiment is over, whatever was reached."""
         return self.schedule.most if self.stops else min(self.schedule.samples, self.schedule.most)
+
+    @property
+    def learns_first(self) -> bool:
+        """Whether the first plan is made by a record and costs are bounded, so that another must bound it."""
+        return self.pilot_power is not None and self.power_cap is not None
 
     def over(self, done: int, *, met: bool) -> bool:
         """Whether nothing more is applied after so many samples."""
@@ -116,6 +125,7 @@ class Planned:
         capped: whether it falls short of what is asked, by the cap or by limits.
         claim: gives what is proved of the design, as in a result; None of white noise.
         why: there is no design.
+        share: of its power that the next part has, which else would cost more than the cap.
     """
 
     record: Array
@@ -126,6 +136,7 @@ class Planned:
     capped: bool = False
     claim: Callable[[], Mapping[str, Json]] | None = field(default=None, compare=False, repr=False)
     why: str = ""
+    share: float = 1.0
 
     @property
     def designed(self) -> bool:
@@ -160,6 +171,11 @@ class Planned:
         share = cost / self.cost
         record = self.record * np.sqrt(share)
         return replace(self, record=record, power=self.power * share, cost=cost, capped=True)
+
+    def weaker(self, share: float) -> Planned:
+        """The same, whose next part has this share of its power."""
+        record = np.concatenate([self.applied * np.sqrt(share), self.record[self.take :]])
+        return replace(self, record=record, share=share)
 
 
 class Planner(Protocol):

@@ -34,6 +34,8 @@ _ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
 # Records whose times differ by one sample time, give or take this share of it, are one.
 _CONTINUES = 0.1
+# A part of less than this share of its power is told.
+_NEARLY = 0.9
 
 
 @dataclass(frozen=True)
@@ -263,8 +265,13 @@ def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
         )
     if plan.capped:
         notes.append(
-            "the plan falls short of what is asked: campaign.power_cap or limits leave no more until "
-            "campaign.max_samples"
+            "the plan falls short of what is asked: campaign.power_cap (10 times the cost of a sample of the "
+            "first plan, if it is not stated) or limits leave no more until campaign.max_samples"
+        )
+    if plan.share < _NEARLY:
+        notes.append(
+            "the next part is stronger than the plan is on average, or costs more at the plant of the spec: "
+            f"it has {100 * plan.share:.0f} % of its power, so that campaign.power_cap holds"
         )
     wanted = task.rules.robust_last and task.rules.schedule.last(past.done)
     if wanted and plan.kind == "nominal":

@@ -17,7 +17,7 @@ from inputdesign_cli.tasks.campaign import Rules, Schedule
 from inputdesign_cli.tasks.campaign_rounds import Rounds
 from inputdesign_cli.tasks.campaign_study import CampaignStudy, CampaignTask
 
-_TENTH, _LONGEST = 10, 3
+_TENTH, _LONGEST, _CAP = 10, 3, 10.0
 
 
 def build_rules(spec: Spec) -> Rules:
@@ -39,7 +39,7 @@ def build_rules(spec: Spec) -> Rules:
     return Rules(
         schedule=_schedule(spec, stated, pilot),
         pilot_power=None if pilot is None else pilot.power,
-        power_cap=stated.power_cap,
+        power_cap=stated.power_cap or _CAP,
         robust_last=stated.last == "robust",
         stops=stated.stop == "data",
         rate=_rate(spec),
