@@ -29,6 +29,8 @@ _OFF, _SURE = 0.02, 3.0
 _CLIPPED, _FEW = 0.95, 2
 # A channel is at rest in plans smaller than this share of the strongest; moved by half of that it is not.
 _AT_REST, _MOVED = 0.02, 0.5
+# Orders of more channels are not tried.
+_MOST = 6
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
     scale, off = max((_scale(due[:, j], applied[:, j]) for j in range(plan.shape[1])), key=_far)
     if off and spliced > abs(shares[least]) + _BETTER:
         off = False  # rows out of their places look like a smaller scale
-    exchanged = _exchanged(due, applied, strongest) if spliced < UNLIKE else None
+    exchanged = _exchanged(due, applied, strongest, shares[least])
     return Match(begins, shares[least], spliced, least + 1, scale, off, exchanged)
 
 
@@ -170,9 +172,14 @@ def _fitted(plan: Array, applied: Array) -> tuple[float, float]:
     return scale, rest
 
 
-def _exchanged(plan: Array, applied: Array, strongest: float) -> tuple[int, ...] | None:
-    """Which channels of the record (m, r) follow those of the plan, where an order of them does."""
-    for order in permutations(range(plan.shape[1])) if plan.shape[1] <= _SLIPS else ():
-        if all(_followed(plan[:, j], applied[:, k], strongest) > LIKE for j, k in enumerate(order)):
+def _exchanged(plan: Array, applied: Array, strongest: float, own: float) -> tuple[int, ...] | None:
+    """Which channels of the record (m, r) follow those of the plan, where another order does so better.
+
+    Args:
+        own: the likeness of the channel that follows least in their own order.
+    """
+    for order in permutations(range(plan.shape[1])) if own < 1.0 - _BETTER and plan.shape[1] <= _MOST else ():
+        least = min(_followed(plan[:, j], applied[:, k], strongest) for j, k in enumerate(order))
+        if least > max(LIKE, own + _BETTER):
             return tuple(k + 1 for k in order)
     return None

@@ -188,10 +188,10 @@ def _check_applied(given: Path, plan: Mapping[str, Json], match: Match, other: s
             hint=f"mend the column if it is in another unit; if it was really applied so, say {forced}",
         )
     if match.exchanged is not None:
-        told = ", ".join(f"u{k}" for k in match.exchanged)
+        told = ", ".join(f"{k}" for k in match.exchanged)
         raise DataError.because(
             "record-unlike",
-            f"the channels of {given.name} are not in the order of {due}: those of the plan are its {told}",
+            f"the channels of {given.name} are not in the order of {due}: it holds them as {told}",
             hint="say which column is which channel, --columns u1=NAME,u2=NAME,..; if they were really "
             f"applied so, say {forced}",
         )

@@ -24,6 +24,8 @@ from inputdesign_cli.tasks.identification import ModelQuestion
 Kind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 REACHED = 1.0 + 1e-9
 """A ratio no larger than this meets what is asked."""
+# What is left of a part is one of its own where it has more than this share of its samples.
+_REMAINDER = 0.1
 # Of the way from the last estimate that could be built on to one that cannot.
 _SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
@@ -43,12 +45,14 @@ class Schedule:
     most: int
 
     def take(self, done: int) -> int:
-        """Samples of the part that begins after so many; 0 at the end."""
-        ends = [end for end in accumulate(self.parts) if end > done]
-        if ends:
-            part = ends[0] - done
-        else:
-            part = min(self.block, self.samples - done) if done < self.samples else self.block
+        """Samples of the part that begins after so many; 0 at the end.
+
+        Where a record was shorter than its plan, a remainder that is no part of its own goes with the next.
+        """
+        ends = zip(accumulate(self.parts), self.parts, strict=True)
+        left = [end - done for end, part in ends if end - done > _REMAINDER * part]
+        whole = self.samples - done
+        part = left[0] if left else min(self.block, whole) if whole > _REMAINDER * self.block else self.block
         return max(min(part, self.most - done), 0)
 
     def rest(self, done: int) -> int:

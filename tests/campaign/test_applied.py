@@ -79,6 +79,10 @@ def test_every_channel_is_looked_at():
     match = compared(plan, noise)
     assert (match.follows, match.channel) == (False, 2)
     assert compared(plan, swapped).exchanged == (2, 1)
+    # So also where both move much alike.
+    alike = np.column_stack([plan[:, 0], plan[:, 0] + 0.6 * planned("white", 60, 2)])
+    assert compared(alike, alike[:, ::-1]).exchanged == (2, 1)
+    assert compared(alike, alike + 0.05).exchanged is None
     assert compared(plan, noise).exchanged is None
 
 

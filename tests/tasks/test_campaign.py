@@ -49,6 +49,24 @@ def test_an_experiment_is_divided_as_the_spec_says(campaign, takes):
     assert found == takes
 
 
+@pytest.mark.parametrize(
+    ("campaign", "done", "take"),
+    [
+        ("{stages: [50, 90, 60]}", 49, 91),  # one sample of the first stage was not recorded
+        ("{stages: [50, 90, 60]}", 40, 10),
+        ("{stages: [50, 90, 60]}", 198, 60),
+        ("{block: 50}", 199, 50),
+        ("{block: 50}", 190, 10),
+        ("{block: 50, max_samples: 201}", 199, 2),
+    ],
+)
+def test_a_remainder_is_no_part_of_its_own(campaign, done, take):
+    """One sample would have to carry all that is missing."""
+    schedule = build_rules(parse_spec(SPEC, overrides=[f"campaign={campaign}"])).schedule
+    assert schedule.take(done) == take
+    assert schedule.rest(done) >= take
+
+
 def test_a_schedule_ends_at_its_longest():
     schedule = Schedule((5,), 10, 20, 33)
     done = 0
