@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.campaign.applied import LIKE, Match, matched
+from inputdesign_cli.campaign.acceptance import accepted
 from inputdesign_cli.campaign.memory import VERSION, Memory
 from inputdesign_cli.campaign.pictures import history
 from inputdesign_cli.errors import DataError, Diagnostic
@@ -19,7 +19,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.curves import Curves, SignalCurves
 from inputdesign_cli.runs.results import Json, Results, Table
-from inputdesign_cli.runs.text_formats import csv_text, read_csv
+from inputdesign_cli.runs.text_formats import csv_text
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 
 Decide = Callable[[Past], Decision]
@@ -63,12 +63,12 @@ def advanced(
         name, text = f"record_{len(records) + 1:02d}", csv_text(part.table)
         _check_going_on(memory)
         _check_new(records, files, given, text)
-        entry, of_the_plan = _accepted(memory, given, part, unlike=unlike)
+        entry, of_the_plan = accepted(memory, given, part, unlike=unlike)
         files[f"{name}.csv"] = text.encode()
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
         records.append({"file": f"{name}.csv", "given": given.name, **entry})
         notes = [*part.notes, *of_the_plan]
-    decided = _again(decide, memory, records, files)
+    decided = _again(decide, memory, records, files, given=given)
     if not notes:
         return decided
     told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
@@ -94,12 +94,17 @@ def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
 
 
 def _again(
-    decide: Decide, memory: Memory, records: list[dict[str, Json]], files: dict[str, bytes]
+    decide: Decide,
+    memory: Memory,
+    records: list[dict[str, Json]],
+    files: dict[str, bytes],
+    *,
+    given: Path | None = None,
 ) -> Results:
     counting = [str(record["file"]) for record in records if not record["withdrawn"]]
     campaign = {**memory.campaign, "records": records}
     last, seed = campaign.get("last"), len(campaign["rounds"]) + 1
-    with _on_disc(files, counting) as paths:
+    with _on_disc(files, counting, given) as paths:
         past = Past(
             records=paths,
             done=sum(int(record["samples"]) for record in records),
@@ -122,8 +127,11 @@ def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) ->
 
 
 @contextmanager
-def _on_disc(files: Mapping[str, bytes], names: Sequence[str]) -> Iterator[list[Path]]:
-    """The records that count as files, the new one as well, which is not in the directory yet."""
+def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | None) -> Iterator[list[Path]]:
+    """The records that count as files, the new one as well, which is not in the directory yet.
+
+    What is wrong with the new one is said of the file that was `given`.
+    """
     with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
         paths = [Path(folder) / name for name in names]
         for path in paths:
@@ -131,99 +139,21 @@ def _on_disc(files: Mapping[str, bytes], names: Sequence[str]) -> Iterator[list[
         try:
             yield paths
         except DataError as error:
-            raise DataError([_of_the_campaign(one, Path(folder)) for one in error.diagnostics]) from error
+            known = {} if given is None else {names[-1]: given.name}
+            told = [_of_the_campaign(one, Path(folder), known) for one in error.diagnostics]
+            raise DataError(told) from error
 
 
-def _of_the_campaign(diagnostic: Diagnostic, folder: Path) -> Diagnostic:
-    """A diagnostic that names a record by itself, not by where it was read."""
+def _of_the_campaign(diagnostic: Diagnostic, folder: Path, known: Mapping[str, str]) -> Diagnostic:
+    """A diagnostic that names a record by itself, or as it is known to the user, not by where it was read."""
+    message = diagnostic.message
+    for name, user in known.items():
+        message = message.replace(name, user)
     place = diagnostic.location
-    if place is None or not Path(place.file).is_relative_to(folder):
-        return diagnostic
-    return replace(diagnostic, location=replace(place, file=Path(place.file).name))
-
-
-def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[dict[str, Json], list[str]]:
-    """What is kept of a record, compared with its plan, and what is to be said of it.
-
-    Raises:
-        DataError: `record-too-long`, `record-other-part`, `record-other-scale`, `record-unlike`.
-    """
-    plan = memory.plan
-    assert plan is not None
-    if part.samples > plan["samples"]:
-        raise DataError.because(
-            "record-too-long",
-            f"{given.name} has {part.samples} samples, and the plan {plan['file']} has {plan['samples']}",
-            hint="give the samples from the start of the plan to its end; is it the record of another part?",
-        )
-    entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
-    if part.excitation is None:
-        told = f"{given.name} has no column r: whether {plan['file']} was applied cannot be told"
-        return entry | {"energy": part.samples * plan["power"]}, [told]
-    applied = part.excitation - np.array(plan["offset"], dtype=float)
-    match = _matched(memory, plan, part, part.excitation)
-    samples = match.begins + part.samples
-    other = _of_another(memory, plan, part, part.excitation, match.likeness)
-    if not unlike:
-        _check_applied(given, plan, match, other)
-    energy = float(np.sum(applied**2)) * samples / len(part.rows)
-    entry |= {"samples": samples, "scale": match.scale} if match.likeness > LIKE else {"samples": samples}
-    entry |= {"energy": energy, "likeness": match.likeness}
-    return entry, _noted(plan, match, other)
-
-
-def _check_applied(given: Path, plan: Mapping[str, Json], match: Match, other: str | None) -> None:
-    """Raise `DataError` (`record-other-part`, `record-other-scale`, `record-unlike`) for what is no plan."""
-    due, forced = plan["file"], "--as-applied: the estimate goes by what was recorded"
-    if other is not None:
-        raise DataError.because(
-            "record-other-part",
-            f"what was applied in {given.name} is {other}, not {due}, which is due",
-            hint=f"give the record of {due}; if {other} was really applied once more, say {forced}",
-        )
-    if match.off:
-        raise DataError.because(
-            "record-other-scale",
-            f"{given.name} was applied at {match.scale:.4g} times the scale of {due}",
-            hint=f"mend the column if it is in another unit; if it was really applied so, say {forced}",
-        )
-    if match.exchanged is not None:
-        told = ", ".join(f"{k}" for k in match.exchanged)
-        raise DataError.because(
-            "record-unlike",
-            f"the channels of {given.name} are not in the order of {due}: it holds them as {told}",
-            hint="say which column is which channel, --columns u1=NAME,u2=NAME,..; if they were really "
-            f"applied so, say {forced}",
-        )
-    if not match.follows:
-        raise DataError.because(
-            "record-unlike",
-            f"what was applied in {given.name} is not {due}: channel {match.channel} has a correlation of "
-            f"{match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted or lost)",
-            hint=f"give the record of {due}; is it another experiment, or another column (--columns)? If it "
-            f"was really applied in its place, say {forced}",
-        )
-
-
-def _noted(plan: Mapping[str, Json], match: Match, other: str | None) -> list[str]:
-    """What is to be said of a record that is taken."""
-    due, told = plan["file"], f"correlation {match.likeness:.2f}"
-    if other is not None:
-        return [
-            f"what was applied is {other} once more, not {due} ({told}): withdraw the record with --withdraw "
-            "if it was given by mistake, else samples count twice"
-        ]
-    if match.likeness > LIKE:
-        return []
-    if not match.follows:
-        return [
-            f"what was applied is hardly {due} ({told}): withdraw the record with --withdraw if it was given "
-            "by mistake; the estimate goes by what was recorded"
-        ]
-    return [
-        f"what was applied follows {due} only in part ({told}, {match.spliced:.2f} with samples shifted or "
-        "lost): it is taken as recorded"
-    ]
+    if place is not None and Path(place.file).is_relative_to(folder):
+        name = Path(place.file).name
+        place = replace(place, file=known.get(name, name))
+    return replace(diagnostic, message=message, location=place)
 
 
 def _check_going_on(memory: Memory) -> None:
@@ -234,32 +164,6 @@ def _check_going_on(memory: Memory) -> None:
             f"the campaign in {memory.directory} has ended: {memory.state}",
             hint="withdraw a record with --withdraw N to go on without it, or begin another campaign",
         )
-
-
-def _matched(memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array) -> Match:
-    """How what was applied (m, r) follows a plan, about its levels."""
-    offset = np.array(plan["offset"], dtype=float)
-    whole = np.stack(list(read_csv(memory.directory / plan["file"]).values())[1:], axis=1) - offset
-    strongest = max(float(each["power"]) for each in _plans(memory)) ** 0.5
-    return matched(whole, excitation - offset, part.rows, strongest)
-
-
-def _plans(memory: Memory) -> list[dict[str, Json]]:
-    return [entry["plan"] for entry in memory.campaign["rounds"] if entry.get("plan")]
-
-
-def _of_another(
-    memory: Memory, due: Mapping[str, Json], part: Part, excitation: Array, likeness: float
-) -> str | None:
-    """The file of another plan that what was applied is, where that is nearer than the one that is due."""
-    found = {
-        plan["file"]: abs(_matched(memory, plan, part, excitation).likeness)
-        for plan in _plans(memory)
-        if plan["file"] != due["file"]
-        and len(memory.files.get(plan["file"], b"").splitlines()) > part.samples
-    }
-    likest = max(found, key=found.__getitem__, default=None)
-    return likest if likest is not None and found[likest] > max(LIKE, abs(likeness)) else None
 
 
 def _check_new(

@@ -104,11 +104,13 @@ class Part:
         table: times, inputs, outputs and, in a loop, the reference as they are kept.
         excitation: (n, r), what was applied; None where the file does not tell it.
         rows: (n,), the numbers of the samples from the first one on; those without values are left out.
+        of_loop: whether the excitation is the reference of a loop.
     """
 
     table: Table
     excitation: Array | None
     rows: NDArray[np.int64]
+    of_loop: bool
     notes: tuple[str, ...]
 
     @property
@@ -176,7 +178,7 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
     if data.r is not None:
         columns |= {f"r{j + 1}": values for j, values in enumerate(data.r.T)}
     applied = data.r if units.closed_loop else inputs
-    return Part(Table(columns), applied, _numbered(data.time), data.notes)
+    return Part(Table(columns), applied, _numbered(data.time), units.closed_loop, data.notes)
 
 
 def _numbered(time: Array) -> NDArray[np.int64]:
