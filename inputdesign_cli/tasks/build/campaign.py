@@ -54,14 +54,14 @@ def _rate(spec: Spec) -> tuple[float, ...] | None:
 
 
 def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
-    samples = spec.experiment.samples
+    samples, has = spec.experiment.samples, "has"
     if pilot is not None and pilot.power is not None:  # what is known before the experiment begins
-        samples += pilot.samples
+        samples, has = samples + pilot.samples, "and its pilot have"
     most = stated.max_samples or max(spec.limits.samples or _LONGEST * samples, samples)
     if most < samples:
         raise spec.complain(
             "conflicting-keys",
-            f"the experiment has {samples} samples with its pilot, and the campaign ends at {most}",
+            f"the experiment {has} {samples} samples, and the campaign ends at {most}",
             hint="raise campaign.max_samples, or lower experiment.samples",
             key="campaign.max_samples",
         )
