@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from inputdesign_cli.campaign.acceptance import accepted
 from inputdesign_cli.campaign.memory import VERSION, Memory
 from inputdesign_cli.campaign.pictures import history
 from inputdesign_cli.errors import DataError, Diagnostic
@@ -19,12 +19,10 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.curves import Curves, SignalCurves
 from inputdesign_cli.runs.results import Json, Results, Table
-from inputdesign_cli.runs.text_formats import csv_text, read_csv
+from inputdesign_cli.runs.text_formats import csv_text
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 
 Decide = Callable[[Past], Decision]
-# A record at another scale: the plan explains it to this correlation, and its size is off by more than this.
-_LIKE, _OFF, _UNLIKE = 0.9, 0.02, 0.5
 
 
 def begun(decide: Decide, folder: Path, directory: Path) -> Results:
@@ -54,38 +52,27 @@ def advanced(
 
     Args:
         given: the file of the user, and what was read of it.
-        unlike: whether to take a record that is not at the scale of its plan, or like another plan.
+        unlike: whether to take a record at another scale than its plan, like another plan, or like none.
 
     Raises:
         DataError: `campaign-over`; `data-repeated`, `record-too-long`, `record-other-part`,
-            `record-other-scale`; what is wrong with a record.
+            `record-other-scale`, `record-unlike`; what is wrong with a record.
     """
     records, files, notes = memory.records, dict(memory.files), list[str]()
     if given is not None and part is not None:
         name, text = f"record_{len(records) + 1:02d}", csv_text(part.table)
         _check_going_on(memory)
         _check_new(records, files, given, text)
-        entry, of_the_plan = _accepted(memory, given, part, unlike=unlike)
+        entry, of_the_plan = accepted(memory, given, part, unlike=unlike)
         files[f"{name}.csv"] = text.encode()
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
         records.append({"file": f"{name}.csv", "given": given.name, **entry})
         notes = [*part.notes, *of_the_plan]
-    decided = _again(decide, memory, records, files)
+    decided = _again(decide, memory, records, files, given=given)
     if not notes:
         return decided
     told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
     return replace(decided, result={**decided.result, "notes": list(told)})
-
-
-def _unlike(entry: Mapping[str, Json]) -> list[str]:
-    """That a record is hardly that of its plan."""
-    if abs(entry.get("likeness", 1.0)) >= _UNLIKE:
-        return []
-    return [
-        f"what was applied is hardly {entry['plan']} (correlation {entry['likeness']:.2f}): is it the record "
-        "of another part, or are rows missing at its start? Withdraw it with --withdraw if so; the estimate "
-        "goes by what was recorded"
-    ]
 
 
 def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
@@ -107,12 +94,17 @@ def withdrawn(decide: Decide, memory: Memory, number: int) -> Results:
 
 
 def _again(
-    decide: Decide, memory: Memory, records: list[dict[str, Json]], files: dict[str, bytes]
+    decide: Decide,
+    memory: Memory,
+    records: list[dict[str, Json]],
+    files: dict[str, bytes],
+    *,
+    given: Path | None = None,
 ) -> Results:
     counting = [str(record["file"]) for record in records if not record["withdrawn"]]
     campaign = {**memory.campaign, "records": records}
     last, seed = campaign.get("last"), len(campaign["rounds"]) + 1
-    with _on_disc(files, counting) as paths:
+    with _on_disc(files, counting, given) as paths:
         past = Past(
             records=paths,
             done=sum(int(record["samples"]) for record in records),
@@ -135,8 +127,11 @@ def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) ->
 
 
 @contextmanager
-def _on_disc(files: Mapping[str, bytes], names: Sequence[str]) -> Iterator[list[Path]]:
-    """The records that count as files, the new one as well, which is not in the directory yet."""
+def _on_disc(files: Mapping[str, bytes], names: Sequence[str], given: Path | None) -> Iterator[list[Path]]:
+    """The records that count as files, the new one as well, which is not in the directory yet.
+
+    What is wrong with the new one is said of the file that was `given`.
+    """
     with tempfile.TemporaryDirectory(prefix="idesign-") as folder:
         paths = [Path(folder) / name for name in names]
         for path in paths:
@@ -144,56 +139,21 @@ def _on_disc(files: Mapping[str, bytes], names: Sequence[str]) -> Iterator[list[
         try:
             yield paths
         except DataError as error:
-            raise DataError([_of_the_campaign(one, Path(folder)) for one in error.diagnostics]) from error
+            known = {} if given is None else {names[-1]: given.name}
+            told = [_of_the_campaign(one, Path(folder), known) for one in error.diagnostics]
+            raise DataError(told) from error
 
 
-def _of_the_campaign(diagnostic: Diagnostic, folder: Path) -> Diagnostic:
-    """A diagnostic that names a record by itself, not by where it was read."""
+def _of_the_campaign(diagnostic: Diagnostic, folder: Path, known: Mapping[str, str]) -> Diagnostic:
+    """A diagnostic that names a record by itself, or as it is known to the user, not by where it was read."""
+    message = diagnostic.message
+    for name, user in known.items():
+        message = message.replace(name, user)
     place = diagnostic.location
-    if place is None or not Path(place.file).is_relative_to(folder):
-        return diagnostic
-    return replace(diagnostic, location=replace(place, file=Path(place.file).name))
-
-
-def _accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[dict[str, Json], list[str]]:
-    """What is kept of a record, compared with its plan, and what is to be said of it.
-
-    Raises:
-        DataError: `record-too-long`, `record-other-part`, `record-other-scale`.
-    """
-    plan = memory.plan
-    assert plan is not None
-    if part.samples > plan["samples"]:
-        raise DataError.because(
-            "record-too-long",
-            f"{given.name} has {part.samples} samples, and the plan {plan['file']} has {plan['samples']}",
-            hint="give the samples from the start of the plan to its end; is it the record of another part?",
-        )
-    entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
-    if part.excitation is None:
-        return entry | {"energy": part.samples * plan["power"]}, []
-    applied, begins, scale, likeness = _matched(memory, plan, part, part.excitation)
-    samples = begins + part.samples
-    entry |= {"samples": samples}
-    other = _of_another(memory, plan, part, part.excitation, abs(likeness))
-    if other is not None and not unlike:
-        raise DataError.because(
-            "record-other-part",
-            f"what was applied in {given.name} is {other}, not {plan['file']}, which is due",
-            hint=f"give the record of {plan['file']}; if {other} was really applied once more, say "
-            "--as-applied: the estimate goes by what was recorded",
-        )
-    if abs(likeness) > _LIKE and abs(scale - 1.0) > _OFF and not unlike:
-        raise DataError.because(
-            "record-other-scale",
-            f"{given.name} was applied at {scale:.4g} times the scale of {plan['file']}",
-            hint="mend the column if it is in another unit; if it was really applied so, say "
-            "--as-applied: the estimate goes by what was recorded",
-        )
-    entry |= {"scale": scale} if abs(likeness) > _LIKE else {}
-    energy = float(np.sum(applied**2)) * samples / len(part.rows)
-    entry |= {"energy": energy, "likeness": likeness}
-    return entry, [_once_more(entry, other)] if other is not None else _unlike(entry)
+    if place is not None and Path(place.file).is_relative_to(folder):
+        name = Path(place.file).name
+        place = replace(place, file=known.get(name, name))
+    return replace(diagnostic, message=message, location=place)
 
 
 def _check_going_on(memory: Memory) -> None:
@@ -204,51 +164,6 @@ def _check_going_on(memory: Memory) -> None:
             f"the campaign in {memory.directory} has ended: {memory.state}",
             hint="withdraw a record with --withdraw N to go on without it, or begin another campaign",
         )
-
-
-def _once_more(entry: Mapping[str, Json], other: str) -> str:
-    """That a record is that of another plan."""
-    return (
-        f"what was applied is {other} once more, not {entry['plan']} (correlation {entry['likeness']:.2f}): "
-        "withdraw the record with --withdraw if it was given by mistake, else samples count twice"
-    )
-
-
-def _matched(
-    memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array
-) -> tuple[Array, int, float, float]:
-    """What was applied about the levels of a plan (m, r), where in the plan it begins, scale and likeness."""
-    offset = np.array(plan["offset"], dtype=float)
-    whole = np.stack(list(read_csv(memory.directory / plan["file"]).values())[1:], axis=1) - offset
-    applied = excitation - offset
-    begins = _begins(whole, applied, part.rows)
-    return applied, begins, *_compared(whole[begins + part.rows], applied)
-
-
-def _of_another(
-    memory: Memory, due: Mapping[str, Json], part: Part, excitation: Array, likeness: float
-) -> str | None:
-    """The file of another plan that what was applied is, where that is nearer than the one that is due."""
-    rounds = memory.campaign["rounds"]
-    plans = {entry["plan"]["file"]: entry["plan"] for entry in rounds if entry.get("plan")}
-    found = {
-        file: abs(_matched(memory, plan, part, excitation)[3])
-        for file, plan in plans.items()
-        if file != due["file"] and len(memory.files.get(file, b"").splitlines()) > part.samples
-    }
-    likest = max(found, key=found.__getitem__, default=None)
-    return likest if likest is not None and found[likest] > max(_LIKE, likeness) else None
-
-
-def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
-    """The sample of the plan (n, r) that a record (m, r) of these `rows` begins with, if not the first."""
-
-    def likeness(start: int) -> float:
-        return abs(_compared(plan[start + rows], applied)[1])
-
-    starts = range(len(plan) - int(rows[-1]))
-    best = max(starts, key=likeness)
-    return best if likeness(0) <= _LIKE < likeness(best) else 0
 
 
 def _check_new(
@@ -263,15 +178,6 @@ def _check_new(
                 hint="give each record once"
                 + (": it was withdrawn, and stays so" if record["withdrawn"] else ""),
             )
-
-
-def _compared(plan: Array, applied: Array) -> tuple[float, float]:
-    """The scale at which a plan (n, r) was applied, and the correlation of the two."""
-    size, own = float(np.linalg.norm(plan)), float(np.linalg.norm(applied))
-    if size == 0.0 or own == 0.0:
-        return 1.0, float(size == own)
-    product = float(np.sum(plan * applied))
-    return product / size**2, product / (size * own)
 
 
 def _decided(

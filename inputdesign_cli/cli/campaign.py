@@ -75,7 +75,8 @@ def proceed(
         bool,
         typer.Option(
             "--as-applied",
-            help="Take a record that was applied at another scale than planned, or of an earlier plan.",
+            help="Take a record of something else than what was planned: at another scale, an earlier plan, "
+            "or none.",
         ),
     ] = False,
     columns: Columns = "",

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.information.experiment import Experiment, PowerKind, of_channel
 from inputdesign_cli.information.noise import told_by_noise
-from inputdesign_cli.plant import excited, input_gradients, noise_gradients
+from inputdesign_cli.plant import (
+    disturbance_gradients,
+    excitation_gradients,
+    excited,
+    input_gradients,
+    noise_gradients,
+)
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
 # Numbers at one node of all plants of an integral together; more would leave the cache of the processor.
@@ -119,26 +125,30 @@ def _together(experiments: Sequence[Experiment], integrals: Integrals) -> NDArra
         return integrals(first.information_density, first.singularities, first.information_factor)[:, None]
 
     whiteners = np.array([np.sqrt(e.samples) * e.noise_whitener[0, 0] * e.from_raw for e in experiments])
+    first_of, second_of = np.tril_indices(first.size)
+    entries = np.zeros((first.size, first.size), dtype=np.intp)
+    entries[first_of, second_of] = entries[second_of, first_of] = np.arange(first_of.size)
 
     def density(w: Array) -> NDArray[np.float64]:
+        """(n, S, k (k + 1) / 2): products are symmetric."""
         columns = whiteners @ _excitation_gradients(experiments, w)[..., 0, 0].transpose(0, 2, 1)
         real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
-        products = real[:, :, None] * real[:, None]
-        products += imaginary[:, :, None] * imaginary[:, None]
-        return products.transpose(3, 0, 1, 2)
+        products = real[:, first_of] * real[:, second_of]
+        products += imaginary[:, first_of] * imaginary[:, second_of]
+        return products.transpose(2, 0, 1)
 
-    return integrals(density, _singularities(experiments), None)
+    return integrals(density, _singularities(experiments), None)[..., entries]
 
 
 def _excitation_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
     """(S, n, k, p, r): what x contributes to the gradients of the predictions, in raw parameters."""
     if experiments[0].loop is not None:
-        return np.stack([e.loop.excitation_gradient(w) for e in experiments if e.loop is not None])
+        return excitation_gradients([e.loop for e in experiments if e.loop is not None], w)
     return input_gradients(experiments[0].model, [e.model for e in experiments], w)
 
 
 def _noise_gradients(experiments: Sequence[Experiment], w: Array) -> ComplexArray:
     """(S, n, k, p, p): what e contributes."""
     if experiments[0].loop is not None:
-        return np.stack([e.loop.noise_gradient(w) for e in experiments if e.loop is not None])
+        return disturbance_gradients([e.loop for e in experiments if e.loop is not None], w)
     return noise_gradients(experiments[0].model, [e.model for e in experiments], w)

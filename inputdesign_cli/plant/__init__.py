@@ -10,7 +10,13 @@ from inputdesign_cli.plant.frequencies import (
     logarithmic_distance as logarithmic_distance,
 )
 from inputdesign_cli.plant.intersample import Intersample as Intersample
-from inputdesign_cli.plant.loop import Loop as Loop, close_loop as close_loop, excited as excited
+from inputdesign_cli.plant.loop import (
+    Loop as Loop,
+    close_loop as close_loop,
+    disturbance_gradients as disturbance_gradients,
+    excitation_gradients as excitation_gradients,
+    excited as excited,
+)
 from inputdesign_cli.plant.model import (
     Fraction as Fraction,
     Listed as Listed,

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.errors import bad_spec
 from inputdesign_cli.plant.frequencies import logarithmic_distance
-from inputdesign_cli.plant.model import Model
+from inputdesign_cli.plant.model import Model, prediction_gradients
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 from inputdesign_cli.plant.transfer import TransferMatrix
 
@@ -36,7 +36,9 @@ _SEVERAL = (
 def beside_zero(w: ArrayLike, nearest: float) -> ComplexArray | Array:
     """The frequencies `w`, those of the axis moved at least so far from zero."""
     given = np.asarray(w)
-    return given if np.iscomplexobj(given) else np.where(np.abs(given) < nearest, nearest, given)
+    if nearest == 0.0 or np.iscomplexobj(given):
+        return given
+    return np.where(np.abs(given) < nearest, nearest, given)
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,11 @@ class Loop(ABC):
     @abstractmethod
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """R H (n, p, p) at normalised frequencies `w`."""
+
+    @classmethod
+    def noises_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
+        """(S, n, p, p): `noise_at` of loops around plants of one structure, beside zero."""
+        return np.stack([loop.noise_at(loop.beside_zero(w)) for loop in loops])
 
     @abstractmethod
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:
@@ -174,15 +181,8 @@ class Loop(ABC):
 
     def disturbed(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """What e causes: S_o H (n, p, p) at y with S_o = (I + G C)^-1, and -C S_o H (n, r, p) at u."""
-        beside = self.beside_zero(w)
-        left, noise, p = self.left_at(beside), self.noise_at(beside), self.model.outputs
-        if left.shape[1] == 2:
-            R, minus_N, P, Q = _blocks(left)
-            below = R * Q - minus_N * P
-            return Q * noise / below, -P * noise / below
-        right = np.zeros((len(left), left.shape[1], p), dtype=complex)
-        right[:, :p] = noise
-        return _split(np.linalg.solve(left, right), p)
+        y, u = disturbed([self], w)
+        return y[0], u[0]
 
     def sensitivity(self, w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """S = (I + G C)^-1 (n, p, p) and C S (n, r, p) at normalised frequencies `w`."""
@@ -198,14 +198,11 @@ class Loop(ABC):
 
     def excitation_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, r): what r contributes to the gradient of the prediction."""
-        y, u = self.excited(w)
-        return self.model.prediction_gradient(self.beside_zero(w), y, u, np.zeros_like(y))
+        return excitation_gradients([self], w)[0]
 
     def noise_gradient(self, w: ArrayLike) -> ComplexArray:
         """(n, k, p, p): what e contributes, through the noise model and around the loop."""
-        y, u = self.disturbed(w)
-        e = np.broadcast_to(np.eye(self.model.outputs, dtype=complex), y.shape)
-        return self.model.prediction_gradient(self.beside_zero(w), y, u, e)
+        return disturbance_gradients([self], w)[0]
 
 
 def excited(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
@@ -220,6 +217,42 @@ def excited(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexA
     inputs = p + np.arange(r)
     right[..., inputs, np.arange(r)] = left[..., inputs, inputs]
     return _split(np.linalg.solve(left, right), p)
+
+
+def disturbed(loops: Sequence[Loop], w: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+    """`Loop.disturbed` of loops around plants of one structure: (S, n, p, p) at y, (S, n, r, p) at u."""
+    kind, p = type(loops[0]), loops[0].model.outputs
+    left, noise = kind.lefts_at(loops, w), kind.noises_at(loops, w)
+    if left.shape[-1] == 2:
+        R, minus_N, P, Q = _blocks(left)
+        below = R * Q - minus_N * P
+        return Q * noise / below, -P * noise / below
+    right = np.zeros((*left.shape[:-1], p), dtype=complex)
+    right[..., :p, :] = noise
+    return _split(np.linalg.solve(left, right), p)
+
+
+def excitation_gradients(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
+    """(S, n, k, p, r): `Loop.excitation_gradient` of loops around plants of one structure."""
+    y, u = excited(loops, w)
+    return _prediction_gradients(loops, w, y, u, np.zeros_like(y))
+
+
+def disturbance_gradients(loops: Sequence[Loop], w: ArrayLike) -> ComplexArray:
+    """(S, n, k, p, p): `Loop.noise_gradient` of loops around plants of one structure."""
+    y, u = disturbed(loops, w)
+    return _prediction_gradients(loops, w, y, u, np.broadcast_to(np.eye(y.shape[-1], dtype=complex), y.shape))
+
+
+def _prediction_gradients(
+    loops: Sequence[Loop], w: ArrayLike, y: ComplexArray, u: ComplexArray, e: NDArray
+) -> ComplexArray:
+    """Those of the models, at once where they are read off at the same frequencies."""
+    if len({loop.nearest for loop in loops}) == 1:
+        models = [loop.model for loop in loops]
+        return prediction_gradients(models[0], models, loops[0].beside_zero(w), y, u, e)
+    each = zip(loops, y, u, e, strict=True)
+    return np.stack([one.model.prediction_gradient(one.beside_zero(w), *signals) for one, *signals in each])
 
 
 def _split(solved: NDArray, outputs: int) -> tuple[ComplexArray, ComplexArray]:

@@ -180,6 +180,15 @@ def noise_gradients(model: Model, models: Sequence[Model], w: ArrayLike) -> Comp
     return np.stack([each.noise_gradient(w) for each in models])
 
 
+@singledispatch
+def prediction_gradients(
+    model: Model, models: Sequence[Model], w: ArrayLike, y: NDArray, u: NDArray, e: NDArray
+) -> ComplexArray:
+    """(S, n, k, p, m): `prediction_gradient`, in the same way, for y, u and e (S, n, p or r, m)."""
+    each = zip(models, y, u, e, strict=True)
+    return np.stack([one.prediction_gradient(w, *signals) for one, *signals in each])
+
+
 class Listed(Model, Protocol):
     """A model that knows its parameters one by one."""
 

@@ -56,7 +56,7 @@ def evaluate(coefficients: ArrayLike, q: ComplexArray) -> ComplexArray:
         several += columns[-1]
         for column in columns[-2::-1]:
             several *= q
-            several += column
+            several.real += column
         return several
     if stated.ndim == 2:
         return evaluate(stated[0], q)[None]

@@ -24,6 +24,9 @@ from inputdesign_cli.plant.polynomial_matrix import at, stack
 from inputdesign_cli.plant.polynomial_model import PolynomialModel
 from inputdesign_cli.plant.transfer import TransferMatrix
 
+# Frequencies from which on it pays to leave out coefficients that vanish.
+_MANY = 512
+
 
 @dataclass(frozen=True)
 class PolynomialLoop(Loop):
@@ -38,6 +41,10 @@ class PolynomialLoop(Loop):
     @cached_property
     def _left(self) -> Array:
         """(p + r, p + r, l): the matrix of polynomials on the left."""
+        return stack(self._rows)
+
+    @cached_property
+    def _rows(self) -> list[list[list[float]]]:
         m, C = self.model, self.controller
         p, r = m.outputs, m.inputs
         rows: list[list[list[float]]] = []
@@ -48,7 +55,12 @@ class PolynomialLoop(Loop):
         for j, q in enumerate(C.denominator):
             right = [q.tolist() if j == other else [0.0] for other in range(r)]
             rows.append([C.numerator[j, i].tolist() for i in range(p)] + right)
-        return stack(rows)
+        return rows
+
+    @cached_property
+    def _longest(self) -> int:
+        """Coefficients of the longest polynomial in the rows of the plant, as in others of its structure."""
+        return max(len(entry) for row in self._rows[: self.model.outputs] for entry in row)
 
     def _others(self, output: int, left_out: int | None = None) -> Array:
         """The product of the F of an output, but for one input's."""
@@ -82,22 +94,55 @@ class PolynomialLoop(Loop):
 
     def left_at(self, w: ArrayLike) -> ComplexArray:
         """(n, p + r, p + r): the matrix on the left of `Loop`."""
-        return at(self._left, unit_circle(w))
+        q = unit_circle(w)
+        return at(self._left, q) if q.size < _MANY else self._lefts(self._left[None], q)[0]
 
     @classmethod
     def lefts_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
         """(S, n, p + r, p + r): see `Loop`; all at once where they are read off at the same frequencies."""
-        beside = {loop.nearest for loop in loops}
-        if len(beside) > 1:
+        if len({loop.nearest for loop in loops}) > 1:
             return super().lefts_at(loops, w)
-        return at(np.stack([loop._left for loop in loops]), unit_circle(loops[0].beside_zero(w)))
+        first, q = loops[0], unit_circle(loops[0].beside_zero(w))
+        lefts = np.stack([loop._left for loop in loops])
+        p = first.model.outputs
+        controllers = lefts[:, p:]
+        if not np.array_equal(controllers[:-1], controllers[1:]):
+            return at(lefts, q)
+        return first._lefts(lefts, q)
+
+    def _lefts(self, lefts: Array, q: ComplexArray) -> ComplexArray:
+        """(S, n, p + r, p + r): the rows of one controller once, and those of the plants by their own length.
+
+        Args:
+            lefts: (S, p + r, p + r, l), of plants of one structure.
+        """
+        p = self.model.outputs
+        value = np.empty((*lefts.shape[:3], q.size), dtype=complex)
+        value[:, :p] = at(lefts[:, :p, :, : self._longest], q).transpose(0, 2, 3, 1)
+        value[:, p:] = at(self._left[p:], q).transpose(1, 2, 0)
+        return value.transpose(0, 3, 1, 2)
 
     def noise_at(self, w: ArrayLike) -> ComplexArray:
         """R H (n, p, p)."""
-        m, q = self.model, unit_circle(w)
-        found = np.zeros((q.size, m.outputs, m.outputs), dtype=complex)
-        for i, (c, d) in enumerate(zip(m.per_output(m.C), m.per_output(m.D), strict=True)):
-            found[:, i, i] = evaluate(self._others(i), q) * evaluate(c, q) / evaluate(d, q)
+        return self._noises([self], w)[0]
+
+    @classmethod
+    def noises_at(cls, loops: Sequence[Self], w: ArrayLike) -> ComplexArray:
+        """(S, n, p, p): see `Loop`; all at once where they are read off at the same frequencies."""
+        if len({loop.nearest for loop in loops}) > 1:
+            return super().noises_at(loops, w)
+        return cls._noises(loops, loops[0].beside_zero(w))
+
+    @staticmethod
+    def _noises(loops: Sequence[PolynomialLoop], w: ArrayLike) -> ComplexArray:
+        q, p = unit_circle(w), loops[0].model.outputs
+        models = [loop.model for loop in loops]
+        found = np.zeros((len(loops), q.size, p, p), dtype=complex)
+        for i in range(p):
+            others = evaluate(np.array([loop._others(i) for loop in loops]), q)
+            above = evaluate(np.array([m.per_output(m.C)[i] for m in models]), q)
+            below = evaluate(np.array([m.per_output(m.D)[i] for m in models]), q)
+            found[:, :, i, i] = others * above / below
         return found
 
     def signals(self, r: Array, e: Array) -> tuple[Array, Array]:

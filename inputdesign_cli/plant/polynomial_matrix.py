@@ -31,7 +31,7 @@ def at(matrix: Array, q: ComplexArray) -> ComplexArray:
     value[:] = matrix[..., -1:]
     for lag in range(matrix.shape[-1] - 2, -1, -1):
         value *= q
-        value += matrix[..., lag, None]
+        value.real += matrix[..., lag, None]
     *leading, rows, columns, last = range(value.ndim)
     return value.transpose(*leading, last, rows, columns)
 

@@ -21,6 +21,7 @@ from inputdesign_cli.plant.model import (
     entry_label,
     input_gradients,
     noise_gradients,
+    prediction_gradients,
     row_parameters,
 )
 from inputdesign_cli.plant.polynomial import (
@@ -214,7 +215,8 @@ class PolynomialModel(Parametrised):
         for i, j in self.active:
             A, B, F = (evaluate(p, q) for p in (self._row(self.A, i), self.B[i][j], self.F[i][j]))
             AF = A * F
-            factors |= {("a", i, j): -B / (A * AF), ("b", i, j): 1.0 / AF, ("f", i, j): -B / (F * AF)}
+            factors["b", i, j] = 1.0 / AF
+            factors |= {(x, i, j): -B / (own * AF) for x, own in (("a", A), ("f", F)) if x in self.letters}
         for index, parameter in enumerate(self.parameters):
             if parameter.letter in "abf":
                 shift = power(q, parameter.power)
@@ -303,6 +305,19 @@ def _noise_gradients(first: PolynomialModel, models: Sequence[PolynomialModel], 
     return _gradients(models, w, first.outputs, H, None, e)
 
 
+@prediction_gradients.register
+def _prediction_gradients(
+    first: PolynomialModel,
+    models: Sequence[PolynomialModel],
+    w: ArrayLike,
+    y: NDArray,
+    u: NDArray,
+    e: NDArray,
+) -> ComplexArray:
+    """(S, n, k, p, m): those of models of one structure."""
+    return _gradients(models, w, y.shape[-1], y, u, e)
+
+
 def _gradients(
     models: Sequence[PolynomialModel],
     w: ArrayLike,
@@ -320,7 +335,10 @@ def _gradients(
     gradient = np.zeros((len(models), len(first.parameters), first.outputs, sources, q.size), dtype=complex)
 
     def values(polynomials: Iterable[Array]) -> ComplexArray:
-        return evaluate(np.array(list(polynomials)), q)[:, None]
+        coefficients = np.array(list(polynomials))
+        if coefficients.shape[1] == 1:  # the same at every frequency: (S, 1, 1)
+            return coefficients[:, None].astype(complex)
+        return evaluate(coefficients, q)[:, None]
 
     C = [values(m.per_output(m.C)[i] for m in models) for i in range(first.outputs)]
     D = [values(m.per_output(m.D)[i] for m in models) for i in range(first.outputs)]

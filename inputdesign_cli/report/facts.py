@@ -11,6 +11,9 @@ from inputdesign_cli.runs.results import Json, Result
 # Gaps below this are told as such.
 _CLOSED = 1e-6
 
+# By so much more than what was asked an exact confidence is told to be exceeded.
+_ROOM = 0.005
+
 # Types of spectra that are short for something.
 _SHORT = {"fir": "FIR"}
 
@@ -75,8 +78,14 @@ def _kept(told: Mapping[str, Json]) -> str:
     low, high = (f"{100 * share:.1f}" for share in told["kept_limits" if runs else "exact_limits"])
     share = f"{100 * told['kept' if runs else 'exact']:.1f} % ({low} to {high})"
     if runs:
-        return f"{share} of {told['runs']} simulated experiments meet it"
+        spent = ", more than asked: so short an experiment costs more than it need" if _beyond(told) else ""
+        return f"{share} of {told['runs']} simulated experiments meet it{spent}"
     return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
+
+
+def _beyond(told: Mapping[str, Json]) -> bool:
+    """Whether an exact confidence is exceeded by more than the chance of its runs."""
+    return bool(told["kept_limits"][0] > told["asked"] + _ROOM)
 
 
 def _limits(result: Result) -> Iterator[str]:

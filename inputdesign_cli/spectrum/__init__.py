@@ -5,6 +5,7 @@ from inputdesign_cli.spectrum.basis import (
     Face as Face,
     Functional as Functional,
     Pricing as Pricing,
+    kept_on_grid as kept_on_grid,
     weighted_mean as weighted_mean,
 )
 from inputdesign_cli.spectrum.directions import (

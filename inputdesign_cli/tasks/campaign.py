@@ -24,6 +24,8 @@ from inputdesign_cli.tasks.identification import ModelQuestion
 Kind = Literal["pilot", "nominal", "robust", "white", "stopgap"]
 REACHED = 1.0 + 1e-9
 """A ratio no larger than this meets what is asked."""
+# What is left of a part is one of its own where it has more than this share of its samples.
+_REMAINDER = 0.1
 # Of the way from the last estimate that could be built on to one that cannot.
 _SHARES = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 
@@ -43,12 +45,14 @@ class Schedule:
     most: int
 
     def take(self, done: int) -> int:
-        """Samples of the part that begins after so many; 0 at the end."""
-        ends = [end for end in accumulate(self.parts) if end > done]
-        if ends:
-            part = ends[0] - done
-        else:
-            part = min(self.block, self.samples - done) if done < self.samples else self.block
+        """Samples of the part that begins after so many; 0 at the end.
+
+        Where a record was shorter than its plan, a remainder that is no part of its own goes with the next.
+        """
+        ends = zip(accumulate(self.parts), self.parts, strict=True)
+        left = [end - done for end, part in ends if end - done > _REMAINDER * part]
+        whole = self.samples - done
+        part = left[0] if left else min(self.block, whole) if whole > _REMAINDER * self.block else self.block
         return max(min(part, self.most - done), 0)
 
     def rest(self, done: int) -> int:
@@ -72,10 +76,19 @@ class Rules:
     white: bool = False  # plans have a flat spectrum
     rate: tuple[float, ...] | None = None  # largest move of each input from one sample to the next
 
+    def cap(self, first: float | None) -> float:
+        """Largest cost of a sample, where one of the first plan costs so much; infinite without either."""
+        return np.inf if self.power_cap is None or first is None else self.power_cap * first
+
     @property
     def end(self) -> int:
         """Samples after which the experiment is over, whatever was reached."""
         return self.schedule.most if self.stops else min(self.schedule.samples, self.schedule.most)
+
+    @property
+    def learns_first(self) -> bool:
+        """Whether the first plan is made by a record and costs are bounded, so that another must bound it."""
+        return self.pilot_power is not None and self.power_cap is not None
 
     def over(self, done: int, *, met: bool) -> bool:
         """Whether nothing more is applied after so many samples."""
@@ -116,6 +129,7 @@ class Planned:
         capped: whether it falls short of what is asked, by the cap or by limits.
         claim: gives what is proved of the design, as in a result; None of white noise.
         why: there is no design.
+        share: of its power that the next part has, which else would cost more than the cap.
     """
 
     record: Array
@@ -126,6 +140,7 @@ class Planned:
     capped: bool = False
     claim: Callable[[], Mapping[str, Json]] | None = field(default=None, compare=False, repr=False)
     why: str = ""
+    share: float = 1.0
 
     @property
     def designed(self) -> bool:
@@ -160,6 +175,11 @@ class Planned:
         share = cost / self.cost
         record = self.record * np.sqrt(share)
         return replace(self, record=record, power=self.power * share, cost=cost, capped=True)
+
+    def weaker(self, share: float) -> Planned:
+        """The same, whose next part has this share of its power."""
+        record = np.concatenate([self.applied * np.sqrt(share), self.record[self.take :]])
+        return replace(self, record=record, share=share)
 
 
 class Planner(Protocol):

@@ -34,6 +34,8 @@ _ENDED: dict[Verdict, State] = {"met": "stopped", "missed": "missed", "undecided
 _TOO_LITTLE = {"too-few-samples", "not-exciting", "constant-input"}
 # Records whose times differ by one sample time, give or take this share of it, are one.
 _CONTINUES = 0.1
+# A part of less than this share of its power is told.
+_NEARLY = 0.9
 
 
 @dataclass(frozen=True)
@@ -102,11 +104,13 @@ class Part:
         table: times, inputs, outputs and, in a loop, the reference as they are kept.
         excitation: (n, r), what was applied; None where the file does not tell it.
         rows: (n,), the numbers of the samples from the first one on; those without values are left out.
+        of_loop: whether the excitation is the reference of a loop.
     """
 
     table: Table
     excitation: Array | None
     rows: NDArray[np.int64]
+    of_loop: bool
     notes: tuple[str, ...]
 
     @property
@@ -174,7 +178,7 @@ def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:
     if data.r is not None:
         columns |= {f"r{j + 1}": values for j, values in enumerate(data.r.T)}
     applied = data.r if units.closed_loop else inputs
-    return Part(Table(columns), applied, _numbered(data.time), data.notes)
+    return Part(Table(columns), applied, _numbered(data.time), units.closed_loop, data.notes)
 
 
 def _numbered(time: Array) -> NDArray[np.int64]:
@@ -263,8 +267,13 @@ def _of_the_plan(plan: Planned, task: Rounds, past: Past) -> list[str]:
         )
     if plan.capped:
         notes.append(
-            "the plan falls short of what is asked: campaign.power_cap or limits leave no more until "
-            "campaign.max_samples"
+            "the plan falls short of what is asked: campaign.power_cap (10 times the cost of a sample of the "
+            "first plan, if it is not stated) or limits leave no more until campaign.max_samples"
+        )
+    if plan.share < _NEARLY:
+        notes.append(
+            "the next part is stronger than the plan is on average, or costs more at the plant of the spec: "
+            f"it has {100 * plan.share:.0f} % of its power, so that campaign.power_cap holds"
         )
     wanted = task.rules.robust_last and task.rules.schedule.last(past.done)
     if wanted and plan.kind == "nominal":

@@ -187,14 +187,38 @@ def test_a_record_whose_first_rows_are_missing_is_placed_in_its_plan(run, begun,
     assert kept["likeness"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_record_that_is_hardly_its_plan_is_noted(run, begun, tmp_path):
+def test_a_record_that_is_not_its_plan_is_refused(run, begun, tmp_path):
     record = applied(begun, tmp_path / "r1.csv")
     head, *rows = [row.split(",") for row in record.read_text().splitlines()]
     mixed = [[a[0], b[1], *a[2:]] for a, b in zip(rows, rows[::-1], strict=True)]
     record.write_text("\n".join(",".join(row) for row in [head, *mixed]) + "\n")
-    result = json.loads(run("next", "c", record, "--json", "--no-figures")[1])
+    before = (begun / "result.json").read_bytes()
+    code, _, err = run("next", "c", record, "--no-figures")
+    assert code == 2
+    assert "record-unlike" in err
+    assert "what was applied in r1.csv is not plan_01.csv" in err
+    assert "--as-applied" in err
+    assert (begun / "result.json").read_bytes() == before
+    result = json.loads(run("next", "c", record, "--json", "--no-figures", "--as-applied")[1])
     assert abs(result["campaign"]["records"][0]["likeness"]) < 0.5
     assert any("hardly plan_01.csv" in note for note in result["notes"])
+
+
+def test_whatever_a_record_says_the_next_part_keeps_the_cap(run, begun, tmp_path):
+    """Records that speak of a plant without gain: without a cap the plan had 10000 times the power."""
+    for number in (1, 2):
+        times, u = np.loadtxt(begun / "signal.csv", delimiter=",", skiprows=1).T
+        y = 0.01 * np.random.default_rng(number).standard_normal(len(u))
+        code, out, _ = run(
+            "next", "c", written(tmp_path / f"r{number}.csv", times, 20 * u, y), "--as-applied", "--json"
+        )
+        campaign = json.loads(out)["campaign"]
+        if campaign["state"] != "running":
+            break
+        part = np.loadtxt(begun / "signal.csv", delimiter=",", skiprows=1)[:, 1]
+        assert np.mean(part**2) <= 10 * campaign["first_cost"] * (1 + 1e-6)
+    assert number == 2 or code == 5
+    assert max(entry["samples"] for entry in campaign["rounds"]) > 0
 
 
 def test_moves_between_parts_keep_the_limit(run, begun, tmp_path):

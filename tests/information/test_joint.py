@@ -12,7 +12,13 @@ from inputdesign_cli.information import (
     jointly_whitened,
     mean_cost,
 )
-from inputdesign_cli.plant import PolynomialModel, close_loop, excited
+from inputdesign_cli.plant import (
+    PolynomialModel,
+    close_loop,
+    disturbance_gradients,
+    excitation_gradients,
+    excited,
+)
 from inputdesign_cli.plant.polynomial import evaluate
 from inputdesign_cli.plant.transfer import Rational, TransferMatrix
 from inputdesign_cli.spectrum import FirBasis, FlatBasis, LinesBasis
@@ -97,6 +103,41 @@ def test_what_loops_cause_is_the_definition():
             G = model.plant_at(w)[:, 0, 0]
             np.testing.assert_allclose(u[number, :, 0, 0], 1.0 / (1.0 + C * G), rtol=1e-12)
             np.testing.assert_allclose(y[number, :, 0, 0], G / (1.0 + C * G), rtol=1e-12)
+
+
+@pytest.mark.parametrize("samples", [3, 700])  # few frequencies, and many
+@pytest.mark.parametrize("controllers", [(SLOW, SLOW, SLOW), (INTEGRATING,) * 3, (SLOW, INTEGRATING, SLOW)])
+def test_gradients_of_loops_are_the_derivatives_of_the_predictor(samples, controllers):
+    """y = G S r + .. and u = S r put into (D A / C) y - (D B / (C F)) u, by finite differences.
+
+    The last coefficients of the first plant vanish: those of the others do not.
+    """
+    w = np.linspace(0.2, 3.0, samples)
+    models = [
+        PolynomialModel.single([0, 0.5, b2], A=[1, -0.4, a2], C=[1, 0.2], D=[1, d1])
+        for a2, b2, d1 in ((0.0, 0.0, 0.3), (0.1, 0.2, 0.1), (-0.2, 0.1, 0.5))
+    ]
+    loops = [controlled(model, controller) for model, controller in zip(models, controllers, strict=True)]
+    q = np.exp(-1j * w)
+
+    def filters(model, theta):
+        at = model.at(theta)
+        A, B, C, D = (np.polynomial.polynomial.polyval(q, c) for c in (at.A[0], at.B[0][0], at.C[0], at.D[0]))
+        return D * A / C, D * B / C
+
+    of_r, of_e = excitation_gradients(loops, w), disturbance_gradients(loops, w)
+    for number, (model, (above, below)) in enumerate(zip(models, controllers, strict=True)):
+        C = above[0] / (below[0] + below[1] * q)
+        G, H = model.plant_at(w)[:, 0, 0], model.noise_at(w)[:, 0, 0]
+        S = 1.0 / (1.0 + C * G)
+        for index in range(len(model.theta)):
+            step = np.zeros(len(model.theta))
+            step[index] = 1e-6
+            (Y1, U1), (Y0, U0) = filters(model, model.theta + step), filters(model, model.theta - step)
+            dY, dU = (Y1 - Y0) / 2e-6, (U1 - U0) / 2e-6
+            for found, y, u in ((of_r, G * S, S), (of_e, S * H, -C * S * H)):
+                # epsilon = dY y - dU u, and the gradient of the prediction is minus that.
+                np.testing.assert_allclose(found[number, :, index, 0, 0], dU * u - dY * y, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("length", [1, 2, 5])

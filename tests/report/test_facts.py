@@ -2,7 +2,7 @@
 
 import pytest
 
-from inputdesign_cli.report.facts import proofs
+from inputdesign_cli.report.facts import facts, proofs
 
 
 @pytest.mark.parametrize(
@@ -18,3 +18,14 @@ from inputdesign_cli.report.facts import proofs
 def test_a_gap_that_only_rounding_decides_is_told_as_closed(gap, told):
     result = {"objective": {"lower_bound": 2.0, "relative_gap": gap}, "spectrum": {"type": "fir"}}
     assert list(proofs(result)) == [f"no FIR spectrum gets below 2, {told}"]
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [((0.9567, 0.9686), True), ((0.9473, 0.9605), False), ((0.9501, 0.9633), False), ((0.93, 0.94), False)],
+)
+def test_an_exact_confidence_that_is_exceeded_is_told(limits, said):
+    told = {"asked": 0.95, "chi_squared_alpha": 2.448, "runs": 4000, "kept": 0.96, "kept_limits": limits}
+    result = {"model_error": {"confidence": told, "alpha": 7.7}}
+    (line,) = [text for name, text, _ in facts(result, "s") if name == "confidence"]
+    assert ("more than asked" in line) is said

@@ -49,6 +49,24 @@ def test_an_experiment_is_divided_as_the_spec_says(campaign, takes):
     assert found == takes
 
 
+@pytest.mark.parametrize(
+    ("campaign", "done", "take"),
+    [
+        ("{stages: [50, 90, 60]}", 49, 91),  # one sample of the first stage was not recorded
+        ("{stages: [50, 90, 60]}", 40, 10),
+        ("{stages: [50, 90, 60]}", 198, 60),
+        ("{block: 50}", 199, 50),
+        ("{block: 50}", 190, 10),
+        ("{block: 50, max_samples: 201}", 199, 2),
+    ],
+)
+def test_a_remainder_is_no_part_of_its_own(campaign, done, take):
+    """One sample would have to carry all that is missing."""
+    schedule = build_rules(parse_spec(SPEC, overrides=[f"campaign={campaign}"])).schedule
+    assert schedule.take(done) == take
+    assert schedule.rest(done) >= take
+
+
 def test_a_schedule_ends_at_its_longest():
     schedule = Schedule((5,), 10, 20, 33)
     done = 0
@@ -159,6 +177,48 @@ def test_a_plan_beyond_the_cap_is_longer_and_at_last_weaker():
     assert len(weaker.record) == 600 - 60
     assert weaker.cost == pytest.approx(0.05 * free.cost)
     assert not at.plan(rules, known, 60, 5, 10 * free.cost).capped
+
+
+WILD = {
+    "a sensor that is not connected": [1e-3, -0.1],
+    "next to an integrator": [0.01, -0.99],
+    "another sign": [-0.02, 0.95],
+    "a gain that is too large": [900.0, -0.7],
+}
+
+
+@pytest.mark.parametrize(
+    "cost", ["{input_power: 1}", "{output_power: 1}", "{input_power: 1, output_power: 1}"]
+)
+@pytest.mark.parametrize("block", [5, 60])
+@pytest.mark.parametrize("name", WILD)
+def test_no_estimate_makes_a_part_dearer_than_the_cap(name, block, cost):
+    """At the plant of the spec: the cap times the first plan, ten times that where outputs are paid for."""
+    text = ["campaign.power_cap=0.7", f"campaign.block={block}", f"cost={cost}", "campaign.pilot=20"]
+    spec = parse_spec(SPEC, overrides=text)
+    at, rules = planner(SPEC, *text), build_rules(spec)
+    first = at.plan(rules, None, 0, 1, None)
+    u, y = record(40)
+    model = at.nominal.model.at(np.array(WILD[name]), np.array([[1.0]]))
+    known = standing(at, model, lambda m: 1e-3 * information_of_data(m, u, y), at.nominal.model)
+    for seed in (1, 2):
+        part = at.plan(rules, known, 40, seed, first.cost).applied[:, 0]
+        caused = lfilter([0, 3.6], [1, -0.7], part)
+        paid = {"input_power": np.mean(part**2), "output_power": np.mean(caused**2)}
+        wide = 10.0 if "output" in cost else 1.0
+        spent = sum(paid[kind] for kind in paid if kind in cost)
+        assert spent <= 0.7 * wide * first.cost * (1 + 1e-6)
+
+
+def test_the_first_plan_after_a_pilot_is_bounded_by_that_of_the_spec():
+    at, text = planner(), "campaign={block: 60, pilot: {samples: 30, power: 0.1}}"
+    rules = build_rules(parse_spec(SPEC, overrides=[text]))
+    u, y = record(40)
+    model = at.nominal.model.at(np.array([1e-3, -0.1]), np.array([[1.0]]))
+    known = standing(at, model, lambda m: information_of_data(m, u, y), at.nominal.model)
+    plan = at.plan(rules, known, 30, 1, None)
+    wanted = solve(parse_spec(SPEC, overrides=["campaign=null"])).result["cost"]
+    assert np.mean(plan.applied**2) <= 10 * wanted * (1 + 1e-6)
 
 
 COLOURED = """

@@ -32,7 +32,7 @@ from inputdesign_cli.design.convex.limits import (
 from inputdesign_cli.information import Experiment, PowerKind, joint_information, mean_cost
 from inputdesign_cli.plant import local_maxima
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.spectrum import Basis, Functional
+from inputdesign_cli.spectrum import Basis, Functional, kept_on_grid
 
 Goal = Literal["cost", "factor", "samples"]
 
@@ -240,10 +240,9 @@ class Problem:
         if known is not None:
             return known
         plants, weights = [self.scenarios[n].experiment for n in scenarios], weights_of(self.cost)
-
-        def density(w: Array) -> NDArray:
-            return mean_cost(plants, weights, w)
-
+        before = self._before[0]._costs.get(scenarios) if self._before else None
+        # Grown problems ask on the grid of the one before.
+        density = kept_on_grid(lambda w: mean_cost(plants, weights, w)) if before is None else before.density
         near = np.concatenate([plant.singularities for plant in plants])
         vector = self._along(
             lambda problem: problem._cost_of(scenarios).vector, lambda basis: basis.integrals(density, near)

@@ -49,7 +49,7 @@ class Campaign(Section):
     power_cap: Positive | None = Field(
         default=None,
         description="Largest cost of a sample, relative to the first plan; a plan beyond it is made longer "
-        "(default: none).",
+        "(default: 10).",
     )
     last: Literal["robust", "nominal"] = Field(
         default="robust",

@@ -17,7 +17,7 @@ from inputdesign_cli.tasks.campaign import Rules, Schedule
 from inputdesign_cli.tasks.campaign_rounds import Rounds
 from inputdesign_cli.tasks.campaign_study import CampaignStudy, CampaignTask
 
-_TENTH, _LONGEST = 10, 3
+_TENTH, _LONGEST, _CAP = 10, 3, 10.0
 
 
 def build_rules(spec: Spec) -> Rules:
@@ -39,7 +39,7 @@ def build_rules(spec: Spec) -> Rules:
     return Rules(
         schedule=_schedule(spec, stated, pilot),
         pilot_power=None if pilot is None else pilot.power,
-        power_cap=stated.power_cap,
+        power_cap=stated.power_cap or _CAP,
         robust_last=stated.last == "robust",
         stops=stated.stop == "data",
         rate=_rate(spec),
@@ -54,14 +54,14 @@ def _rate(spec: Spec) -> tuple[float, ...] | None:
 
 
 def _schedule(spec: Spec, stated: Campaign, pilot: Pilot | None) -> Schedule:
-    samples = spec.experiment.samples
+    samples, has = spec.experiment.samples, "has"
     if pilot is not None and pilot.power is not None:  # what is known before the experiment begins
-        samples += pilot.samples
+        samples, has = samples + pilot.samples, "and its pilot have"
     most = stated.max_samples or max(spec.limits.samples or _LONGEST * samples, samples)
     if most < samples:
         raise spec.complain(
             "conflicting-keys",
-            f"the experiment has {samples} samples with its pilot, and the campaign ends at {most}",
+            f"the experiment {has} {samples} samples, and the campaign ends at {most}",
             hint="raise campaign.max_samples, or lower experiment.samples",
             key="campaign.max_samples",
         )

@@ -12,7 +12,7 @@ import numpy as np
 
 from inputdesign_cli.design.convex.cost import weighted_sum
 from inputdesign_cli.errors import IdesignError, InfeasibleError, SpecError
-from inputdesign_cli.information import Experiment
+from inputdesign_cli.information import Experiment, FiniteRecord
 from inputdesign_cli.monte_carlo.excitations import Redrawn
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -24,7 +24,7 @@ from inputdesign_cli.spectrum import FlatBasis
 from inputdesign_cli.tasks.audit import audit
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.identification import ask, restated
-from inputdesign_cli.tasks.build.system import build_experiment, build_loop, record_step
+from inputdesign_cli.tasks.build.system import build_cost, build_experiment, build_loop, record_step
 from inputdesign_cli.tasks.build.uncertainty import farthest_radius
 from inputdesign_cli.tasks.campaign import REACHED, Kind, Planned, Rules, Standing
 from inputdesign_cli.tasks.given import GivenExcitation
@@ -36,6 +36,9 @@ from inputdesign_cli.tasks.result.design import Designed, design_result
 # A length within the cap is near enough to the shortest: by this factor, or at this share of the cap.
 _CLOSE, _MOSTLY = 1.1, 0.5
 _LONGER = 4.0  # by which a length grows at once
+# A part may cost so many times the cap at the plant of the spec where that depends on the plant, and the
+# first plan after a pilot so many times the design for that plant.
+_ELSEWHERE = 10.0
 _SOURCE = "plan"
 # What says how well the plant is known before any data.
 _PRIOR = {*SOURCES, "parameters"}
@@ -79,7 +82,9 @@ class SpecPlanner:
         take = rules.schedule.take(done)
         if known is None and done == 0 and rules.pilot_power is not None:
             return self._pilot(rules.pilot_power, take, seed)
-        cap = np.inf if rules.power_cap is None or first is None else rules.power_cap * first
+        cap = rules.cap(first)
+        if first is None and known is not None and rules.learns_first:
+            cap = _ELSEWHERE * self._unlearned
         last = rules.schedule.last(done)
         on = rules.stops or not last
         rest, longest = rules.schedule.rest(done), rules.end - done
@@ -89,18 +94,43 @@ class SpecPlanner:
             with suppress(IdesignError):
                 found = self._designed(changes, known)
                 if found.cost <= cap * REACHED:
-                    return found.planned.cut(take)
+                    return self._kept(found.planned.cut(take), cap)
         changes = self._changes(known, rest, seed, white=rules.white, goes_on=on)
         if known is None and rules.robust_last:
             del changes["uncertainty"]  # what the spec knows of the plant
         try:
-            return self._affordable(changes, known, cap, longest).cut(take)
+            return self._kept(self._affordable(changes, known, cap, longest).cut(take), cap)
         except IdesignError as error:
             if known is None:
                 raise
             # The estimate may be far off, and the next part will tell: nothing is decided by it.
             cost = np.inf if first is None else min(cap, first)
-            return self._stopgap(rules, cost, rest, seed, error).cut(take)
+            return self._kept(self._stopgap(rules, cost, rest, seed, error).cut(take), cap)
+
+    @cached_property
+    def _unlearned(self) -> float:
+        """Cost of a sample of the design for the plant of the spec; infinite without one, or if free."""
+        try:
+            cost = self.cheapest(self.nominal.model) / self.nominal.samples
+        except IdesignError:
+            return np.inf
+        return cost or np.inf
+
+    def _kept(self, plan: Planned, cap: float) -> Planned:
+        """The plan whose first part costs no more than the cap at the plant of the spec as well.
+
+        A part may be stronger than its plan is on average. And where outputs are paid for, what costs little
+        at an estimate (that of a sensor which is not connected) may cost any amount elsewhere; plants differ,
+        so that the cap is wide there.
+        """
+        if not np.isfinite(cap):
+            return plan
+        weights, applied = build_cost(self.spec), plan.applied
+        at = FiniteRecord(replace(self.nominal, samples=len(applied)), len(applied), record_step(self.spec))
+        cost = weighted_sum(weights, {kind: at.mean_squares(kind, applied).tolist() for kind in weights})
+        if any(self.nominal.depends_on_plant(kind) for kind in weights):
+            cap *= _ELSEWHERE
+        return plan if cost <= cap * REACHED else plan.weaker(cap / cost)
 
     def cheapest(self, model: Model) -> float:
         """Cost, summed over the samples, of the design that knows the plant: the oracle."""

@@ -1,0 +1,185 @@
+"""What was applied, compared with what was planned: where in the plan a record begins, how far it follows.
+
+Records are as loggers write them: they begin late or early, some of their samples are lost, actuators clip
+and sensors round. All of that leaves most of a record in step with its plan; another experiment is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.plant.polynomial import Array
+
+LIKE = 0.9
+"""From this correlation on a record follows its plan; below, that is told."""
+UNLIKE = 0.5
+"""Below it does not, unless samples are lost or shifted and the rest follows to `_SPLICED`."""
+_SPLICED = 0.7
+# So many samples may be lost, or written twice; each time must explain more than so many of the others.
+_SLIPS, _PAYS = 5, 5.0
+# Another start explains so much more of the correlation.
+_BETTER = 0.02
+# A scale is off by more than this, by so many of its standard deviations, and explains most of what is off.
+_OFF, _SURE = 0.02, 3.0
+# An actuator that clips does so in samples beyond this share of half their range.
+_CLIPPED, _FEW = 0.95, 2
+# A channel is at rest in plans smaller than this share of the strongest; moved by half of that it is not.
+_AT_REST, _MOVED = 0.02, 0.5
+# Orders of more channels are not tried.
+_MOST = 6
+
+
+@dataclass(frozen=True)
+class Match:
+    """How a record follows a plan.
+
+    Attributes:
+        begins: the sample of the plan that the record begins with.
+        likeness: the correlation of the channel that follows least, from -1 to 1, as recorded; `spliced`:
+            with samples that are shifted, lost or written twice put in their places.
+        channel: its number from 1.
+        scale: at which the channel was applied whose scale is farthest off; `off`: that it is not one.
+        exchanged: for each channel of the plan the channel of the record, numbers from 1, that follows it,
+            where these are others than its own; None else.
+    """
+
+    begins: int
+    likeness: float
+    spliced: float
+    channel: int
+    scale: float
+    off: bool
+    exchanged: tuple[int, ...] | None
+
+    @property
+    def follows(self) -> bool:
+        """Whether it may be the record of the plan."""
+        return self.likeness >= UNLIKE or self.spliced >= _SPLICED
+
+
+def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: float) -> Match:
+    """How a record follows its plan, both about the level that was planned.
+
+    Args:
+        plan: (n, r); `applied`: (m, r), whose `rows` (m,) are counted from its first.
+        strongest: the largest root mean square of all plans, beside which a plan may be at rest.
+    """
+    begins = _begins(plan, applied, rows)
+    due = plan[begins + rows]
+    shares = [_followed(due[:, j], applied[:, j], strongest) for j in range(plan.shape[1])]
+    least = int(np.argmin(shares))
+    spliced = shares[least]
+    if spliced < LIKE:
+        spliced = max(spliced, _in_step(plan[:, least], applied[:, least], begins + rows))
+    scale, off = max((_scale(due[:, j], applied[:, j]) for j in range(plan.shape[1])), key=_far)
+    if off and spliced > abs(shares[least]) + _BETTER:
+        off = False  # rows out of their places look like a smaller scale
+    exchanged = _exchanged(due, applied, strongest, shares[least])
+    return Match(begins, shares[least], spliced, least + 1, scale, off, exchanged)
+
+
+def _far(found: tuple[float, bool]) -> tuple[bool, float]:
+    scale, off = found
+    return off, abs(scale - 1.0)
+
+
+def likeness(plan: Array, applied: Array) -> float:
+    """The correlation of two signals (m, r), about their means or not, whichever is larger in size."""
+    return max(_correlation(plan, applied), _correlation(_centred(plan), _centred(applied)), key=abs)
+
+
+def _centred(signal: Array) -> Array:
+    return np.asarray(signal - signal.mean(axis=0), dtype=float)
+
+
+def _correlation(plan: Array, applied: Array) -> float:
+    sizes = float(np.linalg.norm(plan)) * float(np.linalg.norm(applied))
+    return float(np.sum(plan * applied)) / sizes if sizes > 0.0 else 0.0
+
+
+def _followed(plan: Array, applied: Array, strongest: float) -> float:
+    """The likeness of one channel (m,); of one that is at rest, whether it was."""
+    if _rms(plan) < _AT_REST * strongest:
+        return float(_rms(_centred(applied)) <= _MOVED * strongest)
+    return likeness(plan, applied)
+
+
+def _rms(signal: Array) -> float:
+    return float(np.sqrt(np.mean(signal**2)))
+
+
+def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
+    """The sample of the plan (n, r) that a record (m, r) of these `rows` begins with, if not the first."""
+
+    def at(start: int) -> float:
+        return abs(likeness(plan[start + rows], applied))
+
+    best = max(range(len(plan) - int(rows[-1])), key=at)
+    return best if at(best) > max(LIKE, at(0) + _BETTER) else 0
+
+
+def _in_step(plan: Array, applied: Array, places: NDArray[np.int64]) -> float:
+    """The correlation where the record (m,) may slip against the plan (n,), by a few samples in all.
+
+    By dynamic programming over the samples: the state is the slip, and a change of it has its price.
+    """
+    slips = np.arange(-_SLIPS, _SLIPS + 1)
+    padded = np.pad(plan - plan.mean(), _SLIPS + 1)
+    along = padded[np.clip(places[:, None] + slips + _SLIPS + 1, 0, len(padded) - 1)]
+    record = applied - applied.mean()
+    sizes = _rms(plan - plan.mean()) * _rms(record)
+    if sizes == 0.0:
+        return 0.0
+    gains = along * record[:, None] / sizes
+    total = gains[0]
+    for gain in gains[1:]:
+        total = np.maximum(total, total.max() - _PAYS) + gain
+    return float(total.max()) / len(record)
+
+
+def _scale(plan: Array, applied: Array) -> tuple[float, bool]:
+    """The scale at which a plan (m,) was applied, and whether samples that are not clipped refute one."""
+    scale = _fitted(plan, applied)[0]
+    if abs(likeness(plan, applied)) <= LIKE or not _off(plan, applied):
+        return scale, False
+    low, high = float(np.min(applied)), float(np.max(applied))
+    inner = np.abs(applied - 0.5 * (low + high)) < _CLIPPED * 0.5 * (high - low)
+    return scale, int(np.sum(inner)) <= _FEW or _off(plan[inner], applied[inner])
+
+
+def _off(plan: Array, applied: Array) -> bool:
+    """Whether another scale than one explains a record (m,) better than chance does."""
+    scale, rest = _fitted(plan, applied)
+    size = float(np.sum(_centred(plan) ** 2)) or float(np.sum(plan**2))
+    deviation = np.sqrt(rest / (size * max(len(plan) - 2, 1)))
+    least = max(_OFF, _SURE * deviation, np.sqrt(rest / size))
+    return bool(abs(scale - 1.0) > least)
+
+
+def _fitted(plan: Array, applied: Array) -> tuple[float, float]:
+    """The scale of a plan (m,), with a level where that explains more, and the squares that are left."""
+    found = []
+    for p, a in ((plan, applied), (_centred(plan), _centred(applied))):
+        size = float(np.sum(p**2))
+        if size > 0.0:
+            scale = float(np.sum(p * a)) / size
+            found.append((abs(_correlation(p, a)), scale, float(np.sum((a - scale * p) ** 2))))
+    _, scale, rest = max(found, default=(0.0, 1.0, 0.0))
+    return scale, rest
+
+
+def _exchanged(plan: Array, applied: Array, strongest: float, own: float) -> tuple[int, ...] | None:
+    """Which channels of the record (m, r) follow those of the plan, where another order does so better.
+
+    Args:
+        own: the likeness of the channel that follows least in their own order.
+    """
+    for order in permutations(range(plan.shape[1])) if own < 1.0 - _BETTER and plan.shape[1] <= _MOST else ():
+        least = min(_followed(plan[:, j], applied[:, k], strongest) for j, k in enumerate(order))
+        if least > max(LIKE, own + _BETTER):
+            return tuple(k + 1 for k in order)
+    return None

@@ -1,0 +1,142 @@
+"""Campaigns in a loop and with two channels, in stages: the true plant is not that of the spec."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.support.commands import caller
+
+TWO = """
+plant:
+  A: [[1, -0.7], [1, 0.4]]
+  B: [[[0, 1.0], [0, -0.5]], [[0, 0.6], [0, 1.2]]]
+noise: {variance: [[1.0, 0.4], [0.4, 0.5]]}
+experiment: {samples: 300}
+accuracy: {model_error: {relative: 0.3}}
+spectrum: {type: fir, order: 4}
+signal: {candidates: 2}
+campaign: {stages: [60, 120, 120], last: nominal}
+"""
+LOOP = """
+plant: {B: [0, 0.5], F: [1, -0.8]}
+noise: {variance: 1.0}
+cost: {input_power: 1, output_power: 1}
+experiment: {samples: 300, controller: {numerator: [0.4], denominator: [1, -0.95]}}
+accuracy: {model_error: {relative: 0.2}}
+spectrum: {type: fir, order: 4}
+signal: {candidates: 2}
+campaign: {stages: [60, 120, 120], last: nominal}
+"""
+# As in the specs, and off by several standard deviations of the finished experiment.
+TRUE_TWO = {"a1[1]": -0.75, "a1[2]": 0.35, "b1[1,1]": 0.9, "b1[1,2]": -0.6, "b1[2,1]": 0.7, "b1[2,2]": 1.1}
+TRUE_LOOP = {"b1": 0.4, "f1": -0.85}
+
+
+def two(u, e):
+    """(n, 2): y of two ARX equations, sample by sample."""
+    at = TRUE_TWO
+    A = np.diag([at["a1[1]"], at["a1[2]"]])
+    B = np.array([[at["b1[1,1]"], at["b1[1,2]"]], [at["b1[2,1]"], at["b1[2,2]"]]])
+    y = np.zeros_like(u)
+    for t in range(len(u)):
+        y[t] = e[t] @ np.linalg.cholesky([[1.0, 0.4], [0.4, 0.5]]).T
+        if t:
+            y[t] += -A @ y[t - 1] + B @ u[t - 1]
+    return y
+
+
+def loop(r, e):
+    """u and y (n, 1) of u = r - 0.4 / (1 - 0.95 q^-1) y."""
+    u, y, x, v = np.zeros_like(r), np.zeros_like(r), 0.0, 0.0
+    for t in range(len(r)):
+        if t:
+            x = -TRUE_LOOP["f1"] * x + TRUE_LOOP["b1"] * u[t - 1, 0]
+        y[t] = x + e[t]
+        v = 0.95 * v + 0.4 * y[t, 0]
+        u[t] = r[t] - v
+    return u, y
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `idesign` in an empty folder with the specs in it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.yaml").write_text(TWO)
+    (tmp_path / "loop.yaml").write_text(LOOP)
+    return caller(monkeypatch, capsys)
+
+
+def recorded(directory, name):
+    """Header and rows of what is recorded of the part that comes next."""
+    plans = [np.loadtxt(path, delimiter=",", skiprows=1) for path in sorted(directory.glob("plan_*.csv"))]
+    times, x = np.concatenate(plans)[:, 0], np.concatenate(plans)[:, 1:]
+    e = np.random.default_rng(4).standard_normal((1000, x.shape[1]))[: len(x)]
+    if name == "two":
+        table, header = np.column_stack([times, x, two(x, e)]), "time_s,u1,u2,y1,y2"
+    else:
+        table, header = np.column_stack([times, *loop(x, e), x]), "time_s,u,y,r"
+    return header, table[-len(plans[-1]) :]
+
+
+def saved(path, header, table):
+    np.savetxt(path, table, delimiter=",", header=header, comments="")
+    return path
+
+
+@pytest.mark.parametrize(("name", "true"), [("two", TRUE_TWO), ("loop", TRUE_LOOP)])
+def test_a_campaign_ends_with_the_true_parameters(run, tmp_path, name, true):
+    assert run("campaign", f"{name}.yaml", "-o", "c", "--no-figures")[0] == 0
+    for number in range(1, 8):
+        record = saved(tmp_path / f"r{number}.csv", *recorded(tmp_path / "c", name))
+        code, out, _ = run("next", "c", record, "--json", "--no-figures")
+        result = json.loads(out)
+        assert code == 0
+        if result["status"] != "running":
+            break
+    assert result["status"] == "stopped"
+    last = result["campaign"]["rounds"][-1]
+    for parameter, value in true.items():
+        assert abs(last["estimate"][parameter] - value) < 4 * last["standard_deviation"][parameter]
+    for record in result["campaign"]["records"]:
+        assert record["likeness"] == pytest.approx(1.0)
+    assert [record["samples"] for record in result["campaign"]["records"]][:2] == [60, 120]
+
+
+def test_the_input_of_a_loop_is_not_its_reference(run, tmp_path):
+    assert run("campaign", "loop.yaml", "-o", "c", "--no-figures")[0] == 0
+    header, table = recorded(tmp_path / "c", "loop")
+    wrong = table.copy()
+    wrong[:, 3] += 0.8 * np.std(table[:, 3]) * np.random.default_rng(1).standard_normal(len(table))
+    code, _, err = run("next", "c", saved(tmp_path / "w.csv", header, wrong))
+    assert (code, "record-unlike" in err, "r1 has a correlation" in err) == (2, True, True)
+    code, out, _ = run("next", "c", saved(tmp_path / "n.csv", "time_s,u,y", table[:, :3]), "--json")
+    assert code == 0
+    assert any("n.csv has no column r" in note for note in json.loads(out)["notes"])
+
+
+def test_exchanged_channels_are_named(run, tmp_path):
+    assert run("campaign", "two.yaml", "-o", "c", "--no-figures")[0] == 0
+    header, table = recorded(tmp_path / "c", "two")
+    record = saved(tmp_path / "x.csv", header, table[:, [0, 2, 1, 3, 4]])
+    code, _, err = run("next", "c", record)
+    assert (code, "record-unlike" in err, "it holds them as 2, 1" in err) == (2, True, True)
+    columns = "u1=u2,u2=u1,y1=y1,y2=y2"
+    assert run("next", "c", record, "--columns", columns, "--no-figures")[0] == 0
+
+
+def test_a_record_that_ends_early_says_so(run, tmp_path):
+    assert run("campaign", "two.yaml", "-o", "c", "--no-figures")[0] == 0
+    header, table = recorded(tmp_path / "c", "two")
+    code, out, _ = run("next", "c", saved(tmp_path / "s.csv", header, table[:45]), "--json", "--no-figures")
+    assert code == 0
+    assert any("s.csv ends after 45 of the 60 samples" in note for note in json.loads(out)["notes"])
+
+
+def test_what_is_wrong_with_a_record_is_said_of_the_file_that_was_given(run, tmp_path):
+    assert run("campaign", "loop.yaml", "-o", "c", "--no-figures")[0] == 0
+    header, table = recorded(tmp_path / "c", "loop")
+    assert run("next", "c", saved(tmp_path / "n.csv", "time_s,u,y", table[:, :3]), "--no-figures")[0] == 0
+    code, _, err = run("next", "c", saved(tmp_path / "again.csv", header, table), "--as-applied")
+    assert (code, "data-repeated" in err, "again.csv and record_01.csv" in err) == (2, True, True)
+    assert "record_02.csv" not in err
