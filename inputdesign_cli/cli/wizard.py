@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.options import Overwrite, Quiet
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import colourful, status
@@ -64,7 +65,7 @@ def wizard(
     if unanswered and not known and not terminal:
         _refuse(unanswered)
     draft = _asked(known, output, quiet) if unanswered and terminal else None
-    with status("thinking ...", quiet=quiet):
+    with computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.runs.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
         from inputdesign_cli.wizard.solving import enough_lines
@@ -83,7 +84,7 @@ def wizard(
 
 
 def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
-    with status(f"{file}: computing ...", quiet=quiet):
+    with computing(file, quiet=quiet):
         from inputdesign_cli import load_spec, tasks
         from inputdesign_cli.wizard.solving import to_log, verdict
 
@@ -92,7 +93,7 @@ def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     place = Place(None, file.stem, [file], overwrite)
     keep(results, place, figures=True, json_output=False, quiet=True)
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
-        with status(f"{file}: what else would do ...", quiet=quiet):
+        with computing(file, quiet=quiet, doing="what else would do"):
             found = verdict(spec, results.result, _result)
         if not quiet:
             typer.echo(

@@ -17,6 +17,7 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.knowledge import build_knowledge
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.prior import build_earlier, stated_prior
 from inputdesign_cli.tasks.build.requirements import build_requirements
@@ -51,6 +52,7 @@ def build_identification(spec: Spec) -> Identification:
         operating_point=operating_point(spec),
         earlier=build_earlier(spec, nominal),
         has_prior=spec.experiment.prior is not None,
+        knowledge=build_knowledge(spec),
         at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
     )
 
