@@ -68,12 +68,12 @@ def wizard(
     with computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.runs.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
-        from inputdesign_cli.wizard.solving import enough_lines
+        from inputdesign_cli.wizard.spectra import with_spectrum
 
         if draft is None:
             draft = compose(known, output.stem, output.parent)
             draft.validate()
-        draft = enough_lines(draft, _result)
+        draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
     if not quiet:
         typer.echo(f"{output}: written; every line says why it stands there, and may be changed")

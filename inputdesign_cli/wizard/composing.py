@@ -16,7 +16,7 @@ from inputdesign_cli.wizard.wishes import wished
 
 _MOST, LEAST = 5000, 50  # samples
 _PLANTS, _FRESH = 30, 200
-_FIRST = 60  # sinusoids
+_FIRST = "{type: fir, order: 20}"
 
 
 @dataclass(frozen=True)
@@ -25,32 +25,33 @@ class Draft:
 
     Args:
         heads: what stands before the spectrum, tails behind it.
-        lines: of the multisine; None where the accuracy tells them.
+        spectrum: as in a spec; None where the accuracy tells it.
         said: the answers.
-        why: the comment on the lines.
+        why: the comment on the spectrum.
     """
 
     heads: tuple[str, ...]
     tails: tuple[str, ...]
     files: Mapping[str, bytes]
-    lines: int | None
+    spectrum: str | None
     folder: Path
     said: Mapping[str, str]
-    why: str = "sinusoids"
+    why: str = "filtered noise"
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the spectrum is to be chosen."""
+        return self.spectrum is not None
 
     @property
     def text(self) -> str:
         """The spec."""
-        spectrum = (
-            ()
-            if self.lines is None
-            else (f"spectrum: {{type: multisine, lines: {self.lines}}}  # {self.why}",)
-        )
+        spectrum = () if self.spectrum is None else (f"spectrum: {self.spectrum}  # {self.why}",)
         return "\n".join([*self.heads, *spectrum, *self.tails]) + "\n"
 
-    def with_lines(self, lines: int, why: str) -> Draft:
-        """The same with another number of sinusoids."""
-        return replace(self, lines=lines, why=why)
+    def with_spectrum(self, spectrum: str, why: str) -> Draft:
+        """The same with another one."""
+        return replace(self, spectrum=spectrum, why=why)
 
     def spec(self) -> Spec:
         """The spec, checked; the files beside it must have been written.

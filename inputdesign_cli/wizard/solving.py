@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,36 +10,13 @@ import numpy as np
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Result, Results
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.wizard.composing import LEAST, Draft
-from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.composing import LEAST
 from inputdesign_cli.wizard.phrases import short
+from inputdesign_cli.wizard.spectra import Solve
 
-_GAP, _MOST_LINES = 0.02, 240
-_TOLD = 1e-3  # smaller gaps are told as this
 _ROOM, _TRIES = 1.1, 6
 _LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
-
-Solve = Callable[[Spec], Result]
-
-
-def enough_lines(draft: Draft, solve: Solve) -> Draft:
-    """The draft with as many sinusoids as come within 2 % of every spectrum, at the plant as stated."""
-    while draft.lines is not None:
-        nominal = draft.spec().with_(uncertainty=None, **{"signal.candidates": 1})
-        with in_their_words(draft.said):
-            objective = solve(nominal)["objective"]
-        best = objective.get("any_spectrum_bound")
-        if best is None:
-            return draft.with_lines(draft.lines, "sinusoids; how near to every spectrum was not computed")
-        gap = float(objective["value"]) / float(best) - 1.0
-        told = (
-            f"no other spectrum is better than so many sinusoids by more than {100 * max(gap, _TOLD):.2g} %"
-        )
-        if gap <= _GAP or 2 * draft.lines > min(_MOST_LINES, nominal.experiment.samples // 2):
-            return draft.with_lines(draft.lines, told)
-        draft = draft.with_lines(2 * draft.lines, told)
-    return draft
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
 
 Detrend = Literal["none", "constant", "linear", "auto"]
@@ -166,7 +167,7 @@ def standing_alone(name: str, x: Array, rows: NDArray[np.int64]) -> list[str]:
         return []
     listed = ", ".join(str(rows[i]) for i in found[:_SHOWN])
     return [
-        f"{name} has {found.size} values ({100 * found.size / x.size:.2g} %) far from their neighbours (row "
+        f"{name} has {found.size} values ({per_cent(found.size / x.size, 2)}) far from their neighbours (row "
         f"{listed}, ..): spikes? Look at the record, and empty the cells that are faults of measurement"
     ]
 
