@@ -80,13 +80,14 @@ def wizard(
     if solve is None:
         solve = terminal and typer.confirm("Design the experiment now?", default=True)
     if solve:
-        _solve(output, trade=trade, overwrite=overwrite, quiet=quiet)
+        _solve(output, draft.there, trade=trade, overwrite=overwrite, quiet=quiet)
 
 
-def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
+def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     with computing(file, quiet=quiet):
         from inputdesign_cli import load_spec, tasks
-        from inputdesign_cli.wizard.solving import to_log, verdict
+        from inputdesign_cli.wizard.closing import to_log
+        from inputdesign_cli.wizard.solving import verdict
 
         spec = load_spec(file)
         results = tasks.solve(spec)
@@ -94,7 +95,7 @@ def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
     keep(results, place, figures=True, json_output=False, quiet=True)
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
         with computing(file, quiet=quiet, doing="what else would do"):
-            found = verdict(spec, results.result, _result)
+            found = verdict(spec, results.result, _result, there)
         if not quiet:
             typer.echo(
                 "\n".join(

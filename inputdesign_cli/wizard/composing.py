@@ -27,6 +27,7 @@ class Draft:
         heads: what stands before the spectrum, tails behind it.
         spectrum: as in a spec; None where the accuracy tells it.
         said: the answers.
+        there: seconds that may be taken.
         why: the comment on the spectrum.
     """
 
@@ -36,6 +37,7 @@ class Draft:
     spectrum: str | None
     folder: Path
     said: Mapping[str, str]
+    there: float
     why: str = "filtered noise"
 
     @property
@@ -118,11 +120,11 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     heads += [*asked, "objective: best_accuracy  # use all that is allowed"]
     heads += limit_lines(span, said["limits"], duration, step)
     if duration < there:
-        heads[-1] += f", {_MOST} samples; the time there is would be {short(there)}"
-    tails = signal_lines(said["signals"], said["converter"], span)
+        heads[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
+    tails = signal_lines(said["signals"], said["converter"], span, said["limits"])
     if nonparametric:
-        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said)
-    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said)
+        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said, there)
+    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said, there)
 
 
 def _why_step(plant: PlantAnswer) -> str:

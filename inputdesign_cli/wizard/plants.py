@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError
+from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification.yaml.reader import read
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.phrases import LARGEST, after, needed, seconds_after, share, short
 from inputdesign_cli.wizard.questions import bad_answer
@@ -35,6 +34,7 @@ class PlantAnswer:
         covariance: the one of them that tells how good the estimate is.
         sampling: seconds between samples, where that is known already.
         tunable: whether rules of tuning know it.
+        channels: the larger number of its inputs and outputs.
     """
 
     lines: tuple[str, ...]
@@ -47,6 +47,7 @@ class PlantAnswer:
     covariance: str | None = None
     sampling: float | None = None
     tunable: bool = False
+    channels: int = 1
 
     @property
     def sample_time(self) -> float:
@@ -109,6 +110,7 @@ TEMPLATES = {
             1000.0, 420.0,
         ),
         sampling=60.0,
+        channels=2,
     ),
 }  # fmt: skip
 
@@ -211,7 +213,8 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
 
 def _explored(path: Path, stem: str) -> PlantAnswer:
     """The model of `idesign explore`, in a file beside the spec."""
-    from inputdesign_cli import tasks
+    from inputdesign_cli import parse_spec, tasks
+    from inputdesign_cli.tasks.build.tuning import process_of
 
     found = tasks.explore([path])
     name = f"{stem}-model.yaml"
@@ -219,10 +222,20 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
         why = "; ".join(found.reasons) or "no model deserves trust"
         raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
     model = found.results.files["model.yaml"]
-    data = read(model.decode(), name).data
-    step = float(data.get("sample_time", 1.0)) if isinstance(data, dict) else 1.0
+    spec = parse_spec(model.decode(), name, design=False)
+    step, plant = spec.sample_time, spec.plant
+    assert plant.kind != "regression"
     lines = (f"include: [{name}]  # plant and noise, explored in {path.name}",)
-    return PlantAnswer(lines, 20.0 * step, 0.0, files={name: model}, sampling=step)
+    try:
+        process_of(spec)
+    except SpecError:
+        tunable = False
+    else:
+        tunable = True
+    channels = max(plant.inputs, plant.outputs)
+    return PlantAnswer(
+        lines, 20.0 * step, 0.0, files={name: model}, sampling=step, tunable=tunable, channels=channels
+    )
 
 
 def _of_control(path: Path) -> PlantAnswer:
