@@ -190,7 +190,7 @@ def test_a_log_is_explored(tmp_path):
 
 
 def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
-    """A search over structures takes what drifts for a second lag and a zero, which no rule of tuning knows."""
+    """A search over structures takes drift for a second lag and a zero, which no rule of tuning knows."""
     rng = np.random.default_rng(4)
     u = np.repeat(rng.choice([-5.0, 5.0], 60), 20)
     a, y = np.exp(-5.0 / 180.0), np.zeros(1200)
