@@ -195,7 +195,7 @@ def measure(name, runs):
     found = tasks.solve(spec.with_(**changes))
     step = spec.sample_time
     offset = float(spec.signal.offset or 0.0)
-    u, judged = found.signal - offset, spec.with_(uncertainty=None, **{"solver.any_spectrum": False})
+    u, judged = found.signal - offset, spec.with_(**{"solver.any_spectrum": False})
     channels = range(1, u.shape[1] + 1)
     point = {f"{kind}{i}": 0.0 for kind in "uy" for i in channels}
     header = ",".join(["time", *(f"{kind}{i}" for kind in "uy" for i in channels)])

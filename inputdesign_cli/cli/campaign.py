@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.data import levels, named
 from inputdesign_cli.cli.options import (
     Columns,
@@ -23,7 +24,6 @@ from inputdesign_cli.cli.options import (
 )
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep, renew
-from inputdesign_cli.cli.terminal import status as told
 from inputdesign_cli.errors import EXIT_DONE, EXIT_MISSED, EXIT_UNDECIDED
 
 CampaignDirectory = Annotated[
@@ -49,7 +49,7 @@ def campaign(
     The directory remembers every plan, record and decision.
     """
     place = Place(output, name_of(spec), [spec], overwrite)
-    with told(f"{spec}: computing ...", quiet=quiet):
+    with computing(spec, quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.campaign.rounds import begun
 
@@ -93,7 +93,7 @@ def proceed(
     """
     if data is not None and withdraw is not None:
         raise typer.BadParameter("give a record, or withdraw one", param_hint="--withdraw")
-    with told(f"{directory}: computing ...", quiet=quiet):
+    with computing(directory, quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.campaign.memory import held, read_memory
         from inputdesign_cli.campaign.rounds import advanced, withdrawn
@@ -102,7 +102,7 @@ def proceed(
         from inputdesign_cli.tasks.build.preparation import Preparation
 
     with held(directory):
-        with told(f"{directory}: computing ...", quiet=quiet):
+        with computing(directory, quiet=quiet):
             memory = read_memory(directory)
             stated = parse_spec(memory.spec, str(directory / SPEC), folder=memory.folder)
             decide = partial(tasks.next_round, stated)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.options import (
     Columns,
     Confine,
@@ -34,7 +35,6 @@ from inputdesign_cli.cli.options import (
 )
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED, EXIT_UNDECIDED
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def identify(
     model error; prints a summary. In closed loop the direct method is used, from u and y alone.
     """
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
-    with status(f"{data[0]}: computing ...", quiet=quiet):
+    with computing(data[0], quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.runs.origin import check_counted_once
 
@@ -129,7 +129,7 @@ def assess(
     the residuals refute the model structure; the note says what to change.
     """
     place = Place(output, f"{data[0].stem}_assessed", [spec, *data], overwrite, no_output, judges=True)
-    with status(f"{data[0]}: computing ...", quiet=quiet):
+    with computing(data[0], quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.runs.origin import check_counted_once
 

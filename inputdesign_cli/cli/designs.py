@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.options import (
     Confine,
     Fast,
@@ -25,7 +25,6 @@ from inputdesign_cli.cli.options import (
 from inputdesign_cli.cli.reading import name_of, read_spec
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.streams import ending_early
-from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.cli.trade import TradeWords, tell_trade
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
 from inputdesign_cli.compute.time_limit import stoppable
@@ -33,11 +32,8 @@ from inputdesign_cli.errors import STANDARD_INPUT
 
 if TYPE_CHECKING:
     from inputdesign_cli.compute.executor import Executor
-    from inputdesign_cli.compute.watching import Counted, Round
     from inputdesign_cli.runs.results import Results
     from inputdesign_cli.sweep.verbs import Verb
-
-_PATIENCE = 2.0  # seconds after which the rounds of a design are told
 
 
 def solve(
@@ -147,17 +143,9 @@ def _results(
     The numerical libraries are imported behind the message.
     """
     file = place.sources[0]
-    with status(f"{file}: computing ...", quiet=quiet) as show:
-        from inputdesign_cli.compute.watching import watching
+    with computing(file, quiet=quiet):
         from inputdesign_cli.sweep.verbs import run_verb
-
-        started = time.monotonic()
-
-        def told(done: Round | Counted) -> None:
-            if time.monotonic() - started > _PATIENCE:
-                show(f"{file}: {done} ...")
 
         spec = read_spec(file, overrides, confine)
         place = place.checked(spec)
-        with watching(told):
-            return run_verb(verb, spec, executor), place
+        return run_verb(verb, spec, executor), place

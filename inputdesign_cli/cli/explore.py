@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.data import preparation
 from inputdesign_cli.cli.options import (
     Columns,
@@ -27,7 +28,6 @@ from inputdesign_cli.cli.options import (
 )
 from inputdesign_cli.cli.reading import read_spec
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.cli.terminal import status
 from inputdesign_cli.errors import EXIT_MISSED
 
 
@@ -61,7 +61,7 @@ def explore(
     ending = "explored" if validate is None else "validated"
     sources = [*([validate] if validate is not None else []), *data]
     place = Place(output, f"{data[0].stem}_{ending}", sources, overwrite, no_output)
-    with status(f"{data[0]}: computing ...", quiet=quiet):
+    with computing(data[0], quiet=quiet):
         from inputdesign_cli import tasks
 
         prepared = preparation(columns, sample_time, time_unit, resample, detrend, skip, span)

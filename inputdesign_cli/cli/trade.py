@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inputdesign_cli.cli.terminal import status
+from inputdesign_cli.cli.computing import computing
 
 if TYPE_CHECKING:
     from inputdesign_cli.figures.trade import Trade
@@ -48,7 +48,7 @@ def tell_trade(
     quiet: bool,
 ) -> Trade:
     """Run the sweep, draw trade.png into its directory, and print the table."""
-    with status(f"{directory}: trading {' and '.join(words)} ...", quiet=quiet):
+    with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
         from inputdesign_cli.figures.style import rendered
         from inputdesign_cli.figures.trade import draw_trade
         from inputdesign_cli.runs.run_directory import write_bytes

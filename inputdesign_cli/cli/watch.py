@@ -19,6 +19,7 @@ from inputdesign_cli.errors import STANDARD_INPUT, IdesignError
 if TYPE_CHECKING:
     from inputdesign_cli.live.board import Board
     from inputdesign_cli.live.changes import Stamp
+    from inputdesign_cli.live.painters import Painters
 
 _LOOK = 0.1  # seconds between looks at the file while it is solved
 
@@ -48,22 +49,30 @@ def watch(
     """
     from inputdesign_cli.live.board import Board
     from inputdesign_cli.live.pages import message_page
+    from inputdesign_cli.live.painters import painters
     from inputdesign_cli.live.server import serving
 
     if str(spec) == STANDARD_INPUT:
         raise typer.BadParameter("standard input cannot be followed: name a file", param_hint="SPEC")
     board = Board()
     board.show(message_page(spec.name, "Computing .."))
-    with serving(board, port) as address:
+    with serving(board, port) as address, painters() as drawing:
         typer.echo(address)
         if spec.is_dir():
             _follow_directory(spec, board)
         told = [*(overrides or []), *(["solver.any_spectrum=false"] if fast else [])]
-        _follow_spec(spec, told, confine, Place(output, spec.stem, [spec], overwrite), board, figures)
+        place = Place(output, spec.stem, [spec], overwrite)
+        _follow_spec(spec, told, confine, place, board, drawing, figures)
 
 
 def _follow_spec(
-    spec: Path, overrides: list[str], confine: Path | None, place: Place, board: Board, figures: bool
+    spec: Path,
+    overrides: list[str],
+    confine: Path | None,
+    place: Place,
+    board: Board,
+    drawing: Painters,
+    figures: bool,
 ) -> None:
     """Solve and show, again and again."""
     from inputdesign_cli.cli.reading import read_spec
@@ -90,8 +99,9 @@ def _follow_spec(
                 )
                 # The answer at once; then what the page draws; then the figures that are files.
                 board.show(solved(pictures=False).page)
-                followed = solved()
+                followed = solved(painters=drawing.executor)
                 board.show(followed.page)
+                drawing.get_ready()
                 if figures and stamp(files) == before:
                     keep(results, place, figures=True, json_output=False, quiet=True)
         except IdesignError as error:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.options import Overwrite, Quiet
 from inputdesign_cli.cli.run import Place, keep
 from inputdesign_cli.cli.terminal import colourful, status
@@ -64,36 +65,37 @@ def wizard(
     if unanswered and not known and not terminal:
         _refuse(unanswered)
     draft = _asked(known, output, quiet) if unanswered and terminal else None
-    with status("thinking ...", quiet=quiet):
+    with computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.runs.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
-        from inputdesign_cli.wizard.solving import enough_lines
+        from inputdesign_cli.wizard.spectra import with_spectrum
 
         if draft is None:
             draft = compose(known, output.stem, output.parent)
             draft.validate()
-        draft = enough_lines(draft, _result)
+        draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
     if not quiet:
         typer.echo(f"{output}: written; every line says why it stands there, and may be changed")
     if solve is None:
         solve = terminal and typer.confirm("Design the experiment now?", default=True)
     if solve:
-        _solve(output, trade=trade, overwrite=overwrite, quiet=quiet)
+        _solve(output, draft.there, trade=trade, overwrite=overwrite, quiet=quiet)
 
 
-def _solve(file: Path, *, trade: bool, overwrite: bool, quiet: bool) -> None:
-    with status(f"{file}: computing ...", quiet=quiet):
+def _solve(file: Path, there: float, *, trade: bool, overwrite: bool, quiet: bool) -> None:
+    with computing(file, quiet=quiet):
         from inputdesign_cli import load_spec, tasks
-        from inputdesign_cli.wizard.solving import to_log, verdict
+        from inputdesign_cli.wizard.closing import to_log
+        from inputdesign_cli.wizard.solving import verdict
 
         spec = load_spec(file)
         results = tasks.solve(spec)
     place = Place(None, file.stem, [file], overwrite)
     keep(results, place, figures=True, json_output=False, quiet=True)
     if spec.accuracy.criterion is None and "worst_ratio" in results.result.get("signal", {}):
-        with status(f"{file}: what else would do ...", quiet=quiet):
-            found = verdict(spec, results.result, _result)
+        with computing(file, quiet=quiet, doing="what else would do"):
+            found = verdict(spec, results.result, _result, there)
         if not quiet:
             typer.echo(
                 "\n".join(

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Generic
+from typing import Any, Generic
 
 from inputdesign_cli.compute.executor import Answer, Finished, Job, WorkerLostError
 from inputdesign_cli.compute.threads import ONE_THREAD
@@ -42,33 +42,39 @@ class Processes:
     def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
         """Yield every job with its answer, in the order in which they are finished."""
         workers: list[_Worker[Job]] = []
-        again: list[tuple[Job, int]] = []
-        source = iter(jobs)
         try:
-            while True:
-                self._feed(workers, function, again, source)
-                busy = [worker for worker in workers if worker.work is not None]
-                if not busy:
-                    return
-                ready = wait([worker.pipe for worker in busy])
-                for worker in [w for w in busy if w.pipe in ready]:
-                    assert worker.work is not None  # it is busy
-                    job, attempts = worker.work
-                    worker.work = None
-                    try:
-                        answer, error = worker.pipe.recv()
-                    except (EOFError, OSError):
-                        workers.remove(worker)
-                        _end(worker)
-                        if attempts < _ATTEMPTS:
-                            again.append((job, attempts))
-                            continue
-                        lost = f"{_ATTEMPTS} processes ended in the middle of it"
-                        answer, error = None, WorkerLostError(lost)
-                    yield Finished(job, answer, error)
+            yield from self._run(workers, function, jobs)
         finally:
             for worker in workers:
                 _end(worker)
+
+    def _run(
+        self, workers: list[_Worker[Job]], function: Callable[[Job], Answer], jobs: Iterable[Job]
+    ) -> Iterator[Finished[Job, Answer]]:
+        """The same with the processes that are there, and as many more as it takes."""
+        again: list[tuple[Job, int]] = []
+        source = iter(jobs)
+        while True:
+            self._feed(workers, function, again, source)
+            busy = [worker for worker in workers if worker.work is not None]
+            if not busy:
+                return
+            ready = wait([worker.pipe for worker in busy])
+            for worker in [w for w in busy if w.pipe in ready]:
+                assert worker.work is not None  # it is busy
+                job, attempts = worker.work
+                worker.work = None
+                try:
+                    answer, error = worker.pipe.recv()
+                except (EOFError, OSError):
+                    workers.remove(worker)
+                    _end(worker)
+                    if attempts < _ATTEMPTS:
+                        again.append((job, attempts))
+                        continue
+                    lost = f"{_ATTEMPTS} processes ended in the middle of it"
+                    answer, error = None, WorkerLostError(lost)
+                yield Finished(job, answer, error)
 
     def _feed(
         self,
@@ -96,6 +102,32 @@ class Processes:
             # A process that has just ended tells so by its pipe, where its answer is awaited.
             with suppress(BrokenPipeError, ConnectionResetError):
                 free.pipe.send((function, job))
+
+
+@dataclass(frozen=True)
+class StandingProcesses(Processes):
+    """Processes that stay from one run to the next, with what they have imported, until they are ended."""
+
+    _workers: list[_Worker[Any]] = field(default_factory=list, init=False, repr=False)
+
+    def run(self, function: Callable[[Job], Answer], jobs: Iterable[Job]) -> Iterator[Finished[Job, Answer]]:
+        """Yield every job with its answer, in the order in which they are finished."""
+        try:
+            yield from self._run(self._workers, function, jobs)
+        finally:  # who goes away in the middle leaves answers behind that nobody wants
+            for worker in [one for one in self._workers if one.work is not None]:
+                self._workers.remove(worker)
+                _end(worker)
+
+    def start(self) -> None:
+        """Start them all; in the main thread they are deaf to its interrupts."""
+        while len(self._workers) < self.count:
+            self._workers.append(_start())
+
+    def end(self) -> None:
+        """End them all."""
+        while self._workers:
+            _end(self._workers.pop())
 
 
 def _start() -> _Worker[Job]:

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.identification.adequacy import Echoes
 from inputdesign_cli.identification.checks import check_length, check_varying
 from inputdesign_cli.identification.earlier import Earlier
@@ -138,6 +139,7 @@ def identify_records(
         others = [theta for theta in (known, None if earlier is None else earlier.theta) if theta is not None]
         points = np.concatenate([begin.points, *(theta[None] for theta in others)])
         steps = np.append(begin.steps.astype(float), np.zeros(len(others)))
+        tell(Counted("starting points followed to a minimum", 0, len(points)))
         return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
 
     best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched, start)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.identification.earlier import Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate, Estimate
 from inputdesign_cli.identification.extensions import Extension, larger_transfer_matrices, new_name
@@ -64,11 +65,11 @@ class TransferKind(OfModel):
         """The likeliest after refined instrumental variables, from rest, and those from the `given` one."""
         singles = tuple(self.record(*part) for part in parts)
         about = Records(singles)
-        made = [
-            refine(about, evaluate(about, theta))
-            for single in singles
-            for theta in starting_points(single, self.held)
-        ]
+        begun = [theta for single in singles for theta in starting_points(single, self.held)]
+        made = []
+        for number, theta in enumerate(begun):
+            tell(Counted("starting points tried", number, len(begun)))
+            made.append(refine(about, evaluate(about, theta)))
         refined = [made[number] for number in spread_out(about, [point for point, _ in made], _FOLLOWED)]
         if given is not None:
             refined.append(refine(about, evaluate(about, about.stabilised(np.array(given)))))

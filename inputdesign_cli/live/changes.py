@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-_EVERY = 0.1  # seconds between looks
+_EVERY = 0.05  # seconds between looks
 Stamp = tuple[tuple[int, int, int] | None, ...]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.errors import Diagnostic, IdesignError, Location
 from inputdesign_cli.report.followed import Trail
 from inputdesign_cli.report.render import filled
@@ -30,9 +31,17 @@ class Followed:
         """The same while it is computed anew."""
         return replace(self, state="computing", told="The file was saved: computing ..", errors=())
 
-    def solved(self, run: Path, clock: str, seconds: float, *, pictures: bool = True) -> Followed:
+    def solved(
+        self,
+        run: Path,
+        clock: str,
+        seconds: float,
+        *,
+        pictures: bool = True,
+        painters: Executor | None = None,
+    ) -> Followed:
         """With the design that stands in `run` now; without `pictures` these are still being drawn."""
-        made = run_page(run, Trail(), pictures=pictures) | {"clock": clock}
+        made = run_page(run, Trail(), pictures=pictures, painters=painters) | {"clock": clock}
         told = (
             f"Computed at {clock} in {seconds:.1f} s{'' if pictures else '; its pictures are being drawn'}."
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.regular_file import read_regular
@@ -63,9 +64,19 @@ class Chart:
     readings: str = ""
 
 
-def run_charts(run: Path, result: Result, time_unit: str) -> dict[str, Chart]:
-    """The charts of a run by file stem, drawn for a page; of an older run the pictures that it has."""
-    charts = {stem: _readable(stem, curves, time_unit) for stem, curves in read_curves(run).items()}
+def run_charts(run: Path, result: Result, time_unit: str, by: Executor) -> dict[str, Chart]:
+    """The charts of a run by file stem, drawn for a page; of an older run the pictures that it has.
+
+    Args:
+        by: draws them.
+    """
+    jobs = [(stem, curves, time_unit) for stem, curves in read_curves(run).items()]
+    drawn: dict[str, Chart] = {}
+    for done in by.run(_readable, jobs):
+        if done.answer is None:
+            raise done.error or RuntimeError(f"{done.job[0]} was not drawn")
+        drawn[done.job[0]] = done.answer
+    charts = {stem: drawn[stem] for stem, _, _ in jobs}
     for name in result.get("files", ()):
         stem, _, kind = name.rpartition(".")
         if kind in _PICTURES and stem not in charts and (run / name).is_file():
@@ -73,7 +84,9 @@ def run_charts(run: Path, result: Result, time_unit: str) -> dict[str, Chart]:
     return charts
 
 
-def _readable(stem: str, curves: Curves, time_unit: str) -> Chart:
+def _readable(job: tuple[str, Curves, str]) -> Chart:
+    """The chart of a file stem, of its curves and the unit of time."""
+    stem, curves, time_unit = job
     told, caption = described(curves, time_unit), _caption(stem)
     return readable_chart(
         lambda seen: draw(curves, time_unit, "svg", narrow=True, seen=seen),

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from inputdesign_cli.report.numbers import Fact, listed, precise, shown, spoken
 from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Json, Result
+from inputdesign_cli.runs.shares import per_cent
 
 # Gaps below this are told as such.
 _CLOSED = 1e-6
@@ -57,7 +58,7 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
             f"not {error['alpha']:.4g}",
         )
     if "robust" in result:
-        yield from _robust(result["robust"])
+        yield from _robust(result["robust"], result.get("objective", {}).get("kind") == "accuracy_factor")
     if "mean_squared_error" in result:
         error = result["mean_squared_error"]
         parts = f"squared bias {error['bias_squared']:.6g} + variance {error['variance']:.6g}"
@@ -136,7 +137,7 @@ def _paid(result: Result) -> str:
     )
 
 
-def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
+def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
     """What holds at the plants that the true one might be, and at others drawn in the same way."""
     kept = found["scenarios"] - found["discarded"]
     bound = [_bound_by(item) for item in found["active"][:3]]
@@ -164,12 +165,22 @@ def _robust(found: Mapping[str, Json]) -> Iterator[Fact]:
     if "fresh" in found:
         told = found["fresh"]
         low, high = (f"{100 * share:.3g}" for share in told["limits"])
+        worse = f"are less sure than these, with errors up to {told['largest']:.4g} times as large"
         yield (
             "fresh plants",
-            f"{told['missed']} of {told['draws']} drawn afresh are missed: {100 * told['share']:.3g} % "
+            f"of {told['draws']} more, drawn alike, {told['missed']} "
+            f"{worse if best and told['missed'] else 'get less than that'}: {per_cent(told['share'])} "
             f"({low} to {high})" + (f"; at {told['dearer']} it costs more" if told.get("dearer") else ""),
             "said of plants drawn as the spec says, not of the true plant",
         )
+        if "beyond_limits" in told:
+            peaks = told["beyond_limits"]
+            yield (
+                "limits there",
+                f"single samples keep them at the plants that the design is for; of {told['draws']} more "
+                f"{peaks['draws']} go beyond, up to {per_cent(peaks['largest'])} of a limit",
+                "without noise",
+            )
 
 
 def _bound_by(item: Mapping[str, Json]) -> str:
@@ -256,10 +267,10 @@ def _beside_the_design(found: Mapping[str, Json], signal: Mapping[str, Json]) ->
         if "worst_ratio" in signal:
             less = 1.0 - found["value"] / signal["worst_ratio"]
         if less >= 5e-4:
-            yield f"{100 * less:.3g} % less accuracy than the design"
+            yield f"{per_cent(less)} less accuracy than the design"
         return
     more = signal.get("extra_power", 0.0)
     if abs(more) < 5e-5:
         return
     side = "above" if more > 0 else "below"
-    yield f"at a cost {abs(100 * more):.3g} % {side} that of the designed spectrum"
+    yield f"at a cost {per_cent(abs(more))} {side} that of the designed spectrum"

@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
+from inputdesign_cli.compute.executor import Executor, InProcess
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import run_charts
@@ -70,8 +71,14 @@ _FIELDS = {
 }
 
 
-def run_page(run: Path, trail: Trail, *, pictures: bool = True) -> dict[str, Json]:
-    """The content of the template for a run, with pictures or not. Raises `DataError` as `read_run` does."""
+def run_page(
+    run: Path, trail: Trail, *, pictures: bool = True, painters: Executor | None = None
+) -> dict[str, Json]:
+    """The content of the template for a run, with pictures or not. Raises `DataError` as `read_run` does.
+
+    Args:
+        painters: draw the pictures (default: this process).
+    """
     result = trail.follow(read_run(run))
     _check_fields(run, result)
     verb = _verb(result)
@@ -81,7 +88,7 @@ def run_page(run: Path, trail: Trail, *, pictures: bool = True) -> dict[str, Jso
     except SpecError as error:
         message = f"{run / 'spec.yaml'} is no spec of this version: {error}"
         raise DataError.because("run-unreadable", message, hint="run the spec again") from error
-    charts = run_charts(run, result, question.time_unit) if pictures else {}
+    charts = run_charts(run, result, question.time_unit, painters or InProcess()) if pictures else {}
     data = [name for name in _OF_DATA if name in charts]
     runs = [name for name in charts if name.startswith(_OF_RUNS)]
     placed = {*data, *runs, *(name for _, names in _SECTIONS for name in names)}

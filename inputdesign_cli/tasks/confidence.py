@@ -13,6 +13,7 @@ from inputdesign_cli.errors import InaccurateError, InfeasibleError
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.tasks.simulated_estimates import SimulatedEstimates
 
 SETTLED = 1e-3
@@ -126,7 +127,7 @@ def settled_alpha(needed: Callable[[float], float | None], start: float) -> floa
     raise InaccurateError.because(
         "confidence-not-settled",
         f"no alpha was found for which a design keeps the confidence asked for: after {_MOST_ROUNDS} "
-        f"designs it still changes by {100 * abs(missing):.2g} %",
+        f"designs it still changes by {per_cent(abs(missing), 2)}",
         hint="ask for more draws (confidence: {exact: .., draws: 20000}), or for confidence: 0.95",
         key="accuracy.model_error.confidence",
     )

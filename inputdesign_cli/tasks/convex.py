@@ -31,7 +31,7 @@ from inputdesign_cli.tasks.exact_confidence import ExactConfidence
 from inputdesign_cli.tasks.factor_columns import FewColumns, restrict_columns
 from inputdesign_cli.tasks.foresight import Foresight
 from inputdesign_cli.tasks.grid_method import GridMethod
-from inputdesign_cli.tasks.record import Made, RecordRequest, designed_spectrum, redrawn
+from inputdesign_cli.tasks.record import Made, RecordRequest, designed_spectrum, peak_at, redrawn
 from inputdesign_cli.tasks.record_search import fitting_record, samples_of_record
 from inputdesign_cli.tasks.result.bound import bound_curves, equal_white
 from inputdesign_cli.tasks.result.design import Designed, design_result
@@ -127,7 +127,8 @@ class ConvexTask:
         known = self._known(done, record)
         tables, curves = self._illustrations(done, record, result, known)
         if done.plants is not None:
-            robust = robust_result(done, done.plants)
+            peak = None if record is None else peak_at(made.request, done.design, record)
+            robust = robust_result(done, done.plants, peak)
             result["robust"] = robust.entry
             tables, curves = tables | robust.tables, curves | robust.curves
             result |= {"notes": [*result.get("notes", []), *robust.notes]} if robust.notes else {}

@@ -7,7 +7,7 @@ away. A record of the design is simulated on the nominal plant and estimated wit
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from inputdesign_cli.monte_carlo.searched_runs import searched_run
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.knowledge import Knowledge
 from inputdesign_cli.tasks.result.rivals import (
     Apart,
     beyond_admissible,
@@ -55,6 +56,7 @@ class Foresight:
         entries: errors that have r_u where no requirement bounds one.
         earlier: what counts along where the data are assessed.
         advice: what to do about rivals, where nothing better is known.
+        knowledge: what the spec says of the parameters, which rules rivals out.
         looks: whether rivals are looked for at all.
         richer: by its words in a spec the result of the same design with another spectrum; none where there
             is no other.
@@ -65,6 +67,7 @@ class Foresight:
     entries: Sequence[ModelError]
     earlier: Earlier | None
     advice: str
+    knowledge: Knowledge | None = None
     looks: bool = True
     richer: Mapping[str, Callable[[], Result]] = field(default_factory=dict)
 
@@ -107,6 +110,9 @@ class Foresight:
         return searched_run(self.nominal, record, self.units.step, rng, self.earlier)
 
     def _beyond(self, record: Array, estimate: Estimate, requirements: Sequence[Requirement]) -> list[Apart]:
+        if self.knowledge is not None:
+            known = tuple(one for one in estimate.rivals if self.knowledge.admits(one.theta))
+            estimate = replace(estimate, rivals=known)
         model, errors = self.nominal.model.at(estimate.theta), model_errors(requirements)
         if errors:
             return beyond_admissible(model, estimate, errors)

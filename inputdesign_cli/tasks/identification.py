@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from inputdesign_cli.accuracy import ModelError, Requirement, model_errors
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.identification import Earlier, Estimate, identify as estimate_model
+from inputdesign_cli.identification import Earlier, Estimate, Rival, identify as estimate_model
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, TransferMatrix
 from inputdesign_cli.plant.polynomial import Array
@@ -20,6 +21,7 @@ from inputdesign_cli.runs.units import Header
 from inputdesign_cli.tasks.build.data import Data, blaming_columns, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.confidence import Confidence
+from inputdesign_cli.tasks.knowledge import Knowledge, that_agrees
 from inputdesign_cli.tasks.result.estimate_curves import bound_of_data, data_curves
 from inputdesign_cli.tasks.result.estimates import (
     estimate_result,
@@ -29,7 +31,7 @@ from inputdesign_cli.tasks.result.estimates import (
 )
 from inputdesign_cli.tasks.result.faults import faults, loop_faults
 from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions
-from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_notes
+from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Identification:
         earlier: the prior as an estimate, which counts along; None where it has no values.
         has_prior: whether it states prior information.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
+        knowledge: what else it says of the parameters; None where it says nothing.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
     """
@@ -79,12 +82,16 @@ class Identification:
     earlier: Earlier | None
     has_prior: bool
     controller: TransferMatrix | None
+    knowledge: Knowledge | None
     at: Callable[[Model, int, Array, str], ModelQuestion]
 
 
 @dataclass(frozen=True)
 class Identified:
-    """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate."""
+    """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate.
+
+    `ruled_out` are other minima, which what is known of the plant rules out.
+    """
 
     estimate: Estimate
     model: Model
@@ -92,6 +99,7 @@ class Identified:
     preparation: Preparation
     question: ModelQuestion | None
     unasked: str = ""
+    ruled_out: tuple[Rival, ...] = ()
 
 
 def identified(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Identified:
@@ -116,24 +124,30 @@ def estimated(task: Identification, data: Data, first: Path, taken: Preparation)
         DataError: the data do not determine the parameters.
     """
     units, nominal = task.header.units, task.nominal
-    with blaming_columns(first):
-        estimate = estimate_model(
+
+    def from_start(start: Array, near: bool) -> Estimate:
+        return estimate_model(
             nominal,
             data.u,
             data.y,
             units.step,
-            start=nominal.theta,
+            start=start,
             feedback=units.closed_loop,
             lengths=data.lengths,
             earlier=task.earlier,
             experiments=[samples for _, samples in data.files],
+            near=near,
         )
+
+    with blaming_columns(first):
+        likeliest = from_start(nominal.theta, False)
+        estimate, ruled_out = that_agrees(task.knowledge, likeliest, partial(from_start, near=True))
     model = nominal.at(estimate.theta, estimate.noise)
     try:
         question = task.at(model, len(data.y), estimate.factor, f"{first.name} (estimate)")
     except IdesignError as error:
-        return Identified(estimate, model, data, taken, None, told(error))
-    return Identified(estimate, model, data, taken, question)
+        return Identified(estimate, model, data, taken, None, told(error), ruled_out)
+    return Identified(estimate, model, data, taken, question, "", ruled_out)
 
 
 def told(error: IdesignError) -> str:
@@ -168,6 +182,9 @@ def identification_results(task: Identification, found: Identified, started: flo
     notes = identification_notes(found.data.notes, found.model, estimate, against)
     notes += differences(estimate, [name for name, _ in found.data.files])
     notes += prior_notes(estimate, stated=task.has_prior)
+    if found.ruled_out:
+        result["identification"]["ruled_out"] = rival_entries(estimate, found.ruled_out)
+        notes += ruled_out_notes(estimate, found.ruled_out)
     if question is None:
         notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
     else:

@@ -199,6 +199,18 @@ def _worst_few(figures: Mapping[int, float], most: float) -> list[int]:
     return sorted((n for n, figure in figures.items() if figure > most), key=lambda n: -figures[n])[:FEW]
 
 
+def peak_at(request: RecordRequest, design: Design, record: Record) -> Callable[[Experiment], float] | None:
+    """The largest share of a limit on single samples that a record uses at a plant; None: it is the same."""
+    bounds, n = request.bounds, len(record.samples)
+    if bounds.output is None and (design.problem.experiment.loop is None or not bounds.hard):
+        return None
+
+    def share(plant: Experiment) -> float:
+        return peak_share(FiniteRecord(replace(plant, samples=n), n, request.step), bounds, record.samples)
+
+    return share
+
+
 def _binding(design: Design) -> list[int]:
     """The nominal plant, and the scenarios that bind the design."""
     shares = design.result.certificate.shares

@@ -16,7 +16,7 @@ from inputdesign_cli.wizard.wishes import wished
 
 _MOST, LEAST = 5000, 50  # samples
 _PLANTS, _FRESH = 30, 200
-_FIRST = 60  # sinusoids
+_FIRST = "{type: fir, order: 20}"
 
 
 @dataclass(frozen=True)
@@ -25,32 +25,35 @@ class Draft:
 
     Args:
         heads: what stands before the spectrum, tails behind it.
-        lines: of the multisine; None where the accuracy tells them.
+        spectrum: as in a spec; None where the accuracy tells it.
         said: the answers.
-        why: the comment on the lines.
+        there: seconds that may be taken.
+        why: the comment on the spectrum.
     """
 
     heads: tuple[str, ...]
     tails: tuple[str, ...]
     files: Mapping[str, bytes]
-    lines: int | None
+    spectrum: str | None
     folder: Path
     said: Mapping[str, str]
-    why: str = "sinusoids"
+    there: float
+    why: str = "filtered noise"
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the spectrum is to be chosen."""
+        return self.spectrum is not None
 
     @property
     def text(self) -> str:
         """The spec."""
-        spectrum = (
-            ()
-            if self.lines is None
-            else (f"spectrum: {{type: multisine, lines: {self.lines}}}  # {self.why}",)
-        )
+        spectrum = () if self.spectrum is None else (f"spectrum: {self.spectrum}  # {self.why}",)
         return "\n".join([*self.heads, *spectrum, *self.tails]) + "\n"
 
-    def with_lines(self, lines: int, why: str) -> Draft:
-        """The same with another number of sinusoids."""
-        return replace(self, lines=lines, why=why)
+    def with_spectrum(self, spectrum: str, why: str) -> Draft:
+        """The same with another one."""
+        return replace(self, spectrum=spectrum, why=why)
 
     def spec(self) -> Spec:
         """The spec, checked; the files beside it must have been written.
@@ -117,11 +120,11 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     heads += [*asked, "objective: best_accuracy  # use all that is allowed"]
     heads += limit_lines(span, said["limits"], duration, step)
     if duration < there:
-        heads[-1] += f", {_MOST} samples; the time there is would be {short(there)}"
-    tails = signal_lines(said["signals"], said["converter"], span)
+        heads[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
+    tails = signal_lines(said["signals"], said["converter"], span, said["limits"])
     if nonparametric:
-        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said)
-    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said)
+        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said, there)
+    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said, there)
 
 
 def _why_step(plant: PlantAnswer) -> str:

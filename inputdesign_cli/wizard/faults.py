@@ -70,6 +70,8 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     if one.code == "bad-answer" and one.key in KEYS:
         return one
     asked = question(_question(one, said) or key or "wish")
+    if one.message.startswith(f"{asked.asks} ({asked.key}): "):
+        return one  # by a block inside
     why = _MESSAGES.get(one.code) or _in_words(one.message)
     quieter = _QUIETER.search(one.hint)
     hint = f"ask for {quieter[1]} dB or more" if quieter else _HINTS.get(one.code, "")

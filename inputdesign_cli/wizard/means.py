@@ -131,11 +131,16 @@ def loop_line(text: str, plant: PlantAnswer) -> str | None:
         return plant.controller
     if text.lower() == "open":
         return None
+    if plant.channels > 1:
+        raise bad_answer("loop", f"the plant has {plant.channels} channels, and one PI has one: write open")
     return f"{{pid: {pid(text, 'loop')}}}"
 
 
-def signal_lines(kind: str, converter: str, span: Range) -> list[str]:
+def signal_lines(kind: str, converter: str, span: Range, limits: str) -> list[str]:
     """The lines of `signal`.
+
+    Args:
+        limits: where they name the output, one record is fitted to them, which takes its time.
 
     Raises:
         SpecError: `bad-answer`.
@@ -143,6 +148,8 @@ def signal_lines(kind: str, converter: str, span: Range) -> list[str]:
     if kind.lower() not in _TYPES:
         raise bad_answer("signals", f'"{kind}" is none of these')
     lines = ["signal:", f"  type: {_TYPES[kind.lower()]}", "  seed: 1"]
+    if after(limits, "output") is not None:
+        lines.append("  candidates: 1  # it is fitted to the limit on the output at every plant")
     lines.append(f"  offset: {short(span.offset)}  # the operating point, added to signal.csv")
     if converter.lower() in ("no", "none"):
         return lines

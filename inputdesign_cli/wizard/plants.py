@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError
+from inputdesign_cli.errors import DataError, IdesignError, SpecError
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.specification.yaml.reader import read
+from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.phrases import LARGEST, after, needed, seconds_after, share, short
 from inputdesign_cli.wizard.questions import bad_answer
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 _LEAST_ROWS = 10  # of a step response
+_NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class PlantAnswer:
         covariance: the one of them that tells how good the estimate is.
         sampling: seconds between samples, where that is known already.
         tunable: whether rules of tuning know it.
+        channels: the larger number of its inputs and outputs.
     """
 
     lines: tuple[str, ...]
@@ -47,6 +49,7 @@ class PlantAnswer:
     covariance: str | None = None
     sampling: float | None = None
     tunable: bool = False
+    channels: int = 1
 
     @property
     def sample_time(self) -> float:
@@ -109,6 +112,7 @@ TEMPLATES = {
             1000.0, 420.0,
         ),
         sampling=60.0,
+        channels=2,
     ),
 }  # fmt: skip
 
@@ -211,7 +215,7 @@ def _stepped(path: Path, stem: str) -> PlantAnswer:
 
 def _explored(path: Path, stem: str) -> PlantAnswer:
     """The model of `idesign explore`, in a file beside the spec."""
-    from inputdesign_cli import tasks
+    from inputdesign_cli import parse_spec, tasks
 
     found = tasks.explore([path])
     name = f"{stem}-model.yaml"
@@ -219,10 +223,50 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
         why = "; ".join(found.reasons) or "no model deserves trust"
         raise bad_answer("plant", f"explore finds no model in {path.name}: {why}")
     model = found.results.files["model.yaml"]
-    data = read(model.decode(), name).data
-    step = float(data.get("sample_time", 1.0)) if isinstance(data, dict) else 1.0
+    spec = parse_spec(model.decode(), name, design=False)
+    step, plant = spec.sample_time, spec.plant
+    assert plant.kind != "regression"
     lines = (f"include: [{name}]  # plant and noise, explored in {path.name}",)
-    return PlantAnswer(lines, 20.0 * step, 0.0, files={name: model}, sampling=step)
+    channels = max(plant.inputs, plant.outputs)
+    tunable = _is_process(spec)
+    if not tunable and channels == 1 and (first := _first_order(path, spec)) is not None:
+        lines = (f"include: [{name}]  # {path.name}: a gain, a lag and a dead time explain it, too",)
+        model, tunable = first, True
+    return PlantAnswer(
+        lines, 20.0 * step, 0.0, files={name: model}, sampling=step, tunable=tunable, channels=channels
+    )
+
+
+def _is_process(spec: Spec) -> bool:
+    """Whether rules of tuning know the plant."""
+    from inputdesign_cli.tasks.build.tuning import process_of
+
+    try:
+        process_of(spec)
+    except SpecError:
+        return False
+    return True
+
+
+def _first_order(path: Path, explored: Spec) -> bytes | None:
+    """model.yaml of a gain, a time constant and a dead time, where no test speaks against it.
+
+    The noise may drift.
+    """
+    from inputdesign_cli import parse_spec, tasks
+
+    step = explored.sample_time
+    clock = f"sample_time: {step!r}\ntime_unit: {explored.time_unit}\n"
+    process = f"{{gain: 1, time_constant: {10 * step!r}, dead_time: {1.5 * step!r}}}"
+    begun = f"{clock}plant: {{continuous: {process}, sample: zoh}}\n"
+    for noise in _NOISES:
+        try:
+            found = tasks.identify(parse_spec(begun + noise, design=False), path, remove_means=True)
+        except IdesignError:
+            continue
+        if not found.result["identification"]["failed"]:
+            return clock.encode() + found.files["model.yaml"]
+    return None
 
 
 def _of_control(path: Path) -> PlantAnswer:

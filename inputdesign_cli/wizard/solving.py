@@ -2,45 +2,23 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
-from inputdesign_cli.runs.results import Result, Results
+from inputdesign_cli.runs.results import Result
+from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.wizard.composing import LEAST, Draft
-from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.composing import LEAST
 from inputdesign_cli.wizard.phrases import short
+from inputdesign_cli.wizard.spectra import Solve
 
-_GAP, _MOST_LINES = 0.02, 240
-_TOLD = 1e-3  # smaller gaps are told as this
+_MOST_OF = 0.99  # of a limit, which then binds
+_LIMITS = {"rate": "the rate", "amplitude.output": "the output"}
 _ROOM, _TRIES = 1.1, 6
 _LONGER = 2.0  # times as many samples, at most, from one try to the next
 _MINUTE, _HOUR = 60.0, 3600.0
-
-Solve = Callable[[Spec], Result]
-
-
-def enough_lines(draft: Draft, solve: Solve) -> Draft:
-    """The draft with as many sinusoids as come within 2 % of every spectrum, at the plant as stated."""
-    while draft.lines is not None:
-        nominal = draft.spec().with_(uncertainty=None, **{"signal.candidates": 1})
-        with in_their_words(draft.said):
-            objective = solve(nominal)["objective"]
-        best = objective.get("any_spectrum_bound")
-        if best is None:
-            return draft.with_lines(draft.lines, "sinusoids; how near to every spectrum was not computed")
-        gap = float(objective["value"]) / float(best) - 1.0
-        told = (
-            f"no other spectrum is better than so many sinusoids by more than {100 * max(gap, _TOLD):.2g} %"
-        )
-        if gap <= _GAP or 2 * draft.lines > min(_MOST_LINES, nominal.experiment.samples // 2):
-            return draft.with_lines(draft.lines, told)
-        draft = draft.with_lines(2 * draft.lines, told)
-    return draft
 
 
 @dataclass(frozen=True)
@@ -56,16 +34,26 @@ class Verdict:
         return self.ratio <= 1.0
 
 
-def verdict(spec: Spec, result: Result, solve: Solve) -> Verdict:
-    """What is to be told, with a length that would do, which is tried."""
-    ratio, there = float(result["signal"]["worst_ratio"]), result["samples"] * spec.sample_time
-    means = f"{lasting(there)} at plus/minus {short(_peak(spec))}"
+def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> Verdict:
+    """What is to be told, with a length that would do, which is tried.
+
+    Args:
+        there: seconds that may be taken, where the experiment is shorter.
+    """
+    ratio, taken = float(result["signal"]["worst_ratio"]), result["samples"] * spec.sample_time
+    means = f"{lasting(taken)} at {_used(spec, result)}"
     times = f"the model that it leaves errs {ratio:.3g} times as much as is admitted"
     found = _length_that_does(spec, ratio, solve)
     said = [f"{means} is enough: {times}." if ratio <= 1.0 else f"{means} is not enough: {times}."]
     if found is not None:
-        would = f"{lasting(found * spec.sample_time)} would do"
+        needed = found * spec.sample_time
+        would = f"{lasting(needed)} would do"
         said.append(f"{would} (a record of {found} samples was designed, and does).")
+        if there is not None and taken < needed <= there:
+            said.append(
+                f"Of the {lasting(there)} that there are, {lasting(taken)} were used, which are "
+                f"{result['samples']} samples: write duration: {short(needed)} into the spec, and solve it."
+            )
     loop = next((item["loop"] for item in result.get("requirements", []) if "loop" in item), None)
     kept = spec.accuracy.loop
     if kept is not None and loop and (ratio <= 1.0):
@@ -75,18 +63,68 @@ def verdict(spec: Spec, result: Result, solve: Solve) -> Verdict:
             f"rule out (95 % confidence): a gain margin of {loop['gain_margin']:.3g} and a phase margin of "
             f"{loop['phase_margin']:.3g} degrees are kept."
         )
-    drawn = result.get("robust", {}).get("scenarios")
-    if drawn:
+    return Verdict(ratio, (*said, *_elsewhere(result, ratio), *_open_dead_times(result)))
+
+
+def _used(spec: Spec, result: Result) -> str:
+    """How far the input is allowed to move, and does."""
+    allowed, moved = _peak(spec), max(result["signal"].get("input_peak", [_peak(spec)]))
+    told = f"plus/minus {short(allowed)}"
+    if moved >= _MOST_OF * allowed:
+        return told
+    limits = result["signal"].get("of_limits", {})
+    why = [_LIMITS[name] for name, share in limits.items() if name in _LIMITS and share >= _MOST_OF]
+    binding = f", for {' and '.join(why)} does not let it go further" if why else ""
+    return f"{told} (it moves by {moved:.3g} at most{binding})"
+
+
+def _elsewhere(result: Result, ratio: float) -> list[str]:
+    """What is known of other plants within what was said."""
+    robust = result.get("robust", {})
+    if not robust.get("scenarios"):
+        return []
+    at = f"at the plant as you stated it and at {robust['scenarios']} others within what you said of it"
+    said, fresh = [f"This was tried {at}."], robust.get("fresh")
+    if not fresh:
+        return said
+    worst, draws = max(fresh["largest"], 1.0) * ratio, fresh["draws"]
+    if not fresh["missed"]:
+        said.append(f"Nor is it worse at {draws} more of them.")
+    else:
+        enough = "which is enough, too" if worst <= 1.0 else "which is too much"
         said.append(
-            f"This was tried at the plant as you stated it and at {drawn} others within what you said of it."
+            f"Of {draws} more of them {fresh['missed']} would be known less well: there it errs up to "
+            f"{worst:.3g} times as much as is admitted, {enough}."
         )
-    return Verdict(ratio, tuple(said))
+    peaks = fresh.get("beyond_limits")
+    if peaks and peaks["draws"]:
+        said.append(
+            f"Input and output stay within your limits {at}, without noise; at {peaks['draws']} of {draws} "
+            f"more they go beyond, up to {per_cent(peaks['largest'])} of a limit. Leave some room."
+        )
+    elif peaks:
+        said.append(
+            f"Input and output stay within your limits {at}, and at {draws} more; noise comes on top of that."
+        )
+    return said
+
+
+def _open_dead_times(result: Result) -> list[str]:
+    """Where the record would not tell dead times apart."""
+    if not result.get("foreseen", {}).get("rivals"):
+        return []
+    return [
+        "Another dead time would explain such a record nearly as well, and assess may not decide between the "
+        "two: say how well you know it (each within 30 %)."
+    ]
 
 
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
     """Samples of a record that was designed and meets what is asked; None where none was found."""
     # Errors fall with the root of the length, but not in records hardly longer than the plant is slow.
     samples = max(int(np.ceil(spec.experiment.samples * ratio**2 * _ROOM)), LEAST)
+    if ratio <= 1.0 and samples >= spec.experiment.samples:
+        return None
     for _ in range(_TRIES):
         changes = {"limits.duration": None, "experiment.samples": samples, "solver.any_spectrum": False}
         try:
@@ -101,32 +139,6 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
         if ratio <= 1.0 and samples >= spec.experiment.samples:
             return None
     return None
-
-
-def to_log(spec: Spec, results: Results, file: str) -> list[str]:
-    """What to record, and how it is judged."""
-    applied, caused = (
-        [name for name in results.tables[table].columns if re.fullmatch(r"[ruy]\d+", name)]
-        for table in ("signal", "predicted_output")
-    )
-    numbers = [name[1:] for name in applied]
-    inputs, outputs = [f"u{n}" for n in numbers], [name for name in caused if name.startswith("y")]
-    levels = np.broadcast_to(np.asarray(spec.signal.offset or 0.0, dtype=float), len(inputs))
-    references = any(name.startswith("r") for name in applied)
-    what = ", ".join(["time", *inputs, *outputs[:-1]])
-    known = [f"{name}={level:g}" for name, level in zip(inputs, levels, strict=True)]
-    point = ",".join([*known, *(f"{name}=REST" for name in outputs)])
-    apply = "apply signal.csv"
-    if references:
-        apply = (
-            "apply signal.csv as r in u = r - C y (C y counted from rest; r is no position of the actuator)"
-        )
-    return [
-        f"Bring the plant to rest at the operating point, {apply}, and log "
-        f"{what} and {outputs[-1]} every {short(spec.sample_time)} {spec.time_unit}.",
-        f"Then: idesign assess {file} log.csv --operating-point {point}   (REST: the level of "
-        f"{' and '.join(outputs)} before it began)",
-    ]
 
 
 def lasting(seconds: float) -> str:

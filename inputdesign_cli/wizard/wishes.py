@@ -75,6 +75,13 @@ def _below_nyquist(high: float, plant: PlantAnswer) -> None:
 
 def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
     margin = _margin(text)
+    if plant.channels > 1:
+        raise bad_answer(
+            "wish",
+            f"the plant has {plant.channels} channels, and the settings of a PI or PID are for one input and "
+            'one output. Ask for "prediction within 10 % up to ..", or name the plant of one of its loops '
+            '("gain .., time constant .., dead time ..")',
+        )
     if re.search(r"\bown\b", text, re.I):
         return ["accuracy:", f"  loop: {{controller: {{pid: {pid(text, 'wish')}}}, {margin}}}"]
     if plant.tunable:
@@ -87,7 +94,9 @@ def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
     if controlled:
         return ["accuracy:  # with the controller of the experiment", f"  loop: {{{margin}}}"]
     raise bad_answer(
-        "wish", 'rules of tuning do not know this plant; write "own loop with 6 dB, Kp 1.5, Ti 180"'
+        "wish",
+        "no rule of tuning is at hand for this plant (they are for a gain, one or two lags and a dead time); "
+        'name your own settings, as in "own loop with 6 dB, Kp 1.5, Ti 180"',
     )
 
 

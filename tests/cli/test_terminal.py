@@ -1,14 +1,17 @@
 """Colours, progress and columns: on terminals, and nowhere else."""
 
 import sys
+import time
 from pathlib import Path
 
 import pytest
 import typer
 
 import inputdesign_cli
-from inputdesign_cli.cli import app
+from inputdesign_cli.cli import app, computing as computing_line
+from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.terminal import aligned, colourful, status
+from inputdesign_cli.compute.watching import Counted, tell
 
 ROOT = Path(inputdesign_cli.__file__).parents[1]
 GROUP = typer.main.get_command(app)
@@ -27,6 +30,26 @@ class Terminal:
 
     def flush(self):
         pass
+
+
+def test_a_long_computation_tells_how_far_it_is(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with computing("log.csv", quiet=False):
+        tell(Counted("starting points tried", 3, 30))
+        time.sleep(0.3)
+    assert "log.csv: computing ..." in terminal.text
+    assert "3 of 30" not in terminal.text, "there is no need to tell at once"
+    monkeypatch.setattr(computing_line, "_PATIENCE", 0.0)
+    with computing("log.csv", quiet=False):
+        tell(Counted("starting points tried", 3, 30))
+        time.sleep(0.3)
+    assert "log.csv: starting points tried: 3 of 30 ..." in terminal.text
+    terminal.text = ""
+    with computing("log.csv", quiet=True):
+        tell(Counted("starting points tried", 3, 30))
+    assert terminal.text == ""
 
 
 @pytest.mark.parametrize(

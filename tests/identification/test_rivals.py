@@ -5,6 +5,7 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
+from inputdesign_cli.compute.watching import watching
 from inputdesign_cli.identification import identify
 from inputdesign_cli.plant import ContinuousModel, SampledModel
 
@@ -61,3 +62,14 @@ def test_a_dead_time_is_known_up_to_the_period_of_a_sine(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rich_record_leaves_no_rival(seed):
     assert estimated(BINARY, seed)[0].rivals == ()
+
+
+def test_the_search_tells_how_far_it_is():
+    told = []
+    with watching(told.append):
+        found, _ = estimated(BINARY, 0)
+    tried = [one for one in told if one.what == "starting points tried"]
+    # All but the given one are made from the data, and tried one by one.
+    assert [one.done for one in tried] == list(range(tried[0].of))
+    assert found.starts == tried[0].of + 1
+    assert told[-1].what == "starting points followed to a minimum"

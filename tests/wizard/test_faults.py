@@ -9,7 +9,7 @@ from inputdesign_cli.errors import Diagnostic, IdesignError, InfeasibleError, Lo
 from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, question
-from inputdesign_cli.wizard.solving import enough_lines
+from inputdesign_cli.wizard.spectra import with_spectrum
 
 GOOD = {
     "plant": "gain 2, time constant 180 s, dead time 25 s",
@@ -215,7 +215,7 @@ def test_what_a_design_of_the_draft_says_is_told_in_words_too(folder):
         raise InfeasibleError.because("infeasible", "limits.amplitude is too small", "", "limits", place)
 
     with pytest.raises(InfeasibleError) as caught:
-        enough_lines(compose(GOOD, "x", folder), solve)
+        with_spectrum(compose(GOOD, "x", folder), solve)
     (told,) = caught.value.diagnostics
     assert (told.key, told.location) == ("limits", None)
     assert "the amplitude is too small" in told.message

@@ -1,11 +1,18 @@
 """What the wizard says is to be applied and logged."""
 
+import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.wizard.closing import to_log
+from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.means import input_range
-from inputdesign_cli.wizard.solving import to_log
+from inputdesign_cli.wizard.solving import lasting, verdict
+from tests.wizard.test_wizard import ENGINEER
 
 
 def words(applied, caused, offset=None):
@@ -26,11 +33,96 @@ def test_all_channels_are_logged():
 
 
 def test_a_reference_is_no_position_of_the_actuator():
-    apply, judge = words(["r1"], ["y1"], 40.0)
+    apply, level, judge = words(["r1"], ["y1"], 40.0)
+    assert "has the level 40 of the input in it: while y rests, u = r" in level
+    assert "need not be logged" in level
     assert "u = r - C y" in apply
     assert "no position of the actuator" in apply
     assert "log time, u1 and y1" in apply
     assert "--operating-point u1=40,y1=REST" in judge
+
+
+def told(ratio=0.5, there=None, solve=None, limits=None, **robust):
+    """The sentences about a record of 720 samples, 5 s apart."""
+    spec = compose({**ENGINEER, **({"limits": limits} if limits else {})}, "x", Path()).spec()
+    signal = {"worst_ratio": ratio, "input_peak": [1.25 if limits else 5.0], "of_limits": {"rate": 1.0}}
+    result = {"samples": 720, "signal": signal, **({"robust": robust} if robust else {})}
+    missing = {"signal": {}}
+    return " ".join(verdict(spec, result, solve or (lambda other: missing), there).sentences)
+
+
+def test_a_rate_that_binds_is_said():
+    assert "60 min at plus/minus 5 is enough" in told()
+    said = told(limits="rate 0.01")
+    assert (
+        "plus/minus 5 (it moves by 1.25 at most, for the rate does not let it go further) is enough" in said
+    )
+
+
+def test_a_length_that_would_do_is_shorter_than_the_record_that_does():
+    def solve(changed):
+        return {"signal": {"worst_ratio": 0.99, "samples": changed.experiment.samples}, "samples": 0}
+
+    assert "would do" not in told(0.98, solve=solve)
+    assert f"{lasting(5.0 * 434)} would do" in told(0.74, solve=solve)
+
+
+def test_time_that_is_left_is_used():
+    def solve(changed):
+        ratio = 1.5 * (720 / changed.experiment.samples) ** 0.5
+        return {"signal": {"worst_ratio": ratio, "samples": changed.experiment.samples}, "samples": 0}
+
+    said = told(1.5, there=4 * 3600.0, solve=solve)
+    assert "Of the 4 h that there are, 60 min were used" in said
+    assert f"write duration: {5 * math.ceil(720 * 1.5**2 * 1.1)} into the spec" in said
+    assert "write duration" not in told(1.5, there=3600.0, solve=solve)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "fresh", "words"),
+    [
+        (0.5, {"missed": 0, "largest": 1.0}, "Nor is it worse at 200 more of them."),
+        (0.5, {"missed": 9, "largest": 1.2}, "up to 0.6 times as much as is admitted, which is enough"),
+        (0.9, {"missed": 9, "largest": 1.2}, "up to 1.08 times as much as is admitted, which is too much"),
+    ],
+)
+def test_what_is_known_of_other_plants_is_said_in_words_of_the_wish(ratio, fresh, words):
+    said = told(ratio, scenarios=30, fresh={"draws": 200, **fresh})
+    assert words in said
+    assert "drawn afresh" not in said
+
+
+@pytest.mark.parametrize(
+    ("peaks", "words"),
+    [
+        ({"draws": 51, "largest": 1.05}, "at 51 of 200 more they go beyond, up to 105 % of a limit"),
+        ({"draws": 0, "largest": 0.98}, "and at 200 more; noise comes on top of that"),
+    ],
+)
+def test_limits_are_promised_for_the_plants_that_were_tried(peaks, words):
+    said = told(scenarios=30, fresh={"draws": 200, "missed": 0, "largest": 1.0, "beyond_limits": peaks})
+    assert "within your limits at the plant as you stated it and at 30 others" in said
+    assert words in said
+
+
+def test_the_column_is_told_once_what_can_be_done():
+    for wish in ("PI loop with 6 dB", "own loop with 6 dB, Kp 1.5, Ti 180"):
+        with pytest.raises(SpecError) as caught:
+            compose({**ENGINEER, "plant": "column", "wish": wish}, "x", Path()).validate()
+        (found,) = caught.value.diagnostics
+        assert found.message.count("(wish)") == 1
+        assert "has 2 channels" in found.message
+        assert "prediction within 10 %" in found.message
+    with pytest.raises(SpecError, match=r"\(loop\): the plant has 2 channels"):
+        compose({**ENGINEER, "plant": "column", "loop": "PI Kp 1, Ti 60"}, "x", Path())
+
+
+def test_nothing_is_said_twice():
+    """Blocks of answers may stand inside each other."""
+    error = SpecError.because("wrong-shape", "the controller has one channel", "", "accuracy.loop")
+    with pytest.raises(SpecError) as caught, in_their_words({}), in_their_words({}):
+        raise error
+    assert str(caught.value.diagnostics[0].message).count("What is the model for?") == 1
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.errors import DataError, Diagnostic, Location, SpecError, bad_spec
 from inputdesign_cli.identification import resolution_of
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.columns import (
@@ -169,7 +170,7 @@ def prepared(
         if off > MOST_JITTER and not preparation.resample:
             row = _worst_step(signals.time, step)
             message = (
-                f"the steps of time differ from {step:.6g} {time_unit} by up to {100 * off:.3g} %, and more "
+                f"the steps of time differ from {step:.6g} {time_unit} by up to {per_cent(off)}, and more "
                 f"than {100 * MOST_JITTER:g} % is not evened out unasked"
             )
             hint = "add --resample to interpolate all the same, or give the sample time that holds"
@@ -177,7 +178,7 @@ def prepared(
         segments = [resampled(part, step) for part in segments]
         told.insert(
             0,
-            f"the steps of time jitter by up to {100 * off:.2g} % of {step:.6g} {time_unit}: resampled "
+            f"the steps of time jitter by up to {per_cent(off, 2)} of {step:.6g} {time_unit}: resampled "
             "(outputs by interpolation, inputs at the nearest sample)",
         )
     taken = [_detrended(part, signals, preparation) for part in segments]

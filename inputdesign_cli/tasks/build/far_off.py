@@ -7,6 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.tasks.build import rows
 from inputdesign_cli.tasks.build.extremes import OFTEN, spread_of
 
@@ -37,7 +38,7 @@ def strange_values(name: str, y: Array, u: Array, lines: NDArray[np.int64]) -> l
     if told or alone.sum() <= OFTEN * y.size:
         return told
     return [
-        f"{name} has {alone.sum()} values ({100 * alone.mean():.2g} %) far from their neighbours "
+        f"{name} has {alone.sum()} values ({per_cent(alone.mean(), 2)}) far from their neighbours "
         f"({rows.told(lines[alone])}): spikes? Look at the record, and empty the cells that are faults of "
         "measurement"
     ]

@@ -11,6 +11,7 @@ from inputdesign_cli.information import Experiment
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.header import build_units
+from inputdesign_cli.tasks.build.knowledge import build_knowledge
 from inputdesign_cli.tasks.build.model_error import unstated_errors
 from inputdesign_cli.tasks.build.prior import build_earlier
 from inputdesign_cli.tasks.foresight import Foresight
@@ -48,6 +49,7 @@ def build_foresight(
         entries=unstated_errors(spec, nominal),
         earlier=build_earlier(spec, model),
         advice=f"excite more frequencies, or hold what is known (plant.known: [{names}])",
+        knowledge=build_knowledge(spec),
         looks=spec.solver.any_spectrum,
         richer={} if design is None or alone else {words: partial(solved, words) for words in _RICHER},
     )

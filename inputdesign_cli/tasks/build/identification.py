@@ -18,6 +18,7 @@ from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.convex import build_convex
 from inputdesign_cli.tasks.build.header import build_header
+from inputdesign_cli.tasks.build.knowledge import build_knowledge
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
 from inputdesign_cli.tasks.build.prior import build_earlier, stated_prior
 from inputdesign_cli.tasks.build.requirements import build_requirements
@@ -56,6 +57,7 @@ def build_identification(spec: Spec) -> Identification:
         controller=None
         if controller is None
         else controller_matrix(controller, spec.sample_time, (nominal.inputs, nominal.outputs)),
+        knowledge=build_knowledge(spec),
         at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
     )
 

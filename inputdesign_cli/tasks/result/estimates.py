@@ -39,7 +39,7 @@ def identification_entry(estimate: Estimate) -> dict[str, Json]:
         "free_start": estimate.free,
     }
     if estimate.rivals:
-        entry["rivals"] = rival_entries(estimate)
+        entry["rivals"] = rival_entries(estimate, estimate.rivals)
     if estimate.agreement is not None:
         entry["prior"] = {"probability": estimate.agreement}
     if len(estimate.lengths) > 1:

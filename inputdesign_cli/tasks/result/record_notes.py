@@ -8,6 +8,7 @@ import numpy as np
 
 from inputdesign_cli.design.convex.designs import Design
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.signal import Record
 from inputdesign_cli.tasks.record import RecordRequest, worst_ratio
 
@@ -73,7 +74,7 @@ def shortfall(design: Design, record: Record, information: Array) -> list[str]:
         if more > _FALLS_SHORT:
             notes.append(
                 f"the record reaches {record.worst_ratio:.4g} times the admissible error, the design "
-                f"{best:.4g}: {100 * more:.3g} % more, by its length or by the limits on single samples"
+                f"{best:.4g}: {per_cent(more)} more, by its length or by the limits on single samples"
             )
     missed = worst_ratio(problem.side)(information)
     if missed > 1.0 + _FALLS_SHORT:

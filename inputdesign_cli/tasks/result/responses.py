@@ -64,6 +64,6 @@ def response_note(told: dict[str, Json]) -> list[str]:
     share = told["model_outside"]
     sentence = (
         "frequency_response.csv has what the data say of G without a model, with discs of 95 %: the model is "
-        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies"
+        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies (a right model: at about 5 %)"
     )
     return [sentence, *([told["caveat"]] if "caveat" in told else [])]

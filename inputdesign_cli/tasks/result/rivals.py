@@ -28,9 +28,9 @@ class Apart:
     measure: str
 
 
-def rival_entries(estimate: Estimate) -> list[dict[str, Json]]:
-    """`identification.rivals` of `result.json`."""
-    return [_entry(estimate, one) for one in estimate.rivals]
+def rival_entries(estimate: Estimate, found: Sequence[Rival]) -> list[dict[str, Json]]:
+    """`identification.rivals` and `identification.ruled_out` of `result.json`."""
+    return [_entry(estimate, one) for one in found]
 
 
 def foreseen_entries(units: Units, estimate: Estimate, found: Sequence[Apart]) -> list[dict[str, Json]]:
@@ -64,6 +64,19 @@ def rival_notes(units: Units, estimate: Estimate, found: Sequence[Apart]) -> lis
     ]
 
 
+def ruled_out_notes(estimate: Estimate, found: Sequence[Rival]) -> list[str]:
+    """What to say of minima that what the spec knows of the plant rules out."""
+    if not found:
+        return []
+    first = min(found, key=lambda one: one.excess)
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return [
+        f"{_parameters(estimate, first)}{more} would explain the data nearly as well (-2 log likelihood is "
+        f"{abs(first.excess):.3g} {_higher(first)}), but is far outside of what uncertainty says of the "
+        "plant, and does not count"
+    ]
+
+
 def foreseen_note(units: Units, estimate: Estimate, found: Sequence[Apart], remedy: str) -> str:
     """What to say of rivals that a record of the design would leave."""
     nearest = min(found, key=lambda one: one.rival.excess)
@@ -72,9 +85,13 @@ def foreseen_note(units: Units, estimate: Estimate, found: Sequence[Apart], reme
     return (
         f"other parameters would explain such a record nearly as well: in a simulated one also "
         f"{_parameters(estimate, nearest.rival)}{more}, of which -2 log likelihood is {abs(excess):.3g} "
-        f"{'higher' if excess >= 0.0 else 'lower'} and G differs by {_far(units, nearest)}. Estimates may "
+        f"{_higher(nearest.rival)} and G differs by {_far(units, nearest)}. Estimates may "
         f"end there, whatever r_u says, and assess would call such a record undecided: {remedy}"
     )
+
+
+def _higher(one: Rival) -> str:
+    return "higher" if one.excess >= 0.0 else "lower"
 
 
 def _far(units: Units, one: Apart) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from inputdesign_cli.compute.time_limit import OutOfTimeError, what_ended
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
+from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves
@@ -35,8 +36,16 @@ class RobustResult:
     notes: tuple[str, ...]
 
 
-def robust_result(done: Designed, plants: Plants) -> RobustResult:
-    """What the result says of the plants that were drawn, as far as the design is for them."""
+Peak = Callable[[Experiment], float]
+"""The largest share of a limit on single samples that the record uses at a plant."""
+
+
+def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> RobustResult:
+    """What the result says of the plants that were drawn, as far as the design is for them.
+
+    Args:
+        peak: None where no limit on single samples depends on the plant.
+    """
     kept = done.kept
     units, batch = done.units, plants.batch
     at_each = kept_by(done.problem, done.design, done.experiment.samples)
@@ -68,7 +77,7 @@ def robust_result(done: Designed, plants: Plants) -> RobustResult:
         entry |= _risk(plants, len(support), len(kept))
     notes = _unstable(batch)
     if plants.afresh is not None:
-        fresh = _fresh(done, plants, plants.afresh())
+        fresh = _fresh(done, plants, plants.afresh(), peak)
         entry |= {"fresh": fresh} if fresh else {}
         tried = fresh.get("draws", 0)
         if tried < plants.fresh:
@@ -133,14 +142,15 @@ def _risk(plants: Plants, support: int, kept: int) -> dict[str, Json]:
     return {"risk": risk}
 
 
-def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch]) -> dict[str, Json]:
+def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak | None) -> dict[str, Json]:
     """How many of other plants from the same distribution the design misses, as many as there is time for."""
-    tried, rejected, largest = list[Kept](), 0, 0.0
+    tried, peaks, rejected, largest = list[Kept](), list[float](), 0, 0.0
     for batch in afresh:
         try:
             tried += tried_on(done.design, done.experiment.samples, batch, above=min(largest, 1.0))
         except OutOfTimeError:
             break
+        peaks += [] if peak is None else [peak(plant.experiment) for plant in batch.plants]
         tell(Counted("fresh plants", len(tried), plants.fresh))
         rejected += batch.rejected
         largest = max((one.share for one in tried if np.isfinite(one.share)), default=0.0)
@@ -157,6 +167,8 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch]) -> dict[str,
         "limits": list(binomial_limits(missed, len(tried))),
         "largest": largest,
     }
+    if peaks:
+        entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
     promised = plants.paid == "worst" and done.problem.goal == "cost"
     return entry | ({"dearer": int(np.sum(dearer))} if promised else {})
 

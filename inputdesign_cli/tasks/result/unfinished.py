@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from inputdesign_cli.compute.time_limit import more_time, what_ended
 from inputdesign_cli.runs.results import Json, Result
+from inputdesign_cli.runs.shares import per_cent
 
 
 def unfinished_notes(result: Result) -> list[str]:
@@ -32,7 +33,7 @@ def _how_far(found: Json) -> str:
         return "nothing is proved yet of what others reach"
     if "upper_bound" in found:
         return f"no other gets above {found['upper_bound']:.6g}"
-    return f"no other gets below {found['lower_bound']:.6g} ({100 * gap:.2g} % lower)"
+    return f"no other gets below {found['lower_bound']:.6g} ({per_cent(gap, 2)} lower)"
 
 
 def no_other_spectra() -> str:

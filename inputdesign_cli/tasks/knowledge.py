@@ -1,0 +1,61 @@
+"""What a spec says of the parameters besides the data: which of several minima may be that of the plant.
+
+A signal that repeats tells a dead time only up to whole periods, and other minima explain a record nearly as
+well. Who says that it is 25 s within 30 % has said that it is not ten minutes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inputdesign_cli.identification import Estimate, Rival
+from inputdesign_cli.plant.polynomial import Array
+
+# People are surer than they should be: parameters count as possible to so many times the stated distance.
+_ROOM = 3.0
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """The parameters centre + columns z, (k,) and (k, m): z in the unit ball, or with `box` in [-1, 1]^m.
+
+    Of directions without a column nothing is known.
+    """
+
+    centre: Array
+    columns: Array
+    box: bool
+
+    def admits(self, theta: Array) -> bool:
+        """Whether parameters (k,) are possible."""
+        z = np.linalg.lstsq(self.columns, theta - self.centre, rcond=None)[0]
+        size = np.max(np.abs(z), initial=0.0) if self.box else np.linalg.norm(z)
+        return bool(size <= _ROOM)
+
+
+def that_agrees(
+    knowledge: Knowledge | None, estimate: Estimate, near: Callable[[Array], Estimate]
+) -> tuple[Estimate, tuple[Rival, ...]]:
+    """The likeliest minimum that agrees with what is known, and those that do not.
+
+    Where none does, the knowledge is wrong and rules nothing out.
+
+    Args:
+        estimate: the likeliest of all, and its rivals.
+        near: makes the estimate at a minimum near parameters (k,).
+    """
+    minima = (Rival(estimate.theta, 0.0), *estimate.rivals)
+    admitted = [one for one in minima if knowledge is None or knowledge.admits(one.theta)]
+    if not admitted or len(admitted) == len(minima):
+        return estimate, ()
+    home = admitted[0]
+    known = {id(one) for one in admitted}
+    others = [
+        (id(one) in known, Rival(one.theta, one.excess - home.excess)) for one in minima if one is not home
+    ]
+    found = estimate if home is minima[0] else near(home.theta)
+    rivals, ruled_out = (tuple(one for agrees, one in others if agrees is kept) for kept in (True, False))
+    return replace(found, rivals=rivals), ruled_out
