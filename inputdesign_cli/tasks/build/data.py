@@ -149,7 +149,7 @@ def prepared(
         time_unit: of the times, for messages.
 
     Raises:
-        DataError: `data-not-uniform`, the times jitter too much.
+        DataError: `data-not-uniform`, the times jitter too much; `data-not-a-number`, no row is whole.
     """
     sheet, rows, told = signals.sheet, signals.sheet.lines, list[str]()
     time = signals.time if signals.name else signals.time * step
@@ -160,6 +160,13 @@ def prepared(
         there = ~np.isnan(x)
         told += strange_values(name, x[there], signals.u[there], rows[there])
         told += limits_of_sensor(name, x[there])
+    if np.isnan(np.column_stack([time, signals.u, signals.y])).any(axis=1).all():
+        message = f"no row of {sheet.path.name} has a number in every column that is asked for"
+        hint = (
+            "inputs, outputs and times of a sample stand in one row: where a logger writes them in turn, "
+            "join the rows; or name other columns (--columns)"
+        )
+        raise DataError(sheet.error("data-not-a-number", message, hint, 0))
     apart, lines = passed_over(sheet, timed=bool(signals.name))
     segments, cuts = whole_segments(
         time, signals.u, signals.y, step, apart, rows, resample=preparation.resample

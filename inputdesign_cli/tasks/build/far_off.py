@@ -69,6 +69,9 @@ def _alone(x: Array) -> NDArray[np.bool_]:
 
 def _caused(u: Array, y: Array) -> Array:
     """(n,): what past inputs explain of an output, by a finite impulse response and least squares."""
+    u = u[:, ~np.all(np.isnan(u), axis=0)]
+    if not u.size:
+        return np.zeros(y.size)
     there = np.where(np.isnan(u), np.nanmedian(u, axis=0), u)
     scaled = (there - there.mean(axis=0)) / np.maximum(np.abs(there).max(axis=0), np.finfo(float).tiny)
     samples, r = scaled.shape

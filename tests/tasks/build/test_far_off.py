@@ -58,3 +58,11 @@ def test_an_input_is_judged_by_itself():
     assert outliers("u", u, LINES) == []
     u[40] = -9999.0
     assert outliers("u", u, LINES) == ["u has 1 outlying value (row 42): look at the record"]
+
+
+def test_an_input_without_numbers_beside_the_output_explains_nothing():
+    """As where a logger writes inputs and outputs in turn."""
+    y = np.random.default_rng(7).standard_normal(N)
+    y[10] = 90.0
+    (told,) = strange_values("y", y, np.full((N, 2), np.nan), LINES)
+    assert told == "y has 1 outlying value (row 12): look at the record"

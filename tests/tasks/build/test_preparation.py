@@ -209,3 +209,14 @@ def test_a_stated_sample_time_is_converted_as_times_are(tmp_path):
     assert read_data([tmp_path / "b.npz"], units, stated).lengths == (N,)
     with pytest.raises(DataError, match=r"sampled every 0\.5 s"):
         read_data([tmp_path / "a.npz"], units, Preparation())
+
+
+@pytest.mark.parametrize("header", ["time,u,y", "step,u,y"])
+def test_rows_of_which_none_is_whole_are_refused(header, tmp_path):
+    """A logger that writes inputs and outputs in turn."""
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([header, *(f"{2 * k},{k % 3},\n{2 * k + 1},,{k % 7}" for k in range(20))]))
+    for read_one in (lambda: read_data([path], UNITS, Preparation()), lambda: read_log(path, Preparation())):
+        with pytest.raises(DataError, match=r"no row of log\.csv has a number in every column") as caught:
+            read_one()
+        assert "join the rows" in caught.value.diagnostics[0].hint
