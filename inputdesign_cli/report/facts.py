@@ -79,7 +79,7 @@ def _kept(told: Mapping[str, Json]) -> str:
     low, high = (f"{100 * share:.1f}" for share in told["kept_limits" if runs else "exact_limits"])
     share = f"{100 * told['kept' if runs else 'exact']:.1f} % ({low} to {high})"
     if runs:
-        spent = ", more than asked: so short an experiment costs more than it need" if _beyond(told) else ""
+        spent = ", more than asked: it costs more than it need" if _beyond(told) else ""
         return f"{share} of {told['runs']} simulated experiments meet it{spent}"
     return f"{share} of {told['draws']} estimates drawn by asymptotic theory meet it"
 

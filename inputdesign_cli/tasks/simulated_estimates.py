@@ -20,7 +20,8 @@ from inputdesign_cli.plant.polynomial import Array
 _TO_CORRECT, _TO_CHECK = 2**60, 2**60 + 1
 # Samples of all runs: asymptotic theory holds for long records, and many of them take minutes.
 _MOST = 20_000_000
-_EACH = 20  # runs apply the same record: what differs from record to record hardly counts
+# So many runs apply the same record of at least so many samples: what differs between them hardly counts.
+_EACH, _LONG = 20, 100
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ class SimulatedEstimates:
         """(runs, k): NaN where the search did not settle."""
         seconds_left()
         study = Study(self.nominal, self.nominal, self.runs, seed, self.step)
-        trials = tried_on_truth(study, Reapplied(self.excitation, _EACH)).trials
+        each = _EACH if self.nominal.samples >= _LONG else 1
+        trials = tried_on_truth(study, Reapplied(self.excitation, each)).trials
         return np.where(trials.converged[:, None], trials.theta, np.nan)
 
 
