@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from inputdesign_cli.plant.filtering import filtered
@@ -71,13 +70,20 @@ def noise_before(C: Array, D: Array, samples: int) -> NDArray[np.float64]:
     n = max(C.size, D.size) - 1
     if n == 0:
         return np.zeros((0, samples))
-    c, d = np.pad(C, (0, n + 1 - C.size)), np.pad(D, (0, n + 1 - D.size))
-    later = [scipy.linalg.hankel(p[1:]) for p in (c, d)]
-    made = [scipy.linalg.toeplitz(np.append(p[:1], np.zeros(n - 1)), p[:n]) for p in (c, d)]
-    r = (later[0] @ made[1] - later[1] @ made[0]) @ _autoregression(d)[::-1]
+    i, j = np.indices((n, n))
+    (above, c), (below, d) = _padded(C, n), _padded(D, n)
+    past = c[1 + i + j] @ below[n + j - i] - d[1 + i + j] @ above[n + j - i]
+    r = past @ _autoregression(d[: n + 1])[::-1]
     entering = np.zeros((n, samples), dtype=r.dtype)
     entering[:, : min(n, samples)] = r.T[:, :samples]
     return filtered([1.0], C, entering)
+
+
+def _padded(p: Array, n: int) -> tuple[Array, Array]:
+    """p_k, zero outside of its coefficients, for k of -n to n, and for k of 0 to 2 n."""
+    before, after = np.zeros(2 * n + 1, dtype=p.dtype), np.zeros(2 * n + 1, dtype=p.dtype)
+    before[n : n + p.size], after[: p.size] = p, p
+    return before, after
 
 
 def density(C: Array) -> NDArray[np.float64]:

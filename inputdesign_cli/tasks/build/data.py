@@ -235,19 +235,19 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         ((path.name, len(inputs)),),
         tuple(f"{path.name}: {note}" if named else note for note in told),
         np.nanmean(signals.u[:, : units.inputs], axis=0),
-        recorded_in(signals, units.sample_time, segments),
+        recorded_in(signals, units.sample_time, segments, units.inputs),
     )
 
 
-def recorded_in(signals: Signals, step: float, segments: Sequence[Segment]) -> Recorded:
-    """The outputs of the file, sample by sample of the segments, `step` apart."""
+def recorded_in(signals: Signals, step: float, segments: Sequence[Segment], inputs: int) -> Recorded:
+    """The outputs of the file, sample by sample of the segments, `step` apart; of u so many are inputs."""
     stamped = np.flatnonzero(~np.isnan(signals.time))
     stamps = signals.time[stamped] * (1.0 if signals.name else step)
     times = np.concatenate([part.time for part in segments])
     nearest = np.searchsorted(0.5 * (stamps[1:] + stamps[:-1]), times)
     held = np.concatenate([part.held for part in segments])
     at = stamped[nearest]
-    values = np.column_stack([signals.u, signals.y])[at]
+    values = np.column_stack([signals.u[:, :inputs], signals.y])[at]
     return Recorded(values, signals.sheet.lines[at], held, resolution_of(signals.y))
 
 

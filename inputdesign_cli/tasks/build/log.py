@@ -100,7 +100,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         step,
         unit,
         (*told, *notes),
-        recorded_in(signals, step, segments),
+        recorded_in(signals, step, segments, signals.u.shape[1]),
     )
 
 
