@@ -41,8 +41,8 @@ def _send_again(lost: UnraisableHookArgs) -> None:
     """A signal whose exception was raised in a finalizer, where Python drops it, is sent once more."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
         number = signal.SIGINT
-    elif issubclass(lost.exc_type, SystemExit):
-        number = signal.SIGTERM
+    elif isinstance(lost.exc_value, SystemExit) and isinstance(lost.exc_value.code, int):
+        number = signal.Signals(lost.exc_value.code - 128)
     else:
         sys.__unraisablehook__(lost)
         return

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import BinaryIO, NoReturn
 
+from inputdesign_cli.compute.interruptions import interrupt
 from inputdesign_cli.errors import EXIT_BAD_INPUT
 
 EXIT_PIPE = 141  # what a shell reports for a command that SIGPIPE ended
@@ -76,9 +77,9 @@ def prepare_signals() -> None:
     """End in order after SIGTERM and SIGHUP, as after Ctrl-C, unless the caller had them ignored."""
     if threading.current_thread() is not threading.main_thread():
         return
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, _terminate)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, interrupt)
 
 
 @contextmanager
@@ -106,7 +107,3 @@ def ending_early(stop: Callable[[], None]) -> Iterator[list[int]]:
         yield came
     finally:
         restore()
-
-
-def _terminate(number: int, _frame: FrameType | None) -> NoReturn:
-    raise SystemExit(128 + number)
