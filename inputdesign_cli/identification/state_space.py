@@ -86,17 +86,19 @@ class StateSpaceRecord:
         directions in which inputs do; what they do at once, through D, is not counted. From rest, only noise
         has moved the states, and as far as nobody knows.
         """
+        coloured, nothing = self._coloured, np.zeros((0, len(self.y)))
+        if not (free or coloured):
+            return (Start.white(nothing),) * self.structure.outputs
         model = self.structure.at(theta)
         m, n, p = model.matrices, model.order, model.outputs
         A, early, later = model.held
-        coloured = self._coloured
         pushes = np.eye(n) if n <= 2 * model.inputs else np.concatenate([early, later], axis=1).T
         if free:
             late = min(self.late, len(self.y) - 1)
             steady = n if np.any(np.abs(model.poles - 1.0) < _INTEGRATES) else 0
             size, levels = n + p + late * len(pushes) + steady, p
         else:
-            late, steady, size, levels = 0, 0, n if coloured else 0, 0
+            late, steady, size, levels = 0, 0, n, 0
         x, level, driven = np.zeros((size, n)), np.zeros((size, p)), np.zeros((size, n))
         x[:n], driven[size - steady :] = np.eye(size, n)[:n], np.eye(steady, n)
         level[n : n + levels] = np.eye(levels, p)
@@ -115,8 +117,7 @@ class StateSpaceRecord:
         # What an unstable plant does without its predictor grows beyond all numbers.
         stable = bool(np.all(np.abs(model.poles) < 1.0 + _MARGIN))
         before = responses(np.zeros_like(m.K)) if coloured and stable else through
-        none = np.zeros((0, len(self.y)))
-        return tuple(Start(through[:, :, i], before[:, :, i], none, np.zeros(())) for i in range(p))
+        return tuple(Start(through[:, :, i], before[:, :, i], nothing, np.zeros(())) for i in range(p))
 
     def lateness(self, theta: Array) -> int:
         """The dead time in samples, one that is begun counted whole."""
