@@ -221,7 +221,7 @@ class GivenTask:
     def _spectrum_entry(self) -> dict[str, Json]:
         excitation, units = self.excitation, self.header.units
         entry: dict[str, Json] = {"type": "given", "given": excitation.kind}
-        if excitation.sinusoids is not None and excitation.basis is not None and excitation.x is not None:
+        if isinstance(excitation.basis, LinesBasis) and excitation.x is not None:
             frequencies, powers = excitation.basis.lines(excitation.x)
             entry["frequencies"] = frequencies / units.frequency
             entry["powers"] = powers[:, 0, 0].real if units.inputs == 1 else plain_complex(powers)

@@ -126,12 +126,8 @@ def test_solve_analyses_and_says_whether_the_accuracy_is_met():
     assert "r_adm_21" not in bare.tables["bound"].columns
 
 
-def test_lines_in_continuous_time_by_finite_differences():
-    given = "{given: {type: multisine, frequencies: [0.2, 0.7, 1.3], amplitudes: [[3, 3, 3], [2, -2, 1]]}}"
-    result = analyse(
-        parse_spec(CONTINUOUS, overrides=[f"spectrum={given}", "experiment={samples: 50}"])
-    ).result
-    names = result["information"]["parameters"]
+def by_finite_differences(names, lines):
+    """M (12, 12) of 50 samples for power matrices (2, 2) at frequencies, in the order of the names."""
     low = {"b0[1,1]": 3.125, "b0[1,2]": 3.188, "b0[2,1]": 5.313, "b0[2,2]": 1.563}
     high = [[(1.5, 1.563), (2, 1.063)], [(0.5, 1.063), (1, 0.312)]]
     values = low | {
@@ -150,16 +146,43 @@ def test_lines_in_continuous_time_by_finite_differences():
         )
 
     M = np.zeros((12, 12))
-    for w, a in zip([0.2, 0.7, 1.3], [(3, 2), (3, -2), (3, 1)], strict=True):
+    for w, power in lines:
         columns = []
         for name in names:
             h = 1e-6
             up, down = values | {name: values[name] + h}, values | {name: values[name] - h}
-            columns.append(
-                (transfer(up, 1j * w) - transfer(down, 1j * w)) @ np.array(a, dtype=float) / (2 * h)
-            )
+            columns.append((transfer(up, 1j * w) - transfer(down, 1j * w)) / (2 * h))
         F = np.array(columns)
-        M += 50 / 2 * (F @ F.conj().T).real
+        M += 50 * np.einsum("aij,jk,bik->ab", F, power, F.conj()).real
+    return M
+
+
+def test_lines_in_continuous_time_by_finite_differences():
+    given = "{given: {type: multisine, frequencies: [0.2, 0.7, 1.3], amplitudes: [[3, 3, 3], [2, -2, 1]]}}"
+    result = analyse(
+        parse_spec(CONTINUOUS, overrides=[f"spectrum={given}", "experiment={samples: 50}"])
+    ).result
+    lines = [(w, np.outer(a, a) / 2) for w, a in [(0.2, (3, 2)), (0.7, (3, -2)), (1.3, (3, 1))]]
+    M = by_finite_differences(result["information"]["parameters"], lines)
+    np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
+
+
+def test_sinusoids_of_several_inputs_given_as_a_table(tmp_path):
+    """Power matrices of every rank and phase, as `spectrum.csv` of a design holds them."""
+    lines = [
+        (0.2, np.array([[1.0, 0.3 - 0.4j], [0.3 + 0.4j, 0.5]])),
+        (0.7, np.array([[0.4, 0.4j], [-0.4j, 0.4]])),
+        (1.3, np.array([[0.2, 0.0], [0.0, 0.0]])),
+        (1.9, np.array([[0.0, 0.0], [0.0, 0.7]])),
+    ]
+    table = tmp_path / "spectrum.csv"
+    rows = [f"{w},{p[0, 0].real},{p[0, 1].real},{p[0, 1].imag},{p[1, 1].real}" for w, p in lines]
+    header = "frequency_rad_per_s,power_11,power_12_re,power_12_im,power_22"
+    table.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    given = f"spectrum={{given: {{type: table, file: {table}}}}}"
+    result = analyse(parse_spec(CONTINUOUS, overrides=[given, "experiment={samples: 50}"])).result
+    np.testing.assert_allclose(result["power"]["input"], [1.6, 1.6], rtol=1e-12)
+    M = by_finite_differences(result["information"]["parameters"], lines)
     np.testing.assert_allclose(result["information"]["matrix"], M, rtol=1e-6, atol=1e-6 * M.max())
 
 

@@ -17,6 +17,7 @@ from inputdesign_cli.specification.models.spectrum import (
 from inputdesign_cli.spectrum import LinesBasis, TabulatedSpectrum
 from inputdesign_cli.tasks.build.convex import check_pairs, check_supported
 from inputdesign_cli.tasks.build.foresight import build_foresight
+from inputdesign_cli.tasks.build.given_table import read_given_spectrum
 from inputdesign_cli.tasks.build.header import build_header, build_units
 from inputdesign_cli.tasks.build.limits import build_power_limits
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
@@ -30,12 +31,9 @@ from inputdesign_cli.tasks.build.system import (
     read_excitation_record,
     record_step,
 )
-from inputdesign_cli.tasks.build.tables import bad_table, read_frequency_table
 from inputdesign_cli.tasks.given import GivenExcitation, GivenTask
 from inputdesign_cli.tasks.result.given_limits import StatedLimits
 
-_NEGATIVE = -1e-9
-_TABLE = "spectrum.given.file"
 _REFUSED = ("spectrum", "energy")
 # Keys of signals that mean something for a record that the tool makes.
 _MADE = ("type", "periods", "hold", "lines", "amplitudes", "ramp", "bits", "quantisation", "phases")
@@ -148,7 +146,8 @@ def _excitation(spec: Spec, stated: GivenSpectrum, experiment: Experiment) -> Gi
                 "multisine", lines, x, experiment, sinusoids=(frequencies, amplitudes)
             )
         case GivenTable() as given:
-            return GivenExcitation.spectral("table", _table(spec, given, r), np.ones(1), experiment)
+            basis, x = read_given_spectrum(spec, given.file, r)
+            return GivenExcitation.spectral("table", basis, x, experiment)
 
 
 def _sinusoids(spec: Spec, given: GivenMultisine) -> tuple[Array, Array]:
@@ -179,30 +178,3 @@ def _recorded(spec: Spec, experiment: Experiment, given: GivenSignal) -> GivenEx
         return FiniteRecord(coordinates, len(samples), plant.step).information(samples)
 
     return GivenExcitation("signal", power, information, samples=samples)
-
-
-def _table(spec: Spec, given: GivenTable, r: int) -> TabulatedSpectrum:
-    """The columns of `spectrum.csv`: phi, or phi_11, phi_12_re, phi_12_im, phi_22, .."""
-    pairs = [(i, j) for i in range(r) for j in range(i + 1, r)]
-    names: dict[str, tuple[int, int, complex]] = {"phi": (0, 0, 1.0)}
-    if r > 1:
-        names = {f"phi_{i + 1}{i + 1}": (i, i, 1.0) for i in range(r)}
-    for i, j in pairs:
-        names |= {f"phi_{i + 1}{j + 1}_re": (i, j, 1.0), f"phi_{i + 1}{j + 1}_im": (i, j, 1j)}
-    columns = read_frequency_table(spec, given.file, list(names), _TABLE)
-    phi = np.zeros((columns["frequency"].size, r, r), dtype=complex)
-    for name, (i, j, unit) in names.items():
-        phi[:, i, j] += unit * columns[name]
-    for i, j in pairs:
-        phi[:, j, i] = phi[:, i, j].conj()
-    eigenvalues = np.linalg.eigvalsh(phi)
-    if eigenvalues.max() <= 0 or eigenvalues.min() < _NEGATIVE * eigenvalues.max():
-        wanted = "nonnegative, and positive somewhere" if r == 1 else "positive semidefinite, and not zero"
-        hint = "give the spectral density, such as the spectrum.csv of a run"
-        raise bad_table(spec, given.file, f"phi must be {wanted}", hint, _TABLE)
-    frequency = columns["frequency"]
-    if spec.plant.sampled and frequency[-1] > np.pi * (1 + 1e-4):
-        reached = f"{frequency[-1] / build_units(spec).frequency:g} rad/{spec.time_unit}"
-        message = f"it reaches {reached}, beyond the Nyquist frequency"
-        raise bad_table(spec, given.file, message, "frequencies end at pi/sample_time", _TABLE)
-    return TabulatedSpectrum(np.minimum(frequency, np.pi) if spec.plant.sampled else frequency, phi)

@@ -29,6 +29,7 @@ from inputdesign_cli.specification.models.spectrum import (
     GivenMultisine,
     GivenSignal,
     GivenSpectrum,
+    GivenTable,
     MultisineSpectrum,
     PolynomialSpectrum,
 )
@@ -40,7 +41,7 @@ from inputdesign_cli.tasks.build.integrators import on_finite_information
 from inputdesign_cli.tasks.build.parameters import degrees_of, delays_of, reparametrised
 from inputdesign_cli.tasks.build.prior import PRIOR, stated_prior
 from inputdesign_cli.tasks.build.state_space import state_space_model
-from inputdesign_cli.tasks.build.tables import read_samples
+from inputdesign_cli.tasks.build.tables import read_frequency_table, read_samples
 
 # Of pi/sample_time, where a band is proposed.
 _WITHIN = 0.95
@@ -162,6 +163,7 @@ def excitation_band(spec: Spec) -> tuple[float, float]:
 
     Raises:
         SpecError: `needs-band` when continuous time leaves it open.
+        DataError: the table of a given spectrum cannot be read.
     """
     band = _stated_band(spec)
     if spec.plant.sampled:
@@ -192,6 +194,11 @@ def _stated_band(spec: Spec) -> tuple[float, float] | None:
             spec.limits.band is None and not spec.plant.sampled and given[-1] > 0
         ):
             return _around(given)
+        case GivenSpectrum(given=GivenTable(file=name)) if (
+            spec.limits.band is None and not spec.plant.sampled
+        ):
+            rows = read_frequency_table(spec, name, [], "spectrum.given.file", least=1)["frequency"]
+            return _around(rows.tolist()) if rows[-1] > 0 else None
     return spec.limits.band
 
 

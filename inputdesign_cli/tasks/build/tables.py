@@ -213,8 +213,10 @@ def has_column(path: Path, start: str, *, key: str) -> bool:
     return any(name.startswith(start) for name in read_header(path, key=key))
 
 
-def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str) -> dict[str, Array]:
-    """Columns `frequency`, in the unit of the experiment, and `columns`, each (n,).
+def read_frequency_table(
+    spec: Spec, name: str, columns: Sequence[str], key: str, *, least: int = 2
+) -> dict[str, Array]:
+    """Columns `frequency`, in the unit of the experiment, and `columns`, each (n,), of `least` rows or more.
 
     Raises:
         DataError: the file cannot be read, or its frequencies do not rise from zero or more (`bad-table`).
@@ -222,9 +224,10 @@ def read_frequency_table(spec: Spec, name: str, columns: Sequence[str], key: str
     wanted = {"frequency": "frequency", **{column: column for column in columns}}
     found = read_columns(spec.resolve_path(name), wanted, key=key)
     frequency = found["frequency"]
-    if frequency.size < 2 or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
+    if frequency.size < least or np.any(np.diff(frequency) <= 0) or frequency[0] < 0:
         message = "the frequencies must be nonnegative and increase from row to row"
-        raise bad_table(spec, name, message, "sort the rows; there must be two at least", key)
+        hint = f"sort the rows; there must be {'one' if least == 1 else 'two'} at least"
+        raise bad_table(spec, name, message, hint, key)
     for column, values in found.items():
         size = np.abs(values)
         beyond = np.flatnonzero((size > _LARGEST) | ((size < 1.0 / _LARGEST) & (size > 0.0)))
