@@ -6,7 +6,8 @@ The admissible error is drawn so that r_u reaches 50 to 100 % of it: every model
 test spoke against it. It is a constant, or relative to |G| as far as |G| stays above a tenth of its gain.
 Wrong models lack a lag or have another delay, or their data drift, have coloured noise that the model takes
 for another kind, or come from a plant whose gain changes during the record, or whose actuator saturates or
-has a dead zone. Half of the records begin in the middle of things, about a level.
+has a dead zone, or the input was logged late. Half of the records begin in the middle of things, about a
+level.
 
 With --designed the records are the cheapest binary ones for a relative error of a first-order plant in a
 narrow band, at one to two times the amplitude that they need. Nothing there excites what the model lacks more
@@ -30,10 +31,12 @@ import scipy.special
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import Estimate, identify, that_matter
+from inputdesign_cli.identification.explore import answers_output
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 
 FAULTS = ("lag", "delay", "drift", "noise", "change", "nonlinear")
+LATE = "late"
 _FREQUENCIES = np.linspace(1e-3, np.pi, 800)
 _BEFORE = 300
 _DESIGNS = 30
@@ -109,6 +112,8 @@ def trial(fault: str | None, rng: np.random.Generator) -> Trial:
         late = np.arange(total) > _BEFORE + rng.uniform(0.15, 0.85) * samples
         gain = 1.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-1.5, -0.3)
         applied = np.where(late, gain, 1.0) * u
+    if fault == LATE:
+        applied = np.roll(u, -int(rng.integers(2, 16)))
     if fault in ACTUATORS:
         while np.unique(u).size <= 2:  # two levels have a gain, whatever lies between
             u = excitation(total, rng)
@@ -225,17 +230,22 @@ def designed_trial(seed: int, *, wrong: bool, rng: np.random.Generator) -> Trial
 
 @dataclass(frozen=True)
 class Judged:
-    """The estimate; whether its error is admitted, by r_u and in truth; whether a parameter is missed."""
+    """The estimate; whether its error is admitted, by r_u and in truth; whether a parameter is missed.
+
+    `answering` tells that the input answers the noise.
+    """
 
     found: Estimate
     met: bool
     beyond: bool
     missed: bool
+    answering: bool
 
     @property
     def undecided(self) -> bool:
         """Whether the verdict is neither met nor missed."""
-        return bool(self.found.failed) or not self.found.converged or (self.met and self.missed)
+        refuted = bool(self.found.failed) or self.answering
+        return refuted or not self.found.converged or (self.met and self.missed)
 
 
 def judged(made: Trial, rng: np.random.Generator) -> Judged:
@@ -263,6 +273,7 @@ def judged(made: Trial, rng: np.random.Generator) -> Judged:
         bool(np.all(alpha * np.sqrt(spread[asked]) <= admissible * (1.0 + 1e-9))),
         bool(np.any(np.abs(G - true)[asked] > admissible)),
         bool(that_matter(found.directed, moves)),
+        bool(answers_output([(made.u[:, None], made.y[:, None])], [found.errors])),
     )
 
 
@@ -281,6 +292,7 @@ def counted(trials: Iterable[tuple[Trial, np.random.Generator]]) -> Counter[str]
         counts["not settled"] += not one.found.converged
         counts["free start"] += one.found.free
         counts["a parameter missed"] += one.missed
+        counts["an input that answers"] += one.answering
         counts.update({test.name for test in one.found.tests} & {test.name for test in one.found.failed})
         counts["directed"] += any(tried.test in one.found.failed for tried in one.found.directed)
     return counts
@@ -288,7 +300,7 @@ def counted(trials: Iterable[tuple[Trial, np.random.Generator]]) -> Counter[str]
 
 def study(fault: str | None, seeds: range) -> Counter[str]:
     """The verdicts on random systems."""
-    number = [None, *dict.fromkeys([*FAULTS, *ACTUATORS])].index(fault)
+    number = [None, *dict.fromkeys([*FAULTS, *ACTUATORS, LATE])].index(fault)
     generators = [np.random.default_rng([seed, number]) for seed in seeds]
     return counted((trial(fault, rng), rng) for rng in generators)
 
@@ -318,11 +330,12 @@ def main() -> None:
         return
     print(f"right ({asked.runs})", dict(study(None, every)), flush=True)
     wrong_ones: Counter[str] = Counter()
-    for fault in FAULTS:
-        found = study(fault, every[: asked.runs // len(FAULTS)])
+    each = asked.runs // len(FAULTS)
+    for fault in (*FAULTS, LATE):
+        found = study(fault, every[:each])
         wrong_ones += found
-        print(f"{fault} ({asked.runs // len(FAULTS)})", dict(found), flush=True)
-    print(f"wrong ({asked.runs})", dict(wrong_ones))
+        print(f"{fault} ({each})", dict(found), flush=True)
+    print(f"wrong ({each * (1 + len(FAULTS))})", dict(wrong_ones))
 
 
 if __name__ == "__main__":

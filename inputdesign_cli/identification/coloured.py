@@ -59,7 +59,10 @@ class ColouredRecord(OverRecord):
 
     def starts(self, theta: Array, *, free: bool) -> tuple[Start, ...]:
         """What the past adds to those of the plant, filtered, and by noise before the record through C/D."""
-        raw = self.record.starts(self._of_plant(theta), free=free)
+        return self._through(theta, self.record.starts(self._of_plant(theta), free=free))
+
+    def _through(self, theta: Array, raw: Sequence[Start]) -> tuple[Start, ...]:
+        """The starts of the plant filtered, with noise before the record."""
         found = []
         for start, (D, C) in zip(raw, self.structure.at(theta).inverse_filters, strict=True):
             through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
@@ -77,20 +80,27 @@ class ColouredRecord(OverRecord):
         own = np.arange(len(self.structure.plant.parameters), self.size)
         return np.concatenate([self.record.in_starts(free=free), own])
 
-    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
         """The derivatives of the starts: of C and D by central differences."""
-        if index >= len(self.structure.plant.parameters):
-            step = _STEP * np.eye(self.size)[index]
-            above, below = (self.starts(theta + sign * step, free=free) for sign in (1.0, -1.0))
-            return differences(above, below, 2.0 * _STEP)
+        plant, of_plant = self._of_plant(theta), len(self.structure.plant.parameters)
         filters = self.structure.at(theta).inverse_filters
-        found = []
-        slopes = self.record.start_slopes(self._of_plant(theta), index, free=free)
-        for start, (D, C) in zip(slopes, filters, strict=True):
-            through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
-            none = np.zeros((max(D.size, C.size) - 1, len(self.y)))
-            found.append(Start(through, start.disturbance, np.concatenate([noise, none]), start.zeros))
-        return tuple(found)
+        found: dict[int, tuple[Start, ...]] = {}
+        moving = [index for index in indices if index < of_plant]
+        slopes = self.record.start_slopes(plant, moving, free=free) if moving else []
+        for index, starts in zip(moving, slopes, strict=True):
+            own = []
+            for start, (D, C) in zip(starts, filters, strict=True):
+                through, noise = (filtered(D, C, x) for x in (start.free, start.noise))
+                none = np.zeros((max(D.size, C.size) - 1, len(self.y)))
+                own.append(Start(through, start.disturbance, np.concatenate([noise, none]), start.zeros))
+            found[index] = tuple(own)
+        raw = self.record.starts(plant, free=free) if len(moving) < len(indices) else ()
+        for index in indices:
+            if index >= of_plant:
+                step = _STEP * np.eye(self.size)[index]
+                above, below = (self._through(theta + sign * step, raw) for sign in (1.0, -1.0))
+                found[index] = differences(above, below, 2.0 * _STEP)
+        return [found[index] for index in indices]
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): none; no instruments are used."""

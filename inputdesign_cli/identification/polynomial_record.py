@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -84,12 +85,24 @@ class PolynomialRecord:
         ]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *found]))
 
-    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
-        """By a step along the imaginary axis, which loses no digits to a difference ([squire-trapp-1998])."""
-        step = np.zeros(theta.size, dtype=complex)
-        step[index] = 1j * _STEP
-        found = self.starts(theta + step, free=free)
-        return tuple(Start(*(block.imag / _STEP for block in start)) for start in found)
+    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
+        """By steps along the imaginary axis, which lose no digits to a difference ([squire-trapp-1998])."""
+        still = (
+            [start.still for start in self.starts(theta, free=free)] if len(self.structure.rows) > 1 else []
+        )
+        found = []
+        for index in indices:
+            step = np.zeros(theta.size, dtype=complex)
+            step[index] = 1j * _STEP
+            slopes = []
+            for i, (row, place) in enumerate(zip(self.structure.rows, self.structure.places, strict=True)):
+                if index in place:
+                    start = _start(row, (theta + step)[place], len(self.y), free=free)
+                    slopes.append(Start(*(block.imag / _STEP for block in start)))
+                else:
+                    slopes.append(still[i])
+            found.append(tuple(slopes))
+        return found
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): nothing; no instruments are used."""

@@ -61,8 +61,8 @@ class Record(Protocol):
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
         """The parameters on which the starts depend."""
 
-    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
-        """The derivatives of the starts with respect to one of them."""
+    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
+        """The derivatives of the starts with respect to each of these."""
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p): what measured outputs in place of the model's add to psi."""
@@ -198,8 +198,8 @@ class Records:
             return at_rest
         coefficients, root, directions = starts.eliminated(errors, self.weights)
         slopes = np.zeros((theta.size, starts.parts))
-        for k in self.parts[0].in_starts(free=self.free):
-            change = self._start_slopes(theta, int(k))
+        moving = self.parts[0].in_starts(free=self.free).tolist()
+        for k, change in zip(moving, self._start_slopes(theta, moving), strict=True):
             psi[k] += starts.combined(coefficients, starts=change)
             slopes[k] = 0.5 * starts.slopes(change)
         past = np.zeros((starts.past, errors.shape[1]))
@@ -229,7 +229,8 @@ class Records:
         if index not in self.parts[0].in_starts(free=self.free) or not (starts.past and starts.finite):
             return psi
         coefficients, _, _ = starts.eliminated(np.concatenate([e for e, _ in found]), self.weights)
-        return psi + starts.combined(coefficients, starts=self._start_slopes(theta, index), free=False)
+        (change,) = self._start_slopes(theta, [index])
+        return psi + starts.combined(coefficients, starts=change, free=False)
 
     @cached_property
     def _longest(self) -> Record:
@@ -239,8 +240,8 @@ class Records:
     def _starts(self, theta: Array) -> FreeStarts:
         return FreeStarts(self.lengths, self._longest.starts(theta, free=self.free))
 
-    def _start_slopes(self, theta: Array, index: int) -> tuple[Start, ...]:
-        return self._longest.start_slopes(theta, index, free=self.free)
+    def _start_slopes(self, theta: Array, indices: Sequence[int]) -> list[tuple[Start, ...]]:
+        return self._longest.start_slopes(theta, indices, free=self.free)
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p), see `Record`."""

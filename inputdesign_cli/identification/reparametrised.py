@@ -66,19 +66,20 @@ class ReparametrisedRecord(OverRecord):
         """That at the coefficients."""
         return self.record.lateness(self.parametrisation.at(theta).coefficients)
 
-    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
-        """The derivatives of the starts with respect to one parameter, by the chain rule."""
+    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
+        """The derivatives of the starts with respect to these parameters, by the chain rule."""
         here = self.parametrisation.at(theta)
-        moved = [c for c in self.record.in_starts(free=free) if here.jacobian[c, index] != 0.0]
+        slopes = here.jacobian[:, indices]
+        moved = [c for c in self.record.in_starts(free=free).tolist() if np.any(slopes[c])]
         if not moved:
-            none = self.starts(theta, free=free)
-            return tuple(Start(*(np.zeros_like(block) for block in start)) for start in none)
-        weights = here.jacobian[moved, index]
-        slopes = [self.record.start_slopes(here.coefficients, int(c), free=free) for c in moved]
-        return tuple(
-            Start(*(np.tensordot(weights, np.array(blocks), 1) for blocks in zip(*same, strict=True)))
-            for same in zip(*slopes, strict=True)
-        )
+            return [tuple(start.still for start in self.starts(theta, free=free))] * len(indices)
+        of_moved = self.record.start_slopes(here.coefficients, moved, free=free)
+        # Of every output and block the derivatives (moved, ..), weighed for all parameters at once.
+        weighed = [
+            [np.tensordot(slopes[moved].T, np.array(blocks), 1) for blocks in zip(*same, strict=True)]
+            for same in zip(*of_moved, strict=True)
+        ]
+        return [tuple(Start(*(b[k] for b in blocks)) for blocks in weighed) for k in range(len(indices))]
 
     def in_starts(self, *, free: bool) -> NDArray[np.int64]:
         """Those that move a coefficient on which the starts depend."""

@@ -47,6 +47,11 @@ class Start(NamedTuple):
         return Start(free, disturbance, noise, self.zeros)
 
     @property
+    def still(self) -> Start:
+        """Its derivative with respect to what it does not depend on."""
+        return Start(*(np.zeros_like(block) for block in self))
+
+    @property
     def finite(self) -> bool:
         """Whether all are."""
         return all(bool(np.all(np.isfinite(block))) for block in self)

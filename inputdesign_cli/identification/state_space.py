@@ -147,8 +147,11 @@ class StateSpaceRecord:
         estimated = any(letter == "K" for letter, _, _ in self.structure.entries)
         return estimated or bool(np.any(self.structure.matrices.K))
 
-    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
         """By central differences."""
+        return [self._start_slope(theta, index, free=free) for index in indices]
+
+    def _start_slope(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
         size = _STEP * max(abs(theta[index]), _STEP)
         step = size * np.eye(self.size)[index]
         above, below = (self.starts(theta + sign * step, free=free) for sign in (1.0, -1.0))

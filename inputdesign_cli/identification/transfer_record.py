@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -112,8 +113,11 @@ class TransferRecord:
         """Those of the denominators."""
         return np.flatnonzero([free and parameter.letter == "a" for parameter in self.structure.parameters])
 
-    def start_slopes(self, theta: Array, index: int, *, free: bool) -> tuple[Start, ...]:
+    def start_slopes(self, theta: Array, indices: Sequence[int], *, free: bool) -> list[tuple[Start, ...]]:
         """By central differences; of no start from rest."""
+        return [self._start_slope(theta, index) for index in indices]
+
+    def _start_slope(self, theta: Array, index: int) -> tuple[Start, ...]:
         parameter = self.structure.parameters[index]
         i, j = parameter.places[0]
         order = self._order(i, j)

@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.plant.polynomial import Array
 
+# So many values of the parameters are kept with their coefficients.
+_RECENT = 4
+
 
 @dataclass(frozen=True)
 class Parametrisation:
@@ -53,9 +56,20 @@ class Parametrisation:
 
     def at(self, theta: ArrayLike) -> Parametrisation:
         """The same with other values (k,) of the free ones."""
-        values = self.values.copy()
-        values[self.free] = np.asarray(theta, dtype=float)
-        return replace(self, values=values)
+        point = np.asarray(theta, dtype=float)
+        key = point.tobytes()
+        if key not in self._recent:
+            if len(self._recent) >= _RECENT:
+                del self._recent[next(iter(self._recent))]
+            values = self.values.copy()
+            values[self.free] = point
+            self._recent[key] = replace(self, values=values)
+        return self._recent[key]
+
+    @cached_property
+    def _recent(self) -> dict[bytes, Parametrisation]:
+        """Where `at` has been: a search asks for the same few points again and again."""
+        return {}
 
     @cached_property
     def coefficients(self) -> Array:

@@ -38,6 +38,7 @@ from inputdesign_cli.tasks.result.exploration import (
 )
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
+from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
 
 # A simulation that explains less than this of data it has not seen is no model.
 _LEAST_FIT = 5.0
@@ -65,7 +66,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     loops = answers_output(log.parts)
     with blaming_columns(paths[0]):
         found = explore_records(log.parts, feedback=bool(loops), step=log.step)
-    reasons = (*_reasons(found), *_refuted(found), *_undriven(log))
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *_undriven(log))
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
@@ -150,6 +151,24 @@ def _reasons(found: Found) -> tuple[str, ...]:
                 f"the simulation explains {fit:.1f} % of {'y' if single else f'y{i + 1}'} in {unseen} "
                 f"samples that it has not seen, and of noise alone it may explain {chance:.1f} %: the inputs "
                 "hardly act on it, or the record is too short or too noisy to tell how"
+            )
+    return tuple(told)
+
+
+def _idle(found: Found) -> tuple[str, ...]:
+    """Outputs of which the whole record tells no effect of the inputs, though a part of it did."""
+    nothing = driven_by_nothing(found.model, found.estimate)
+    single = found.model.outputs == 1
+    told = []
+    for i, fit in enumerate(found.estimate.fit):
+        worse = fit is not None and fit <= 0.0
+        if worse or i in nothing:
+            why = f"the simulation explains {fit:.1f} %" if worse else "its standard deviations reach zero"
+            output = "y" if single else f"y{i + 1}"
+            told.append(
+                f"in the whole record no effect of the inputs on {output} can be told from none ({why}): "
+                "what agreed in a part of it may be chance, as two slow signals often do; move the inputs "
+                "more, or for longer"
             )
     return tuple(told)
 

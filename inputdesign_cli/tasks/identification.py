@@ -32,6 +32,7 @@ from inputdesign_cli.tasks.result.estimates import (
 from inputdesign_cli.tasks.result.faults import faults, loop_faults
 from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
+from inputdesign_cli.tasks.result.unrelated import answering, idle
 
 
 @dataclass(frozen=True)
@@ -158,9 +159,12 @@ def told(error: IdesignError) -> str:
 def speaking_against(task: Identification, found: Identified) -> list[str]:
     """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
     data, estimate = found.data, found.estimate
-    measured = [*faults(task.header.units, estimate, data), *loop_faults(task.controller, data)]
+    units = task.header.units
+    measured = [*faults(units, estimate, data), *loop_faults(task.controller, data)]
     return measured or [
+        *idle(units, task.nominal, found.model, estimate),
         *refutations(found.model, estimate),
+        *answering(units, estimate, data),
         *(repetitions(estimate, data.files) or data.repeated),
     ]
 

@@ -35,29 +35,41 @@ def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) ->
     return 0
 
 
-def answers_output(parts: Sequence[tuple[Array, Array]]) -> list[tuple[int, float]]:
+def answers_output(
+    parts: Sequence[tuple[Array, Array]], innovations: Sequence[Array] | None = None
+) -> list[tuple[int, float]]:
     """Inputs that past noise of the outputs helps to predict, with the probability of that by chance.
 
     That hints of a loop. Each input is regressed on its own past and the other inputs', then on past
     innovations of the outputs as well ([ljung-1999], Section 13.4); the test is that of the likelihood ratio.
     Not outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
     would help to predict one that is held.
+
+    Args:
+        innovations: of the outputs of every part, (n, p), where a model tells them; else those of a
+            regression on past inputs and outputs.
     """
     found = []
     r, p = parts[0][0].shape[1], parts[0][1].shape[1]
     lags = max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * (r + p))), 1)
-    centred = [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > 3 * lags]
+    long = [len(y) > 3 * lags for _, y in parts]
+    centred = [
+        (u - u.mean(axis=0), y - y.mean(axis=0)) for (u, y), kept in zip(parts, long, strict=True) if kept
+    ]
     if not centred:
         return []
-    innovations = _innovations(centred, lags)
+    if innovations is None:
+        new = _innovations(centred, lags)
+    else:
+        new = [e[lags:] for e, kept in zip(innovations, long, strict=True) if kept]
     own = np.concatenate([_past(u, lags)[lags:] for u, _ in centred])
-    both = np.column_stack([own, np.concatenate([_past(e, lags) for e in innovations])])
+    both = np.column_stack([own, np.concatenate([_past(e, lags) for e in new])])
     for j in range(r):
         target = np.concatenate([u[2 * lags :, j] for u, _ in centred])
         left = [_left_over(columns, target) for columns in (own, both)]
         if left[0] <= 1e-12 * float(np.sum(target**2)):
             continue  # the input follows from its own past: a deterministic signal
-        statistic = len(target) * np.log(left[0] / max(left[1], 1e-300))
+        statistic = (len(target) - both.shape[1]) * np.log(left[0] / max(left[1], 1e-300))
         probability = float(scipy.special.chdtrc(p * lags, statistic))
         if probability < _CERTAIN:
             found.append((j, probability))

@@ -1,0 +1,102 @@
+"""Inputs that may not be those that moved the plant: they answer the outputs, or explain nothing of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.identification import Estimate
+from inputdesign_cli.identification.explore import answers_output
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.data import Data
+from inputdesign_cli.tasks.result.refutations import chance
+
+_FREQUENCIES = 60
+_LEAST_FREQUENCY = 1e-3
+# G that is zero up to chance, and one that these data rule out.
+_ZERO, _OTHERWISE = 1e-3, 1e-6
+# Directions of G that are smaller than this, and what the parameters may leave of it.
+_DEPENDENT, _LEFT = 1e-8, 1e-4
+
+
+def answering(units: Units, estimate: Estimate, data: Data) -> list[str]:
+    """A sentence for every input that past prediction errors predict, where the spec has no loop."""
+    if units.closed_loop:
+        return []
+    ends = np.cumsum(data.lengths)[:-1]
+    parts = list(zip(np.split(data.u, ends), np.split(data.y, ends), strict=True))
+    errors = np.split(estimate.errors, ends)
+    return [
+        f"past prediction errors help to tell {_name(units, j)} (probability {chance(probability)}), and no "
+        "input in open loop answers the noise: it was logged late, columns are swapped, or the data come "
+        "from a loop; mend the columns, or state the loop as experiment.controller"
+        for j, probability in answers_output(parts, errors)
+    ]
+
+
+def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> list[str]:
+    """A sentence for every input that explains nothing, though at the plant of the spec it would.
+
+    Args:
+        nominal, estimated: of one structure.
+    """
+    w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi / units.step
+    with np.errstate(all="ignore"):
+        gradient, now, before = estimated.plant_gradient(w), estimated.plant_at(w), nominal.plant_at(w)
+    told = []
+    for j in range(units.inputs):
+        change = _stacked(gradient[:, :, :, j].swapaxes(0, 1))
+        probability = _chance(estimate, change, _stacked(now[None, :, :, j])[0], wholly=True)
+        if probability is None or probability < _ZERO:
+            continue
+        expected = _chance(estimate, change, _stacked((now - before)[None, :, :, j])[0], wholly=False)
+        if expected is not None and expected < _OTHERWISE:
+            told.append(
+                f"{_name(units, j)} explains nothing of what was measured: G cannot be told from zero "
+                f"(probability {chance(probability)}), and the plant of the spec can: see whether the "
+                "columns are those of one experiment; if the plant does not answer, correct the spec"
+            )
+    return told
+
+
+def driven_by_nothing(model: Model, estimate: Estimate) -> list[int]:
+    """The outputs (from zero) of a model in units of samples whose row of G cannot be told from zero."""
+    w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi
+    with np.errstate(all="ignore"):
+        gradient, G = model.plant_gradient(w), model.plant_at(w)
+    found = []
+    for i in range(model.outputs):
+        change = _stacked(gradient[:, :, i].swapaxes(0, 1))
+        probability = _chance(estimate, change, _stacked(G[None, :, i])[0], wholly=True)
+        if probability is not None and probability > _ZERO:
+            found.append(i)
+    return found
+
+
+def _stacked(G: ComplexArray) -> Array:
+    """(m, 2 n p): real and imaginary parts of values (m, n, p)."""
+    flat = G.reshape(len(G), -1)
+    return np.concatenate([flat.real, flat.imag], axis=1)
+
+
+def _chance(estimate: Estimate, change: Array, away: Array, *, wholly: bool) -> float | None:
+    """The probability, if the estimate is right but for chance, of G that differs from it by `away` (m,).
+
+    The statistic is that of Wald: the least that a step of the parameters takes to get there, as far as any
+    does, `change` (k, m) being the gradient of G. None where none leads there `wholly`.
+    """
+    if not all(np.all(np.isfinite(x)) for x in (change, away)):
+        return None
+    J = scipy.linalg.solve_triangular(estimate.factor, change, lower=True)
+    _, sizes, right = np.linalg.svd(J, full_matrices=False)
+    kept = sizes > _DEPENDENT * np.max(sizes, initial=0.0)
+    along = right[kept] @ away
+    if wholly and np.linalg.norm(away - along @ right[kept]) > _LEFT * np.linalg.norm(away):
+        return None
+    return float(scipy.special.chdtrc(np.count_nonzero(kept), np.sum((along / sizes[kept]) ** 2)))
+
+
+def _name(units: Units, j: int) -> str:
+    return f"u{j + 1}" if units.inputs > 1 else "u"
