@@ -290,10 +290,13 @@ def explore_structure(
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
-    """The best of every family."""
+    """The best of every family; those with coloured noise beside the plain ones, of which they are made."""
     kept: list[Candidate] = []
     for candidate in sorted(found, key=lambda c: -c.validation):
-        alike = sum(c.orders.family == candidate.orders.family for c in kept)
+        alike = sum(
+            (c.orders.family, c.orders.coloured) == (candidate.orders.family, candidate.orders.coloured)
+            for c in kept
+        )
         if alike < _FINALISTS and np.isfinite(candidate.validation):
             kept.append(candidate)
     return kept
