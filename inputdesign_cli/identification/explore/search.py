@@ -137,9 +137,12 @@ class Chosen:
 
     @property
     def ranked(self) -> list[Candidate]:
-        """Those that may be taken, then the others, the best first; those on the edge of stability last."""
+        """Those that may be taken, then the others, the best first.
+
+        After them the biased ones, and those on the edge of stability last.
+        """
         others = [c for c in self.candidates if all(c is not one for one in self.finalists)]
-        return sorted((*self.finalists, *others), key=lambda c: not c.steady)
+        return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
 
     def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
         """Of each input, the delays that 95 % of confidence leaves a candidate."""
