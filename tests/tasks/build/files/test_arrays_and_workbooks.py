@@ -10,8 +10,8 @@ from inputdesign_cli.errors import DataError
 from inputdesign_cli.tasks.build.files import isolated, read_sheet
 from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
-from inputdesign_cli.tasks.build.tables import read_columns
-from tests.support.logs import TIME, U, Y, iddata, save
+from inputdesign_cli.tasks.build.tables import columns_of, read_columns
+from tests.support.logs import ROWS, TIME, U, Y, iddata, save
 
 
 @pytest.mark.parametrize(
@@ -97,3 +97,40 @@ def test_arrays_that_mean_columns_of_numbers_are_columns(tmp_path):
     found = read_columns(path, {name: name for name in names}, key="")
     for name, expected in zip(names, (TIME, U, Y, U, Y), strict=True):
         np.testing.assert_array_equal(found[name], expected)
+
+
+WORKBOOKS = {
+    "names": [["time", "u", "y"], *ROWS],
+    "no names": ROWS,
+    "a row of units": [["time", "u", "y"], ["s", "V", "degC"], *ROWS],
+    "a preamble": [["Logger X1"], ["Serial", 42], [], ["time", "u", "y"], *ROWS],
+    "a preamble, names and units": [["Logger X1"], ["time", "u", "y"], ["s", "V", "degC"], *ROWS],
+}
+
+
+@pytest.mark.parametrize("rows", WORKBOOKS.values(), ids=WORKBOOKS)
+def test_the_table_of_a_workbook_is_found_as_in_text(rows, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    pandas.DataFrame(rows).to_excel(path, index=False, header=False)
+    sheet = read_sheet(path, key="")
+    wanted = {name: name if sheet.names else str(k + 1) for k, name in enumerate(("time", "u", "y"))}
+    for name, numbers in columns_of(sheet, wanted).items():
+        np.testing.assert_array_equal(numbers, {"time": TIME, "u": U, "y": Y}[name])
+    begins = len(rows) - len(ROWS) + 1
+    assert sheet.lines.tolist() == list(range(begins, begins + len(ROWS)))
+
+
+def test_a_cell_of_a_workbook_that_is_no_number_is_told_with_its_row(tmp_path):
+    """1.125 beside 808 has three decimals, and no mark between thousands: cells of a workbook are typed."""
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    cells = {"u": [1.125, 808, "n/a", None], "y": [1.0, 2.0, "broken", 4.0]}
+    pandas.DataFrame(cells).to_excel(path, index=False)
+    sheet = read_sheet(path, key="")
+    np.testing.assert_array_equal(columns_of(sheet, {"u": "u"})["u"], [1.125, 808.0, np.nan, np.nan])
+    with pytest.raises(DataError, match="'broken' in column y is not a finite number") as caught:
+        columns_of(sheet, {"y": "y"})
+    assert caught.value.diagnostics[0].location.line == 4

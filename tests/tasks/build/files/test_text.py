@@ -59,6 +59,8 @@ def test_gaps_are_nan_and_text_is_not(tmp_path):
 LOGGERS = {
     "a preamble of keys": "Logger X1\nSerial,42\nOperator,Bob\n\ntime,u,y\n{rows}",
     "a preamble as wide as the table": "a,b,c\nd,e,f\ntime,u,y\n{rows}",
+    "a preamble as wide as the table, of empty cells": "Logger X1,,\nSerial,42,\n,,\ntime,u,y\n{rows}",
+    "the same above names and units": "Logger X1,,\ntime,u,y\ns,V,degC\n{rows}",
     "a preamble above names and units": "Logger,X1\n\ntime,u,y\ns,V,degC\n{rows}",
     "a preamble without names": "Logger X1\nwritten by hand\n{rows}",
     "a separator at every end": "time,u,y\n{trailing}",
