@@ -103,8 +103,8 @@ WORKBOOKS = {
     "names": [["time", "u", "y"], *ROWS],
     "no names": ROWS,
     "a row of units": [["time", "u", "y"], ["s", "V", "degC"], *ROWS],
-    "a preamble": [["Logger X1"], ["Serial", 42], [], ["time", "u", "y"], *ROWS],
-    "a preamble, names and units": [["Logger X1"], ["time", "u", "y"], ["s", "V", "degC"], *ROWS],
+    "a preamble": [["Logger X1", None, None], ["Serial", 42, None], [None] * 3, ["time", "u", "y"], *ROWS],
+    "a preamble, names and units": [["Logger X1", None, None], ["time", "u", "y"], ["s", "V", "degC"], *ROWS],
 }
 
 
