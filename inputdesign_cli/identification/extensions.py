@@ -15,8 +15,7 @@ from inputdesign_cli.identification.records import Record, Records, shifted
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.plant.model import Listed
-from inputdesign_cli.plant.polynomial import Array, ComplexArray
-from inputdesign_cli.plant.polynomial_model import Rows
+from inputdesign_cli.plant.polynomial import Array, ComplexArray, Rows
 
 
 @dataclass(frozen=True)

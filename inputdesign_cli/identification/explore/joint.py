@@ -122,33 +122,50 @@ def _estimated(
     found: Sequence[Chosen], used: Parts, feedback: bool
 ) -> tuple[tuple[Candidate, ...], Estimate, Model]:
     """The best structures on the whole record; simpler ones where these cannot be estimated there."""
-    u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
-    lengths = [len(part) for _, part in used]
+    inputs = used[0][0].shape[1]
     reason: SpecError | None = None
     for taken in _combinations(found):
-        structure = joined(taken, u.shape[1], range(u.shape[1]))
         try:
-            estimate = identify(
-                structure,
-                u,
-                y,
-                start=structure.theta,
-                feedback=feedback,
-                lengths=lengths,
-                rest=False,
-                near=taken[0].orders.physical,  # other starts cost more than the search
-            )
+            begun = taken
+            if len(taken) > 1:
+                # Where one output has several minima, a search for all of them seldom leaves a wrong one.
+                begun = tuple(_alone(own, used, i, feedback) for i, own in enumerate(taken))
+            structure = joined(begun, inputs, range(inputs))
+            # Of plants in s other starts cost more than the search.
+            near = len(taken) > 1 or taken[0].orders.physical
+            estimate = _identified(structure, used, feedback, near=near)
         except SpecError as error:
             reason = error
             continue
         model = structure.at(estimate.theta, estimate.noise)
-        if is_steady(model, len(y)):
+        if is_steady(model, sum(len(y) for _, y in used)):
             return taken, estimate, model
     raise reason or bad_spec(
         "no-structure",
         "no stable model explains the record",
         hint="record it in a loop, or remove the drift: --detrend linear",
         key="y",
+    )
+
+
+def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool) -> Candidate:
+    """The structure of one output, estimated from the whole record without the others."""
+    own = [(u, y[:, output : output + 1]) for u, y in used]
+    estimate = _identified(candidate.model, own, feedback, near=candidate.orders.physical)
+    return replace(candidate, model=candidate.model.at(estimate.theta, estimate.noise))
+
+
+def _identified(structure: Model, used: Parts, feedback: bool, *, near: bool) -> Estimate:
+    u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
+    return identify(
+        structure,
+        u,
+        y,
+        start=structure.theta,
+        feedback=feedback,
+        lengths=[len(part) for _, part in used],
+        rest=False,
+        near=near,
     )
 
 

@@ -41,6 +41,11 @@ class Orders:
         return self.a > 0
 
     @property
+    def coloured(self) -> bool:
+        """Whether the noise has a filter of its own."""
+        return self.c + self.d > 0
+
+    @property
     def unknowns(self) -> int:
         """What the input must tell: the coefficients of one input."""
         return self.b + self.order

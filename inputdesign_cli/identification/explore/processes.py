@@ -81,6 +81,11 @@ class Process:
         return {word: number for word, number in every.items() if number}
 
     @property
+    def coloured(self) -> bool:
+        """Whether the noise is filtered."""
+        return self.noise > 0
+
+    @property
     def letters(self) -> tuple[str, ...]:
         """The parameters of an input."""
         return (*_OF_ORDER[self.order], *(("Tz",) if self.zero else ()), "L")

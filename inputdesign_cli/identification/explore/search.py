@@ -137,9 +137,12 @@ class Chosen:
 
     @property
     def ranked(self) -> list[Candidate]:
-        """Those that may be taken, then the others, the best first; those on the edge of stability last."""
+        """Those that may be taken, then the others, the best first.
+
+        After them the biased ones, and those on the edge of stability last.
+        """
         others = [c for c in self.candidates if all(c is not one for one in self.finalists)]
-        return sorted((*self.finalists, *others), key=lambda c: not c.steady)
+        return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
 
     def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
         """Of each input, the delays that 95 % of confidence leaves a candidate."""
@@ -290,10 +293,13 @@ def explore_structure(
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
-    """The best of every family."""
+    """The best of every family; those with coloured noise beside the plain ones, of which they are made."""
     kept: list[Candidate] = []
     for candidate in sorted(found, key=lambda c: -c.validation):
-        alike = sum(c.orders.family == candidate.orders.family for c in kept)
+        alike = sum(
+            (c.orders.family, c.orders.coloured) == (candidate.orders.family, candidate.orders.coloured)
+            for c in kept
+        )
         if alike < _FINALISTS and np.isfinite(candidate.validation):
             kept.append(candidate)
     return kept

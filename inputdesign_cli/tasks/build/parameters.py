@@ -10,8 +10,7 @@ import numpy as np
 from inputdesign_cli.expressions import Expression
 from inputdesign_cli.plant import Listed, Model, Parameter, Parametrisation, Reparametrised, Words
 from inputdesign_cli.plant.model import DELAY
-from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.plant.polynomial_model import Rows
+from inputdesign_cli.plant.polynomial import Array, Rows
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.named import leading
 from inputdesign_cli.specification.models.plant import ContinuousPlant, PolynomialPlant, StateSpacePlant

@@ -15,8 +15,7 @@ from inputdesign_cli.plant import (
     SampledModel,
     StateSpaceModel,
 )
-from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.plant.polynomial_model import Rows
+from inputdesign_cli.plant.polynomial import Array, Rows
 from inputdesign_cli.plant.reparametrised import Place
 from inputdesign_cli.runs.results import Json
 

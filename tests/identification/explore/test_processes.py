@@ -95,3 +95,14 @@ def test_a_true_model_is_judged_alike_in_s_and_in_q(in_s):
     expected = 100.0 * (1.0 - np.linalg.norm(left - left.mean()) / (np.std(y[114:]) * np.sqrt(left.size)))
     assert found.simulation[0] == pytest.approx(expected, abs=0.2)
     assert found.prediction[0] == pytest.approx(expected, abs=0.2)
+
+
+def test_coloured_noise_does_not_displace_the_plain_structure():
+    """Of one lag, with filters for white noise it simulates as well: the one without them is taken."""
+    rng = np.random.default_rng(18)
+    u = np.repeat(rng.choice([-1.0, 1.0], 40), 6)[:, None]
+    x, _ = first_order(1.5, 6.0, 1.2).simulate(u, np.zeros(u.shape), 1.0)
+    y = x + np.std(x) / np.sqrt(10.0) * rng.standard_normal(u.shape)
+    best = explore_structure([(u[:150], y[:150])], [(u[150:], y[150:])], step=STEP).best.orders
+    assert (best.family, best.noise) == ("FOPDT", 0)
+    assert abs(best.delays[0] - 3) <= 1

@@ -1,5 +1,7 @@
 """Delay and order of simulated plants are found; fits are those of their definition."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -202,3 +204,17 @@ def test_the_range_of_a_delay_holds_it(seed):
     for candidate in chosen.candidates:
         for delay, (low, high) in zip(candidate.orders.delays, chosen.ranges(candidate), strict=True):
             assert low <= delay <= high
+
+
+def test_what_is_tried_next_is_unbiased_and_stable_first():
+    """Where the best cannot be estimated from the whole record; within each kind, the best first."""
+    rng = np.random.default_rng(3)
+    u, y = rng.standard_normal((2, 40, 1))
+    one = explore_structure([(u[:24], y[:24])], [(u[24:], y[24:])], physical=False)
+    arx, oe = (next(c for c in one.candidates if c.orders.family == name) for name in ("ARX", "OE"))
+    edge = replace(oe, steady=False, validation=95.0)
+    biased = replace(arx, steady=True, failed=("trend",), validation=96.0)
+    plain = replace(oe, steady=True, failed=(), validation=89.0)
+    weak = replace(oe, steady=True, failed=("trend",), validation=80.0)
+    chosen = replace(one, candidates=(edge, biased, plain, weak), finalists=(edge, biased))
+    assert [c.validation for c in chosen.ranked] == [89.0, 80.0, 96.0, 95.0]

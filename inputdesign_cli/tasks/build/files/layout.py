@@ -213,6 +213,10 @@ def table_begins(rows: Rows, separator: str | None) -> int:
     if not widths:
         return 0
     width = widths.most_common(1)[0][0]
+    # Sheets fill every row up to the width of the table, with nothing.
+    full = next((i for i, (_, row) in enumerate(sample) if len(row) == width and all(map(str.strip, row))), 0)
+    if 0 < full < _LOOKED_AT and _of_words(rows[full][1], width, comma):
+        return full
     first = next(i for i, (_, row) in enumerate(rows) if len(row) == width and _of_numbers(row, comma))
     if first < 2:
         return 0

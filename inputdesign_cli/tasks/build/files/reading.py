@@ -8,7 +8,7 @@ from inputdesign_cli.errors import STANDARD_INPUT
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.tasks.build.files.arrays import read_mat, read_npz
 from inputdesign_cli.tasks.build.files.decoding import decoded
-from inputdesign_cli.tasks.build.files.frames import EXCEL, PARQUET, read_frame
+from inputdesign_cli.tasks.build.files.frames import EXCEL, PARQUET, read_parquet, read_workbook
 from inputdesign_cli.tasks.build.files.sheet import Sheet, unreadable
 from inputdesign_cli.tasks.build.files.text import read_text
 
@@ -34,8 +34,10 @@ def read_sheet(path: Path, *, key: str) -> Sheet:
         return read_npz(path, key, raw)
     if kind == ".mat":
         return read_mat(path, key, raw)
-    if kind in PARQUET + EXCEL:
-        return read_frame(path, key, raw)
+    if kind in PARQUET:
+        return read_parquet(path, key, raw)
+    if kind in EXCEL:
+        return read_workbook(path, key, raw)
     if raw.startswith(_SHEETS):
         hint = "save the sheet as CSV (comma separated values, UTF-8), and name that file"
         raise unreadable(path, key, "is a spreadsheet, no CSV file", hint)

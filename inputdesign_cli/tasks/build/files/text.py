@@ -32,15 +32,18 @@ from inputdesign_cli.tasks.build.files.layout import (
 from inputdesign_cli.tasks.build.files.sheet import Column, Sheet, unreadable
 
 
-def read_text(path: Path, key: str, text: str) -> Sheet:
+def read_text(path: Path, key: str, text: str, separated_by: str | None = None) -> Sheet:
     """The table in a text file.
+
+    Args:
+        separated_by: what stands between fields; None: as the text says.
 
     Raises:
         DataError: `data-unreadable`, `data-extra-field`.
     """
     lines = text.splitlines()
     comment, first = _leading_comment(lines)
-    separator = separator_of(lines[first:])
+    separator = separated_by or separator_of(lines[first:])
     try:
         rows, passed = rows_of(text, separator)
     except OpenQuoteError as error:

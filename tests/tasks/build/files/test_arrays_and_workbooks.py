@@ -1,0 +1,136 @@
+"""The columns of .mat, .npz, parquet and Excel files; what holds none is told."""
+
+import io
+
+import numpy as np
+import pytest
+import scipy.io
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.tasks.build.files import isolated, read_sheet
+from inputdesign_cli.tasks.build.log import read_log
+from inputdesign_cli.tasks.build.preparation import Preparation
+from inputdesign_cli.tasks.build.tables import columns_of, read_columns
+from tests.support.logs import ROWS, TIME, U, Y, iddata, save
+
+
+@pytest.mark.parametrize(
+    "content", [{"u": U, "y": Y, "Ts": 0.5}, {"data": iddata()}], ids=["arrays", "iddata"]
+)
+def test_mat_files_hold_arrays_or_an_iddata(content, tmp_path):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, content)
+    np.testing.assert_array_equal(read_columns(path, {"u": "u"}, key="")["u"], U)
+    np.testing.assert_array_equal(read_columns(path, {"y": "y"}, key="")["y"], Y)
+    assert read_sheet(path, key="").pace.sample_time == 0.5
+
+
+def test_wide_arrays_are_several_channels(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, u=np.column_stack([U, -U]), y=Y)
+    found = read_columns(path, {"u2": "u2", "y": "y"}, key="")
+    np.testing.assert_array_equal(found["u2"], -U)
+
+
+def test_objects_of_matlab_get_the_lines_that_convert_them(tmp_path):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"note": "an iddata lives elsewhere"})
+    with pytest.raises(DataError) as caught:
+        read_sheet(path, key="")
+    assert "save('data.mat', '-struct', 's'" in caught.value.diagnostics[0].hint
+
+
+def test_arrays_of_objects_are_never_unpickled(tmp_path):
+    buffer = io.BytesIO()
+    np.savez(buffer, u=np.array([{"a": 1}, None], dtype=object))
+    (tmp_path / "log.npz").write_bytes(buffer.getvalue())
+    with pytest.raises(DataError):
+        read_sheet(tmp_path / "log.npz", key="")
+
+
+@pytest.mark.parametrize(("name", "writer"), [("log.parquet", "to_parquet"), ("log.xlsx", "to_excel")])
+def test_parquet_and_excel_are_read_where_pandas_is(name, writer, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow" if "parquet" in name else "openpyxl")
+    frame = pandas.DataFrame({"time": TIME, "u": U, "y": Y, "note": list("abcd")})
+    getattr(frame, writer)(tmp_path / name, index=False)
+    np.testing.assert_array_equal(read_columns(tmp_path / name, {"u": "u"}, key="")["u"], U)
+
+
+def test_an_object_beside_other_arrays_is_told_with_the_lines_that_convert_it(monkeypatch, tmp_path):
+    """SciPy writes no such objects: what its reader tells of one."""
+    path = tmp_path / "log.mat"
+    path.write_bytes(b"MATLAB 5.0 MAT-file")
+    monkeypatch.setattr(isolated, "arrays_of", lambda raw: isolated.Arrays({"v": U}, opaque=True))
+    with pytest.raises(DataError) as caught:
+        read_log(path, Preparation())
+    assert "save('data.mat', '-struct', 's'" in caught.value.diagnostics[0].message
+
+
+WRONG = {
+    "complex numbers": U + 1j,
+    "text": np.array(list("abcd")),
+    "an array of 3 dimensions": np.ones((4, 2, 2)),
+    "nothing": np.zeros(0),
+    "a single number": np.array(2.0),
+}
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+@pytest.mark.parametrize("what", WRONG)
+def test_arrays_that_are_no_columns_are_told_by_what_they_hold(kind, what, tmp_path):
+    path = tmp_path / f"log.{kind}"
+    save(path, u=WRONG[what], y=Y)
+    for read in (lambda: read_log(path, Preparation()), lambda: read_columns(path, {"u": "u"}, key="")):
+        with pytest.raises(DataError) as caught:
+            read()
+        assert caught.value.diagnostics[0].message.startswith(f"u in log.{kind} holds {what}: ")
+
+
+def test_arrays_that_mean_columns_of_numbers_are_columns(tmp_path):
+    """Complex numbers without an imaginary part, a third dimension of one, fields, and times."""
+    path = tmp_path / "log.npz"
+    moments = np.datetime64("2024-03-12T10:15:00") + (1000 * TIME).astype("timedelta64[ms]")
+    fields = np.array(list(zip(U, Y, strict=True)), dtype=[("u1", float), ("y1", float)])
+    np.savez(path, time=moments, u2=U + 0j, y2=Y[:, None, None], fields=fields)
+    names = ("time", "u1", "y1", "u2", "y2")
+    found = read_columns(path, {name: name for name in names}, key="")
+    for name, expected in zip(names, (TIME, U, Y, U, Y), strict=True):
+        np.testing.assert_array_equal(found[name], expected)
+
+
+WORKBOOKS = {
+    "names": [["time", "u", "y"], *ROWS],
+    "no names": ROWS,
+    "a row of units": [["time", "u", "y"], ["s", "V", "degC"], *ROWS],
+    "a preamble": [["Logger X1", None, None], ["Serial", 42, None], [None] * 3, ["time", "u", "y"], *ROWS],
+    "a preamble, names and units": [["Logger X1", None, None], ["time", "u", "y"], ["s", "V", "degC"], *ROWS],
+}
+
+
+@pytest.mark.parametrize("rows", WORKBOOKS.values(), ids=WORKBOOKS)
+def test_the_table_of_a_workbook_is_found_as_in_text(rows, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    pandas.DataFrame(rows).to_excel(path, index=False, header=False)
+    sheet = read_sheet(path, key="")
+    wanted = {name: name if sheet.names else str(k + 1) for k, name in enumerate(("time", "u", "y"))}
+    for name, numbers in columns_of(sheet, wanted).items():
+        np.testing.assert_array_equal(numbers, {"time": TIME, "u": U, "y": Y}[name])
+    begins = len(rows) - len(ROWS) + 1
+    assert sheet.lines.tolist() == list(range(begins, begins + len(ROWS)))
+
+
+def test_a_cell_of_a_workbook_that_is_no_number_is_told_with_its_row(tmp_path):
+    """1.125 beside 808 has three decimals, and no mark between thousands: cells of a workbook are typed."""
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    path = tmp_path / "log.xlsx"
+    cells = {"u": [1.125, 808, "n/a", None], "y": [1.0, 2.0, "broken", 4.0]}
+    pandas.DataFrame(cells).to_excel(path, index=False)
+    sheet = read_sheet(path, key="")
+    np.testing.assert_array_equal(columns_of(sheet, {"u": "u"})["u"], [1.125, 808.0, np.nan, np.nan])
+    with pytest.raises(DataError, match="'broken' in column y is not a finite number") as caught:
+        columns_of(sheet, {"y": "y"})
+    assert caught.value.diagnostics[0].location.line == 4
