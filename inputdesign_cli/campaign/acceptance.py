@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.campaign.applied import LIKE, Match, matched
+from inputdesign_cli.campaign.applied import LIKE, UNLIKE, Match, matched
 from inputdesign_cli.campaign.memory import Memory
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
@@ -88,7 +88,7 @@ def _check_applied(
             "record-unlike",
             f"what was applied in {given.name} is not {due}: {'r' if loop else 'u'}{match.channel} has a "
             f"correlation of {match.likeness:.2f} with the plan ({match.spliced:.2f} with samples shifted or "
-            "lost)",
+            "lost)" + (", as slow signals have by chance" if match.likeness >= UNLIKE else ""),
             hint=f"give the record of {due}; is it another experiment, or another column (--columns)? If it "
             f"was really applied in its place, say {forced}",
         )

@@ -17,8 +17,13 @@ from inputdesign_cli.plant.polynomial import Array
 LIKE = 0.9
 """From this correlation on a record follows its plan; below, that is told."""
 UNLIKE = 0.5
-"""Below it does not, unless samples are lost or shifted and the rest follows to `_SPLICED`."""
-_SPLICED = 0.7
+"""Below it does not, unless samples are lost or shifted and the rest follows to 0.6."""
+_SPLICED = 0.6
+# How sure the scale of the plan must be, in standard deviations, since slow signals are alike by chance;
+# surer where the best places of samples were looked for.
+_MOVES, _PLACED = 1.8, 5.0
+# Coefficients of the regression that makes white what a record has besides its plan, in so many rounds.
+_COLOUR, _ROUNDS = 2, 3
 # So many samples may be lost, or written twice; each time must explain more than so many of the others.
 _SLIPS, _PAYS = 5, 5.0
 # Another start explains so much more of the correlation.
@@ -45,6 +50,7 @@ class Match:
         scale: at which the channel was applied whose scale is farthest off; `off`: that it is not one.
         exchanged: for each channel of the plan the channel of the record, numbers from 1, that follows it,
             where these are others than its own; None else.
+        follows: whether it may be the record of the plan.
     """
 
     begins: int
@@ -54,11 +60,7 @@ class Match:
     scale: float
     off: bool
     exchanged: tuple[int, ...] | None
-
-    @property
-    def follows(self) -> bool:
-        """Whether it may be the record of the plan."""
-        return self.likeness >= UNLIKE or self.spliced >= _SPLICED
+    follows: bool
 
 
 def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: float) -> Match:
@@ -73,13 +75,16 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
     shares = [_followed(due[:, j], applied[:, j], strongest) for j in range(plan.shape[1])]
     least = int(np.argmin(shares))
     spliced = shares[least]
+    follows = spliced >= LIKE or (spliced >= UNLIKE and _moves(due[:, least], applied[:, least]) >= _MOVES)
     if spliced < LIKE:
-        spliced = max(spliced, _in_step(plan[:, least], applied[:, least], begins + rows))
+        value, placed = _in_step(plan[:, least], applied[:, least], begins + rows)
+        spliced = max(spliced, value)
+        follows = follows or (value >= _SPLICED and _moves(placed, applied[:, least]) >= _PLACED)
     scale, off = max((_scale(due[:, j], applied[:, j]) for j in range(plan.shape[1])), key=_far)
     if off and spliced > abs(shares[least]) + _BETTER:
         off = False  # rows out of their places look like a smaller scale
     exchanged = _exchanged(due, applied, strongest, shares[least])
-    return Match(begins, shares[least], spliced, least + 1, scale, off, exchanged)
+    return Match(begins, shares[least], spliced, least + 1, scale, off, exchanged, follows)
 
 
 def _far(found: tuple[float, bool]) -> tuple[bool, float]:
@@ -122,23 +127,61 @@ def _begins(plan: Array, applied: Array, rows: NDArray[np.int64]) -> int:
     return best if at(best) > max(LIKE, at(0) + _BETTER) else 0
 
 
-def _in_step(plan: Array, applied: Array, places: NDArray[np.int64]) -> float:
+def _in_step(plan: Array, applied: Array, places: NDArray[np.int64]) -> tuple[float, Array]:
     """The correlation where the record (m,) may slip against the plan (n,), by a few samples in all.
 
-    By dynamic programming over the samples: the state is the slip, and a change of it has its price.
+    By dynamic programming over the samples: the state is the slip, and a change of it has its price. Beside
+    it the samples (m,) of the plan that the record follows.
     """
     slips = np.arange(-_SLIPS, _SLIPS + 1)
     padded = np.pad(plan - plan.mean(), _SLIPS + 1)
     along = padded[np.clip(places[:, None] + slips + _SLIPS + 1, 0, len(padded) - 1)]
     record = applied - applied.mean()
-    sizes = _rms(plan - plan.mean()) * _rms(record)
-    if sizes == 0.0:
-        return 0.0
-    gains = along * record[:, None] / sizes
-    total = gains[0]
+    gains = along * record[:, None] / max(_rms(plan - plan.mean()) * _rms(record), 1e-300)
+    total, before = gains[0], []
     for gain in gains[1:]:
-        total = np.maximum(total, total.max() - _PAYS) + gain
-    return float(total.max()) / len(record)
+        best = int(np.argmax(total))
+        stays = total >= total[best] - _PAYS
+        before.append(np.where(stays, np.arange(slips.size), best))
+        total = np.where(stays, total, total[best] - _PAYS) + gain
+    slip = int(np.argmax(total))
+    path = [slip]
+    for last in reversed(before):
+        slip = int(last[slip])
+        path.append(slip)
+    placed = np.asarray(along[np.arange(len(record)), path[::-1]], dtype=float)
+    return float(total.max()) / len(record), placed
+
+
+def _moves(plan: Array, applied: Array) -> float:
+    """The scale of a plan in a record (m,), in standard deviations, where what is left is coloured noise.
+
+    Slow signals that have nothing to do with each other are correlated over a few samples; whitened, by
+    regressions of what is left on its past ([cochrane-orcutt-1949]), they are not.
+    """
+    x, y = _centred(plan), _centred(applied)
+    scale, sure = _scaled(x, y)
+    for _ in range(_ROUNDS if len(x) > 2 * _COLOUR + 1 else 0):
+        past = _past(y - scale * x)
+        colour = np.linalg.lstsq(past, (y - scale * x)[_COLOUR:], rcond=None)[0]
+        scale, sure = _scaled(*(_centred(signal[_COLOUR:] - _past(signal) @ colour) for signal in (x, y)))
+    return sure
+
+
+def _scaled(plan: Array, applied: Array) -> tuple[float, float]:
+    """The scale of a plan in a record (m,), both about their means, and in its standard deviations."""
+    size = float(np.sum(plan**2))
+    if size == 0.0:
+        return 0.0, 0.0
+    scale = float(np.sum(plan * applied)) / size
+    left = float(np.sum((applied - scale * plan) ** 2))
+    freedom = max(len(plan) - 2 - _COLOUR, 1)
+    return scale, scale * float(np.sqrt(size * freedom / max(left, 1e-300)))
+
+
+def _past(signal: Array) -> Array:
+    """(m - 2, 2): the samples before each of a signal (m,)."""
+    return np.column_stack([signal[_COLOUR - k : -k] for k in range(1, _COLOUR + 1)])
 
 
 def _scale(plan: Array, applied: Array) -> tuple[float, bool]:

@@ -18,7 +18,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import isfinite
 from pathlib import Path
@@ -42,6 +42,15 @@ from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import output_errors, read_run
 
 VERSION = 1
+_FROM_A_COPY = (
+    "bring it back from a copy of the directory; without one, begin another campaign, and let "
+    "`idesign identify` make a prior of the records that are left"
+)
+_HINTS = {
+    "run-missing": "begin a campaign with `idesign campaign SPEC -o DIR`",
+    "run-incomplete": _FROM_A_COPY,
+    "run-unreadable": _FROM_A_COPY,
+}
 _KEPT = re.compile(r"(plan|record|model)_\d\d+(_as_given)?\.[a-z0-9]+")
 
 
@@ -94,6 +103,16 @@ def read_memory(directory: Path) -> Memory:
         DataError: `run-missing`, `run-incomplete`, `run-unreadable`; `campaign-missing`, it holds something
             else; `campaign-version`.
     """
+    try:
+        return _read(directory)
+    except DataError as error:
+        # What a run may do, begin anew, would lose what has been recorded.
+        raise DataError(
+            [replace(each, hint=_HINTS.get(each.code, each.hint)) for each in error.diagnostics]
+        ) from error
+
+
+def _read(directory: Path) -> Memory:
     result = read_run(directory)
     campaign = result.get("campaign")
     if not isinstance(campaign, dict) or "records" not in campaign:

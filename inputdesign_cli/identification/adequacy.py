@@ -4,14 +4,16 @@ Each test regresses the residuals on signals that the model does without: past i
 trends. What the parameters and unknown starts can explain is taken off these signals first, so that the
 statistic is chi-squared whatever was estimated. Past residuals lack what was estimated as well: where unknown
 starts are many, as those of a record with gaps, that alone correlates residuals, and it is what scores are
-compared with. Few signals find a fault of a known shape, many one of any;
-`directed.py` has the fewest, one parameter more.
+compared with. In a narrow band the noise is known no better than its model there, and a statistic follows F
+instead ([satterthwaite-1946]). Few signals find a fault of a known shape, many one of any; `directed.py` has
+the fewest, one parameter more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -32,6 +34,8 @@ _TRENDS, _WAVES = 3, 4
 # Of each residual at most one direction in so many is tried.
 _SAMPLES_A_DIRECTION = 8
 _DEPENDENT = 1e-6
+# A relative variance of the noise so small changes probabilities of 0.001 by a few per cent of themselves.
+_WELL_KNOWN = 1e-3
 
 Fault = Literal["plant", "noise", "drift", "change", "nonlinear"]
 Echo = Callable[[Array], Array]
@@ -47,7 +51,8 @@ class ScoreTest:
     Attributes:
         name: of the test.
         fault: what is wrong where it fails.
-        probability: of a statistic as large, with so many degrees of freedom, if the model is right.
+        probability: of a statistic as large, with so many degrees of freedom, if the model is right; see
+            `White.probability`.
         lag: of past inputs or residuals, where they explain most; of trends None.
         output: of which residuals are explained most; `source`, by which input or other residual.
     """
@@ -85,6 +90,7 @@ class White:
         starts: ((N + M) p, m), orthonormal, what m unknown starts explain.
         explained: ((N + M) p, m + k), what they and the k parameters explain; `basis`, orthonormal.
         means: (k,), of the scores of the parameters, see `echoes`.
+        known: what past errors add to the gradients of parameters of the noise.
     """
 
     root: Array
@@ -95,6 +101,7 @@ class White:
     explained: Array
     basis: Array
     means: Array
+    known: Echoes
 
     @classmethod
     def of(cls, point: Point, echoes: Echoes | None = None) -> White:
@@ -112,6 +119,7 @@ class White:
             explained,
             _orthonormal(_scaled(explained)),
             none,
+            echoes or (),
         )
         for index, through in echoes or ():
             none[index] = found.echoes(through)
@@ -123,7 +131,7 @@ class White:
         found[: signals[0].size] = (signals @ self.root.T).reshape(len(signals), -1).T
         return found
 
-    def echoes(self, through: Callable[[Array], Array]) -> float:
+    def echoes(self, through: Echo) -> float:
         """The mean of the score of a signal that is made of the residuals themselves.
 
         Of residuals P e, with P = I - Q Q^T for the unknown starts Q and e white, the score (T P e)^T P e has
@@ -132,12 +140,42 @@ class White:
         Args:
             through: T, of errors (N, p).
         """
+        return -self.variance * self._trace(through, self.starts)
+
+    def probability(self, statistic: float, directions: Array) -> float:
+        """That of a sum of squares as large along f directions ((N + M) p, f), orthonormal, if all is noise.
+
+        It is chi-squared in units of the noise along these directions, and what is known of that is the
+        estimate. With e(t) = epsilon(t) + T_k epsilon(t) delta theta_k the log of its power changes by
+        2 tr(D^T T_k D) / f for each delta theta_k; of the variance v that this has, the statistic over f is F
+        with f and 2 / v degrees of freedom. White directions have v = 0, a narrow band where the noise has a
+        zero or a pole next to the unit circle has 0.1 and more.
+        """
+        freedom = directions.shape[1]
+        slopes = np.zeros(self.means.size)
+        for index, through in self.known:
+            slopes[index] = 2.0 * self._trace(through, directions) / freedom
+        deviations = slopes @ self._spread
+        v = self.variance * float(deviations @ deviations)
+        if v <= _WELL_KNOWN:
+            return float(scipy.special.chdtrc(freedom, statistic))
+        return float(scipy.special.fdtrc(freedom, 2.0 / v, statistic / freedom))
+
+    @cached_property
+    def _spread(self) -> Array:
+        """(k, (N + M) p): by it and the residuals' variance parameters are spread, starts being unknown."""
+        scale = np.maximum(np.linalg.norm(self.explained, axis=0), 1e-300)
+        inverse = np.linalg.pinv(self.explained / scale, rcond=1e-12) / scale[:, None]
+        return np.asarray(inverse[len(inverse) - self.means.size :])
+
+    def _trace(self, through: Echo, directions: Array) -> float:
+        """tr(D^T T D) of directions ((N + M) p, n), for T of errors (N, p)."""
         outputs, back = len(self.root), np.linalg.inv(self.root).T
         found = 0.0
-        for direction in self.starts[: self.samples * outputs].T:
+        for direction in directions[: self.samples * outputs].T:
             own = direction.reshape(-1, outputs)
             found += float(np.sum((through(own @ back) @ self.root.T) * own))
-        return -self.variance * found
+        return found
 
     def mean_left(self, columns: Array, means: Array) -> Array:
         """(m,): the means of scores of columns (N p, m) once what parameters explain is taken off."""
@@ -173,7 +211,7 @@ def score_tests(
         if signals.of_residuals and echoes is not None:
             own = _mean_scores(records, white, signals.lags)
         scores = regressors.T @ white.residuals - white.mean_left(columns / norms, own / norms)
-        _, sizes, right = np.linalg.svd(regressors, full_matrices=False)
+        left, sizes, right = np.linalg.svd(regressors, full_matrices=False)
         kept = sizes > _DEPENDENT
         freedom = int(np.sum(kept))
         if not freedom:
@@ -185,7 +223,12 @@ def score_tests(
         lag = signals.lags[largest] if signals.lags else None
         # Lag by lag all inputs, or all residuals.
         source = largest % signals.lags.count(signals.lags[0]) if signals.lags else 0
-        probability = float(scipy.special.chdtrc(freedom, statistic))
+        # What past residuals explain has no band of its own.
+        probability = (
+            float(scipy.special.chdtrc(freedom, statistic))
+            if signals.of_residuals
+            else white.probability(statistic, left[:, kept])
+        )
         found = (signals.name, signals.fault, statistic, freedom, probability, lag, output, source)
         tests.append(ScoreTest(*found))
     return tuple(tests)

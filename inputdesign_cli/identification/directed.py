@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from inputdesign_cli.identification.adequacy import Echo, Echoes, Fault, ScoreTest, White
@@ -141,7 +140,8 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
     statistic = float(group[0].left @ white.residuals - group[0].mean) ** 2
     statistic /= group[0].size ** 2 * white.variance
     larger: Model | None = None
-    if _probability(statistic) < _OPEN and records.earlier is None:
+    along = group[0].left[:, None] / group[0].size
+    if white.probability(statistic, along) < _OPEN and records.earlier is None:
         ends = [(tried.alternative.estimated(records), tried) for tried in group]
         known = [(end, tried) for end, tried in ends if end is not None]
         if known:
@@ -159,7 +159,7 @@ def _tested(records: Records, point: Point, white: White, group: list[_Tried]) -
     faults = [alternative.fault for alternative in alternatives]
     fault: Fault = "plant" if "plant" in faults else faults[0]
     return Directed(
-        ScoreTest(name, fault, statistic, 1, _probability(statistic), None),
+        ScoreTest(name, fault, statistic, 1, white.probability(statistic, along), None),
         alternatives,
         deviation=1.0 / first.size,
         following=-explained[explained.size - point.theta.size :],
@@ -173,7 +173,3 @@ def _ratio(records: Records, point: Point, cost: float, less: float) -> float:
     if records.weights is not None:
         return cost - less
     return float(point.near.freedom * np.log(cost / max(less, 1e-300)))
-
-
-def _probability(statistic: float) -> float:
-    return float(scipy.special.chdtrc(1, statistic))

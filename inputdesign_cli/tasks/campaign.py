@@ -59,6 +59,15 @@ class Schedule:
         """Samples that the plan of that part is for: those of the whole experiment that are left."""
         return max(min(self.samples, self.most) - done, self.take(done))
 
+    @property
+    def looks(self) -> int:
+        """Into how many parts it is divided at most."""
+        done = parts = 0
+        while done < self.most:
+            done += self.take(done)
+            parts += 1
+        return max(parts, 1)
+
     def last(self, done: int) -> bool:
         """Whether the plan ends with that part."""
         return self.rest(done) <= self.take(done)

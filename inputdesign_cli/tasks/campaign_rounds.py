@@ -141,9 +141,10 @@ def decide(task: Rounds, past: Past) -> Decision:
             assessment = judge(task.identification, found, started)
             assessed, stands = assessment.results, _standing(task, found, past)
             notes += _shrunk(found, stands)
+            looks = task.rules.schedule.looks
             other = [
-                *differences(found.estimate, [name for name, _ in found.data.files]),
-                *contradictions(found.estimate),
+                *differences(found.estimate, [name for name, _ in found.data.files], looks),
+                *contradictions(found.estimate, looks),
             ]
             met = stands is not None and stands.met
             if other:

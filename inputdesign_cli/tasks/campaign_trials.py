@@ -18,6 +18,7 @@ from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, P
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.tasks.campaign import Planner, Rules, Standing, ratio_of, standing
+from inputdesign_cli.tasks.result.neglected import mattering, neglected
 
 Ending = Literal["stopped", "missed", "undecided", "unplanned"]
 _SEEDS = 2**31
@@ -135,14 +136,20 @@ class _Run:
         self._stand(model.at(full.theta, full.noise), u, y)
 
     def _examined(self, u: Array, y: Array) -> bool:
-        """Estimate anew from several starts, and tell whether tests refute the structure."""
+        """Estimate anew from several starts, and tell whether that speaks against the structure."""
         model = self.last
         try:
             full = identify(model, u, y, self.job.step, start=model.theta, feedback=self._feedback, rest=True)
         except SpecError:
             return False
         self._stand(model.at(full.theta, full.noise), u, y)
-        return bool(full.failed)
+        if full.failed or not full.converged:
+            return True
+        known = self.known
+        if known is None or not known.met:  # more parameters miss it all the more
+            return False
+        question = self.job.planner.question(known.model, known.information)
+        return bool(mattering(neglected(known.model, full, model_errors(question.requirements))))
 
     @property
     def _feedback(self) -> bool:

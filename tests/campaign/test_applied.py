@@ -59,6 +59,17 @@ def test_an_unrelated_record_is_not(kind, samples, least):
         assert sum(not match.follows for match in found) >= least
 
 
+@pytest.mark.parametrize(("kind", "most"), [("slow", 6), ("resonant", 8)])
+@pytest.mark.parametrize("samples", [30, 50])
+def test_signals_that_are_alike_by_chance_are_told_by_their_moves(kind, samples, most):
+    """Of 40 unrelated records up to 23 have a correlation of a half, in place or shifted by a few samples."""
+    found = [
+        compared(planned(kind, samples, seed), planned(kind, samples, 1000 + seed)).follows
+        for seed in range(40)
+    ]
+    assert sum(found) <= most
+
+
 @pytest.mark.parametrize("scale", [0.1, 0.9, 1.1, -1.0, 25.4])
 @pytest.mark.parametrize("kind", PLANS)
 def test_a_scale_is_found(kind, scale):

@@ -256,11 +256,15 @@ def test_directories_of_another_kind_and_version_are_refused(run, begun):
     assert "campaign-version" in run("next", "c")[2]
     content["campaign"] |= {"version": 1, "rounds": [{}]}
     (begun / "result.json").write_text(json.dumps(content))
-    assert "run-unreadable" in run("next", "c")[2]
+    told = run("next", "c")[2]
+    assert "run-unreadable" in told
+    assert "from a copy" in told  # to run the spec again, as after `solve`, would lose the records
     del content["campaign"]
     (begun / "result.json").write_text(json.dumps(content))
     assert "campaign-missing" in run("next", "c")[2]
-    assert "run-missing" in run("status", "nowhere")[2]
+    told = run("status", "nowhere")[2]
+    assert "run-missing" in told
+    assert "idesign campaign SPEC" in told
 
 
 def test_data_of_another_plant_are_undecided(run, begun, tmp_path):

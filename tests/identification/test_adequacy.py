@@ -9,7 +9,7 @@ import scipy.signal
 import scipy.stats
 
 from inputdesign_cli.identification import identify
-from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, failed
+from inputdesign_cli.identification.adequacy import LEVEL, ScoreTest, White, failed
 from inputdesign_cli.plant import Intersample, PolynomialModel, SampledModel
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx, two_by_two
@@ -63,6 +63,42 @@ def test_probabilities_of_right_models_are_uniform():
     found = [identify(arx(), u[i], y[i], start=arx().theta) for i in range(20)]
     for name in by_name(found[0]):
         assert scipy.stats.kstest([by_name(f)[name].probability for f in found], "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("w", [0.02, 0.2, 1.5])
+def test_noise_is_known_no_better_than_its_zero(w):
+    """log |1 - c exp(-jw)|^2 has the variance of c times its derivative squared: F with 2 over that."""
+    c, n = 0.9, 2000
+    psi = scipy.signal.lfilter([0, 1.0], [1.0, -c], np.random.default_rng(8).standard_normal(n))[:, None]
+    white = White(
+        root=np.eye(1),
+        samples=n,
+        residuals=np.zeros(n),
+        variance=1.0,
+        starts=np.zeros((n, 0)),
+        explained=psi,
+        basis=psi / np.linalg.norm(psi),
+        means=np.zeros(1),
+        known=((0, lambda e: scipy.signal.lfilter([0, 1.0], [1.0, -c], e, axis=0)),),
+    )
+    along = np.cos(w * np.arange(n))[:, None]
+    slope = 2.0 * np.real(np.exp(-1j * w) / (1.0 - c * np.exp(-1j * w)))
+    variance = slope**2 / np.sum(psi**2)
+    expected = scipy.stats.f.sf(11.0, 1, 2.0 / variance) if variance > 1e-3 else scipy.stats.chi2.sf(11.0, 1)
+    assert white.probability(11.0, along / np.linalg.norm(along)) == pytest.approx(expected, rel=0.02)
+
+
+def test_slow_noise_that_is_hardly_known_is_no_drift():
+    """Taken for known, the noise below its zero had a probability below 0.05 in 9 of these 25 records."""
+    rng, model = np.random.default_rng(9), one_channel([0, 1.0], C=[1, -0.9])
+    found = []
+    for _ in range(25):
+        u, e = rng.standard_normal((200, 1)), rng.standard_normal((200, 1))
+        y = scipy.signal.lfilter([0, 1.0], [1.0], u, axis=0) + scipy.signal.lfilter(
+            [1, -0.9], [1.0], e, axis=0
+        )
+        found.append(by_name(identify(model, u, y, start=model.theta))["trend"].probability)
+    assert np.sum(np.array(found) < 0.05) <= 4
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,7 @@ def test_a_schedule_ends_at_its_longest():
     while take := schedule.take(done):
         done += take
     assert done == 33
+    assert schedule.looks == 5  # 5, 10, 5 and, beyond the 20 samples, 10 and 3
 
 
 @pytest.mark.parametrize(

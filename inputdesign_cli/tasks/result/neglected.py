@@ -74,14 +74,18 @@ def _largest(model: Model, directed: Directed, error: OnModelError) -> Neglected
     return Neglected(directed, float(np.max(moves)), float(may_move), float(w[at]))
 
 
+def mattering(found: Sequence[Neglected]) -> list[Neglected]:
+    """Those that speak against a verdict."""
+    return [found[i] for i in that_matter([one.directed for one in found], [one.moves for one in found])]
+
+
 def objections(units: Units, found: Sequence[Neglected]) -> list[str]:
     """What to say of those that matter."""
-    matter = that_matter([one.directed for one in found], [one.moves for one in found])
     return [
         f"{one.directed.alternatives[0].phrase} would move G by "
         f"{one.moves:.3g} times the admissible error about {units.named(one.frequency)} (probability "
         f"{chance(one.directed.test.probability)} without it): {REMEDY[one.directed.test.fault]}"
-        for one in (found[i] for i in matter)
+        for one in mattering(found)
     ]
 
 

@@ -58,9 +58,13 @@ def unsettled(estimate: Estimate) -> list[str]:
     ]
 
 
-def contradictions(estimate: Estimate) -> list[str]:
-    """What to say where the prior and the data are not of one system."""
-    if estimate.agreement is None or estimate.agreement >= _PRIOR:
+def contradictions(estimate: Estimate, looks: int = 1) -> list[str]:
+    """What to say where the prior and the data are not of one system.
+
+    Args:
+        looks: how often it is asked as data come in; they share the level (Bonferroni).
+    """
+    if estimate.agreement is None or estimate.agreement * looks >= _PRIOR:
         return []
     return [
         f"experiment.prior and these data contradict each other (probability {chance(estimate.agreement)} "
@@ -68,12 +72,16 @@ def contradictions(estimate: Estimate) -> list[str]:
     ]
 
 
-def differences(estimate: Estimate, files: Sequence[str]) -> list[str]:
-    """What to say where the experiments are not of one system; the level is shared by all (Bonferroni)."""
+def differences(estimate: Estimate, files: Sequence[str], looks: int = 1) -> list[str]:
+    """What to say where the experiments are not of one system; the level is shared by all (Bonferroni).
+
+    Args:
+        looks: see `contradictions`.
+    """
     found = [
         (probability, name)
         for probability, name in zip(estimate.alike, files, strict=False)
-        if probability * len(estimate.alike) < _ONE_SYSTEM
+        if probability * len(estimate.alike) * looks < _ONE_SYSTEM
     ]
     if not found:
         return []
