@@ -40,6 +40,7 @@ def test_the_sentence_of_the_engineer_is_a_spec():
     assert spec.accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
     assert spec.accuracy.loop.tuning.simc is not None
     assert (spec.limits.amplitude.input, spec.signal.offset, spec.experiment.samples) == (5.0, 40.0, 720)
+    assert spec.uncertainty.worst_case == 0.95
     assert spec.noise.variance == pytest.approx(0.04)
     assert spec.plant.continuous.time_constant == 180.0
 
