@@ -49,8 +49,8 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     if ratio <= 1.0 < surely:
         said.append(
             "But assess judges at the plant that the data tell, and that scatters: where the plant is the "
-            f"worst that you allow, 5 % of such experiments would tell one at which it errs {surely:.3g} times "
-            "as much or more, and be called missed."
+            "worst that you allow, 5 % of such experiments would tell one at which it errs "
+            f"{surely:.3g} times as much or more, and be called missed."
         )
     if found is not None:
         needed = found * spec.sample_time
