@@ -22,6 +22,7 @@ from inputdesign_cli.figures.style import (
     GREY,
     ORANGE,
     OTHERS,
+    limiting_label,
     log_axes,
     marked,
     plot_admitted,
@@ -62,12 +63,8 @@ def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
         handles += axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
-        handles += marked(axes, curves.active, height, color=BLUE, label=_limiting(curves.active))
+        handles += marked(axes, curves.active, height, color=BLUE, label=limiting_label(curves.active.size))
     return handles
-
-
-def _limiting(active: Array) -> str:
-    return "limiting frequency" if active.size == 1 else "limiting frequencies"
 
 
 @dataclass(frozen=True)
