@@ -13,7 +13,7 @@ from inputdesign_cli.figures.style import (
     OTHERS,
     frequency_axis,
     legend_above,
-    log_axes,
+    plain_decades,
 )
 from inputdesign_cli.runs.curves import FanCurves
 
@@ -26,7 +26,7 @@ _LEAST = 1e-3
 def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
     """A line for every plant, those that bind in colour; none may exceed one."""
     axes = page.add_subplot()
-    log_axes(axes, "y")
+    plain_decades(axes, "y")
     w = curves.frequency
     rows = curves.ratios[:_MOST_LINES]
     width = 0.5 if len(rows) > 20 else 0.8
