@@ -106,7 +106,7 @@ TEMPLATES = {
         lambda step: pi(step, 0.8, 60.0),
     ),
     "motor": Template(
-        {"wish": "PI loop with 6 dB", "range": "plus/minus 5 around 10", "time": "20 s", "noise": "0.05"},
+        {"wish": "PI loop with 6 dB", "range": "plus/minus 5 around 10", "time": "40 s", "noise": "0.05"},
         {"gain": 0.1, "time_constant": 0.5, "dead_time": 0.02},
         lag,
         skogestad,

@@ -54,14 +54,15 @@ def wizard(
     At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
     They are asked in the terminal where no option answers them. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
+    from inputdesign_cli.wizard.questions import QUESTIONS, read_answers, told_by_plant
 
     if output.exists() and not overwrite:
         hint = "choose another name with -o, or overwrite it with --overwrite"
         raise OutputError.because("output-exists", f"{output} exists already", hint)
     known = read_answers(answers, given or [])
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
-    unanswered = [one.key for one in QUESTIONS if one.default is None and one.key not in known]
+    there = {*known, *told_by_plant(known)}
+    unanswered = [one.key for one in QUESTIONS if one.default is None and one.key not in there]
     if unanswered and not known and not terminal:
         _refuse(unanswered)
     draft = _asked(known, output, quiet) if unanswered and terminal else None

@@ -22,8 +22,10 @@ from inputdesign_cli.figures.style import (
     GREY,
     ORANGE,
     OTHERS,
+    limiting_label,
     log_axes,
     marked,
+    plain_decades,
     plot_admitted,
     positive,
 )
@@ -32,6 +34,8 @@ from inputdesign_cli.runs.results import Array
 
 # Ratios beyond this many times the limit, or the design, run out of the linear panel.
 _HIGHEST = 4.0
+# Ratios that all stay below this share of the limit are flat on a linear axis: they are drawn over decades.
+_FAR_BELOW = 0.25
 # A gain below this many times the least error is drawn there.
 _FAR = 1e-2
 
@@ -62,12 +66,8 @@ def _plot(axes: Axes, curves: BoundPanel) -> list[Artist]:
         handles += axes.plot(w, gain, color=BLACK, linewidth=1.2, label="|G|")
     if curves.active.size:
         height = np.exp(np.interp(curves.active, w, np.log(curves.r_u)))
-        handles += marked(axes, curves.active, height, color=BLUE, label=_limiting(curves.active))
+        handles += marked(axes, curves.active, height, color=BLUE, label=limiting_label(curves.active.size))
     return handles
-
-
-def _limiting(active: Array) -> str:
-    return "limiting frequency" if active.size == 1 else "limiting frequencies"
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def _drawn(curves: BoundPanel) -> list[_Error]:
 def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> list[Artist]:
     """r_u / r_adm, with the largest in the legend: of one entry all curves, of several that of each."""
     handles: list[Artist] = []
-    tops = [1.0]
+    tops, drawn_ratios = [1.0], list[Array]()
     for number, curves in enumerate(panels):
         if curves.r_adm is None:
             continue
@@ -115,11 +115,16 @@ def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> list[Artist]:
             # White excitation that meets the same reaches the same: no more than its name is to be said.
             handles += lines if error.style != DOTTED or curves.r_u_equal is None else []
             tops.append(top if not place else min(top, _HIGHEST * max(tops)))
+            drawn_ratios.append(ratio[ratio > 0])
         if len(panels) == 1 and curves.active.size:
             height = np.interp(curves.active, curves.frequency, curves.r_u / positive(curves.r_adm))
             marked(axes, curves.active, height, color=BLUE, label="")
     handles.append(axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit"))
     axes.axhspan(1.0, 1.12 * max(tops) + 1.0, color=ORANGE, alpha=0.07, linewidth=0)
     axes.set_ylim(0.0, 1.12 * max(tops))
+    ratios = np.concatenate(drawn_ratios or [np.ones(1)])
+    if ratios.size and ratios.max() < _FAR_BELOW:
+        plain_decades(axes, "y")
+        axes.set_ylim(max(0.8 * float(ratios.min()), _FAR * float(ratios.max())), 1.3)
     axes.set_ylabel("r_u / r_adm")
     return handles

@@ -12,12 +12,14 @@ from inputdesign_cli.runs.results import Array
 
 COLUMNS = 3
 POINTS = 200
+_TICKS = 2  # intervals between numbers: these are wide for three columns
 
 
 def draw_ellipses(page: Figure, curves: EllipseCurves, time_unit: str) -> None:
     """One panel a pair: the region that holds the estimate with the probability of the title."""
     grid = page_of_pairs(page, len(curves.pairs), COLUMNS)
     for axes, pair in zip(grid, curves.pairs, strict=True):
+        axes.locator_params(axis="x", nbins=_TICKS)
         _draw(axes, pair, curves.probability)
     handles, _ = grid[0].get_legend_handles_labels()
     legend_over_all(page, handles)
@@ -32,7 +34,6 @@ def _draw(axes: Axes, pair: Ellipse, probability: float) -> None:
     axes.plot(*pair.center, marker="+", color=BLACK, linestyle="none", label="nominal")
     axes.set_xlabel(pair.names[0])
     axes.set_ylabel(pair.names[1])
-    axes.tick_params(axis="x", labelrotation=30)  # the labels are wide for three columns
 
 
 def boundary(center: Array, covariance: Array, probability: float) -> Array:

@@ -10,10 +10,10 @@ from inputdesign_cli.figures.style import (
     DASHED,
     GREY,
     ORANGE,
-    PALETTE,
+    OTHERS,
     frequency_axis,
     legend_above,
-    log_axes,
+    plain_decades,
 )
 from inputdesign_cli.runs.curves import FanCurves
 
@@ -26,7 +26,7 @@ _LEAST = 1e-3
 def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
     """A line for every plant, those that bind in colour; none may exceed one."""
     axes = page.add_subplot()
-    log_axes(axes, "y")
+    plain_decades(axes, "y")
     w = curves.frequency
     rows = curves.ratios[:_MOST_LINES]
     width = 0.5 if len(rows) > 20 else 0.8
@@ -38,13 +38,13 @@ def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
         handles.append(Line2D([], [], color=GREY, linewidth=0.8, label=f"{len(curves.ratios)} plants"))
     handles += axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
     named = list(curves.active.items())[:_MOST_NAMED]
-    for (name, ratio), color in zip(named, PALETTE, strict=False):
+    for (name, ratio), color in zip(named, OTHERS, strict=False):
         handles += axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
-    handles.append(axes.axhline(1.0, color=ORANGE, linestyle=DASHED, linewidth=1.0, label="admitted"))
     shown = curves.nominal if not len(rows) else rows
-    axes.set_ylim(
-        max(float(shown.min()) * 0.8, _LEAST * float(shown.max())), 1.3 * max(float(shown.max()), 1.0)
-    )
+    top = 1.3 * max(float(shown.max()), 1.0)
+    handles.append(axes.axhline(1.0, color=ORANGE, linestyle=DASHED, label="limit"))
+    axes.axhspan(1.0, top, color=ORANGE, alpha=0.07, linewidth=0)
+    axes.set_ylim(max(float(shown.min()) * 0.8, _LEAST * float(shown.max())), top)
     frequency_axis(axes, w, time_unit)
     axes.set_ylabel("r_u / r_adm")
     legend_above(axes, handles)

@@ -18,6 +18,7 @@ from inputdesign_cli.figures.style import (
     ORANGE,
     frequency_label,
     legend_over_all,
+    limiting_label,
     marked,
 )
 from inputdesign_cli.runs.curves import NyquistCurves
@@ -73,7 +74,8 @@ def draw_nyquist(page: Figure, curves: NyquistCurves, time_unit: str) -> None:
     limiting = np.interp(curves.limiting, curves.frequency, L)
     limiting = limiting[_shown(limiting)]  # rings are drawn beyond the axes too, and would push them aside
     if limiting.size:
-        handles += marked(axes, limiting.real, limiting.imag, color=BLUE, label="limiting frequency")
+        label = limiting_label(limiting.size)
+        handles += marked(axes, limiting.real, limiting.imag, color=BLUE, label=label)
     axes.plot([-1.0], [0.0], "+", color=BLACK, markersize=10, markeredgewidth=1.6)
     axes.annotate("−1", (-1.0, 0.0), (4, 5), textcoords="offset points")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)

@@ -9,7 +9,14 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from inputdesign_cli.figures.style import GREY, frequency_axis, legend_above, legend_over_all, lowered
+from inputdesign_cli.figures.style import (
+    GREY,
+    frequency_axis,
+    legend_above,
+    legend_over_all,
+    lowered,
+    title_above,
+)
 from inputdesign_cli.runs.results import Array
 
 # How much higher a page is with a panel under one other, or under several.
@@ -78,7 +85,7 @@ def draw_panels(
             axes.tick_params(which="both", labelbottom=False)
             axes.set_xlabel("")
     if title and single:
-        page.suptitle(title, x=0.01, ha="left")
+        title_above(page, title)
     axes, handles = max(drawn, key=lambda one: len(one[1]))
     if single:
         legend_above(axes, handles)

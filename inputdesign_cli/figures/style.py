@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
@@ -40,6 +41,7 @@ OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what 
 
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
 _LETTERS_PER_INCH, _BESIDE_LABEL = 12.0, 6
+_TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
@@ -205,6 +207,11 @@ def marked(axes: Axes, x: Array, y: Array, *, color: str, label: str) -> list[Li
     return [rings]
 
 
+def limiting_label(count: int) -> str:
+    """What so many rings stand for: frequencies at which what is asked binds."""
+    return "limiting frequency" if count == 1 else "limiting frequencies"
+
+
 def plot_admitted(axes: Axes, w: Array, r_adm: Array) -> list[Artist]:
     """What is admitted, drawn alike wherever it is: a dashed line, and beyond it a shade.
 
@@ -263,6 +270,15 @@ def _columns(labels: Sequence[str], inches: float) -> int:
     return 1
 
 
+def title_above(page: Figure, title: str) -> None:
+    """A title of the page, in as many lines as it takes."""
+    page.suptitle(_wrapped(page, title), x=0.01, ha="left")
+
+
+def _wrapped(page: Figure, title: str) -> str:
+    return textwrap.fill(title, max(int(page.get_figwidth() * _TITLE_PER_INCH), 1))
+
+
 def legend_over_all(page: Figure, handles: Sequence[Artist], title: str | None = None) -> None:
     """One legend for all panels of a page, above them."""
     labels = [str(handle.get_label()) for handle in handles]
@@ -270,7 +286,7 @@ def legend_over_all(page: Figure, handles: Sequence[Artist], title: str | None =
         handles=handles,
         loc="outside upper left",
         ncols=_columns(labels, page.get_figwidth()),
-        title=title,
+        title=title and _wrapped(page, title),
         alignment="left",
         handlelength=2.0,
         columnspacing=1.2,

@@ -28,6 +28,7 @@ from inputdesign_cli.figures.style import (
     legend_over_all,
     log_axes,
     rendered,
+    title_above,
 )
 from inputdesign_cli.figures.sweep_axes import (
     LOG_FROM,
@@ -128,7 +129,7 @@ def _draw_panels(
         legend_over_all(page, longest, title)
     else:
         if title:
-            page.suptitle(title, x=0.01, ha="left")
+            title_above(page, title)
         legend_above(grid[0][0], longest)
 
 
@@ -143,7 +144,7 @@ def _draw_curves(
     assert x is not None
     assert y is not None
     groups = list(dict.fromkeys(table.columns[across])) if across else [""]
-    bound, whatever = _bound(table, quantity)
+    bound, whatever = bound_of(table) if quantity == "objective.value" else (None, "")
     side = "ceiling" if table.maximised else "floor"
     handles: list[Artist] = []
     everything = [y] if bound is None else [y, bound]
@@ -184,9 +185,9 @@ def _scale_values(axes: Axes, table: SweepTable, values: Array) -> None:
         axes.set_ylim(bottom=0.0)
 
 
-def _bound(table: SweepTable, quantity: str) -> tuple[Array | None, str]:
-    """The bound over all designs whatever, and which they are."""
-    for name, whatever in BOUNDS.items() if quantity == "objective.value" else ():
+def bound_of(table: SweepTable) -> tuple[Array | None, str]:
+    """The bound (n,) on the objective over all designs of a kind, and what kind; None and "" without one."""
+    for name, whatever in BOUNDS.items():
         values = table.numbers(name)
         if values is not None and np.isfinite(values).any():
             return values, whatever

@@ -13,7 +13,7 @@ from inputdesign_cli.compute.executor import Executor
 from inputdesign_cli.figures.plots import draw
 from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.regular_file import read_regular
-from inputdesign_cli.report.described import WITHOUT_LIMIT, described
+from inputdesign_cli.report.described import captioned, described
 from inputdesign_cli.report.numbers import spoken
 from inputdesign_cli.runs.curves import Curves
 from inputdesign_cli.runs.curves_file import read_curves
@@ -24,20 +24,13 @@ if TYPE_CHECKING:
 
 _PICTURES = {"png": "image/png", "svg": "image/svg+xml"}
 _CAPTIONS = {
-    "bound": "Above: the error that the model may have (r_u) against the error that is admitted (r_adm). "
-    "Below: their ratio, which is to stay below one; white excitation that spends the same goes higher.",
     "deviations": "The standard deviation of the measured frequency response at every line, against what is "
     "admitted.",
     "fan": "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at "
     "each, those that bind in colour. The plants are those that the uncertainty of the spec describes; "
     "nothing is said of the true plant.",
-    "spectrum": "Where in frequency the excitation has its power, and white excitation for comparison.",
     "optimality": "The certificate of the bound over every spectrum: what a unit of cost buys at each "
     "frequency, relative to the best. It is nowhere above one, and one where power pays.",
-    "signal": "The signal to apply (signal.csv), how its values are distributed, and the output that it is "
-    "to cause, with two standard deviations of noise.",
-    "nyquist": "The loop C G with the discs in which the data leave it, and the circle about -1 that it is "
-    "to keep off. The limiting frequencies are those at which a disc touches what is admitted.",
     "ellipses": "The confidence ellipses that the design buys, for pairs of parameters.",
     "directions": "The gains of the plant, and how the design shares its power among their directions.",
     "moments": "The second moments of the regressors.",
@@ -87,11 +80,11 @@ def run_charts(run: Path, result: Result, time_unit: str, by: Executor) -> dict[
 def _readable(job: tuple[str, Curves, str]) -> Chart:
     """The chart of a file stem, of its curves and the unit of time."""
     stem, curves, time_unit = job
-    told, caption = described(curves, time_unit), _caption(stem)
+    caption = _caption_by_kind(stem) or captioned(curves) or _caption(stem)
     return readable_chart(
         lambda seen: draw(curves, time_unit, "svg", narrow=True, seen=seen),
-        told or caption,
-        WITHOUT_LIMIT if told == WITHOUT_LIMIT else caption,
+        described(curves, time_unit) or caption,
+        caption,
     )
 
 
@@ -133,6 +126,5 @@ def _caption_by_kind(stem: str) -> str | None:
         "fit": "The recorded outputs, predicted one step ahead, and simulated from the input alone.",
         "residuals": "Correlations of the residuals with themselves and with past inputs; chance leaves them "
         "within the grey.",
-        "bound": "The error r_u that these data leave, against the admitted error r_adm.",
         "structures": "How well each structure that was tried simulates data that it has not seen.",
     }.get(stem.removeprefix("data_"))

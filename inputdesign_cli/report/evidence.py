@@ -10,19 +10,24 @@ from inputdesign_cli.runs.results import Json, Result
 _SPREAD = "{:.4g} ± {:.2g}"
 # Below this share of its standard deviation the digits of an estimate say nothing, not even its order.
 _NOTHING = 1e-3
+_NORMAL = 1.96  # standard deviations to either side of 95 %
 
 
 def estimate_table(result: Result) -> Rows | None:
-    """The estimated parameters with their standard deviations."""
+    """The estimated parameters with their standard deviations and 95 % limits."""
     found = result.get("identification")
     if found is None or "theta" not in found:
         return None
     deviations = found["standard_deviation"]
     rows = tuple(
-        (name, _beside(value, deviations[name]), f"{deviations[name]:.2g}")
+        (name, _beside(value, deviations[name]), f"{deviations[name]:.2g}", _limits(value, deviations[name]))
         for name, value in found["theta"].items()
     )
-    return Rows(("parameter", "estimate", "standard deviation"), rows)
+    return Rows(("parameter", "estimate", "standard deviation", "95 % limits"), rows)
+
+
+def _limits(value: float, deviation: float) -> str:
+    return f"{value - _NORMAL * deviation:.4g} to {value + _NORMAL * deviation:.4g}"
 
 
 def _beside(value: float, deviation: float) -> str:

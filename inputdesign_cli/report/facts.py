@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from inputdesign_cli.report.numbers import Fact, listed, precise, shown, spoken
+from inputdesign_cli.report.numbers import Fact, enumerated, precise, shown, spoken
 from inputdesign_cli.runs.objectives import objective
 from inputdesign_cli.runs.results import Json, Result
 from inputdesign_cli.runs.shares import per_cent
@@ -35,7 +35,7 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     if kind != "least_cost" and "cost" in result:
         yield cost, shown(result["cost"]), ""
     power = result.get("power", {})
-    powers = ", ".join(f"{name} {listed(power[name])}" for name in power)
+    powers = ", ".join(f"{name} {enumerated(power[name])}" for name in power)
     if powers:
         yield "power", powers, "at the plant of the spec" if _paid(result) else ""
     limits = "; ".join(_limits(result))
@@ -44,7 +44,8 @@ def facts(result: Result, time_unit: str) -> Iterator[Fact]:
     error = result.get("model_error", {})
     if "worst_ratio" in error:
         where = f" at {error['worst_frequency']:.4g} rad/{time_unit}" if "worst_frequency" in error else ""
-        yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", ""
+        at = "at the plant of the spec" if "robust" in result else ""
+        yield "model error", f"r_u / r_adm at most {error['worst_ratio']:.6g}{where}", at
     asked = result.get("requirements", result.get("assessment", {}).get("requirements", []))
     yield from (_loop(entry["loop"], time_unit) for entry in asked if "loop" in entry)
     if "worst_ratio" in result.get("frequency_response", {}):
@@ -198,7 +199,10 @@ def white(result: Result) -> str:
     multiple = kind in ("least_cost", "closed_loop_error")
     if value is None or (multiple and (ratio is None or not value)):
         return ""
-    return f"white excitation: {_clean(value, kind)}" + (f", {ratio:.3g} times as much" if multiple else "")
+    told = f"white excitation: {_clean(value, kind)}"
+    if not multiple:
+        return told
+    return f"{told}, as much" if f"{ratio:.3g}" == "1" else f"{told}, {ratio:.3g} times as much"
 
 
 def _gap(relative: float) -> str:
@@ -237,20 +241,21 @@ def _signal(result: Result) -> Iterator[str]:
     """The samples of the record, and what they attain."""
     signal = result["signal"]
     yield f"{signal['samples']} samples"
-    peak, of_u = (listed(signal[key]) if signal.get(key) else "" for key in ("peak", "input_peak"))
+    peak, of_u = (enumerated(signal[key]) if signal.get(key) else "" for key in ("peak", "input_peak"))
     looped = bool(of_u) and of_u != peak  # what excites is then another signal than the input
     for key in ("power", "peak", "crest_factor"):
         if signal.get(key):
-            yield f"{spoken(key)}{' of r' * looped} {listed(signal[key])}"
+            yield f"{spoken(key)}{' of r' * looped} {enumerated(signal[key])}"
     if looped:
         yield f"peak of u {of_u}"
-        yield f"peak of y {listed(signal['output_peak'])}"
+        yield f"peak of y {enumerated(signal['output_peak'])}"
     if "mean_squared_error" in signal:
         yield f"error {signal['mean_squared_error']:.6g} with these samples"
     if "worst_ratio" in signal:
         error = "worst_ratio" in result.get("model_error", {})
         ratio = "r_u / r_adm" if error else "ratio to the requirement"
-        yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples"
+        of = ", at the worst of these plants" if "robust" in result else ""
+        yield f"{ratio} at most {precise(signal['worst_ratio'])} with these samples{of}"
     if "confidence" in signal:
         told = signal["confidence"]
         kept, of = ("kept", "simulated experiments") if "runs" in told else ("exact", "estimates")

@@ -35,6 +35,12 @@ def listed(values: Json) -> str:
     return " ".join(f"{value:.4g}" for value in (values if isinstance(values, list | tuple) else [values]))
 
 
+def enumerated(values: Json) -> str:
+    """The same in a sentence: `1, 2 and 3`."""
+    *others, last = listed(values).split(" ")
+    return f"{', '.join(others)} and {last}" if others else last
+
+
 def spoken(name: str) -> str:
     """A name of the program as words."""
     return name.replace("_", " ")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.figures.style import rendered
-from inputdesign_cli.figures.sweep_figures import sweep_figures
+from inputdesign_cli.figures.sweep_figures import bound_of, sweep_figures
 from inputdesign_cli.figures.sweep_table import SweepTable, read_sweep
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.report.charts import Chart, readable_chart
@@ -106,8 +106,10 @@ def _answer(table: SweepTable) -> str:
 
 
 def _charts(table: SweepTable) -> list[Chart]:
+    bounded = "; dashed: the proved bound that no design passes" if bound_of(table)[1] else ""
+    failed = "; crosses: points without a result" if any(table.columns["code"]) else ""
     captions = {
-        "curves": "The result over one key; dashed: the proved bound that no design passes.",
+        "curves": f"The result over one key{bounded}{failed}.",
         "map": "The result over both keys; hatched where a point has none.",
         "moments": "The second moments of the regressors over the key.",
     }

@@ -319,7 +319,7 @@ class ConvexTask:
                 white=white,
                 equal=equal_white(design, done.experiment.samples, result["baseline"]["white"]["ratio"]),
                 white_labels=white_labels(result),
-                record=known,
+                record=known if errors else self._known(done, record, own_length=False),
                 stated=bool(errors),
                 active=active,
             )
@@ -334,9 +334,13 @@ class ConvexTask:
             curves["ellipses"] = ellipses
         return tables, curves
 
-    def _known(self, done: Designed, record: Record | None) -> Array | None:
-        """The information (k, k) of the record; None where it leaves a parameter undetermined."""
+    def _known(self, done: Designed, record: Record | None, *, own_length: bool = True) -> Array | None:
+        """The information (k, k) of the record, or of one like it as long as the design.
+
+        None where it leaves a parameter undetermined.
+        """
         if record is None or not np.isfinite(record.worst_ratio):
             return None
         plant = FiniteRecord(done.experiment, len(record.samples), self.record.step)
-        return plant.information(record.samples)
+        told = plant.information if own_length else plant.information_of_experiment
+        return told(record.samples)

@@ -86,6 +86,7 @@ class Plants:
         discard: how many of the plants the design may leave out.
         afresh: draws others from the same distribution, a few at a time; None where plants were listed.
         fresh: how many of these were asked for.
+        at: the plant with parameters (k,), None where they are none; not given where plants were listed.
         unknowns: of the program, None where they have no number.
         region: where the design is to serve the worst plant that is found, too; `searched` what was found.
     """
@@ -98,6 +99,7 @@ class Plants:
     discard: int = 0
     afresh: Callable[[], Iterator[Batch]] | None = None
     fresh: int = 0
+    at: Callable[[Array], Alternative | None] | None = None
     unknowns: int | None = None
     region: Region | None = None
     searched: Searched | None = None
@@ -174,23 +176,29 @@ def tried_on(design: Design, samples: int, batch: Batch, *, above: float = 0.0) 
     return [_tried(design, at.basis, power, samples, plant, above) for plant in batch.plants]
 
 
+def estimate_from(design: Design, samples: int, plant: Alternative, rng: np.random.Generator) -> Array | None:
+    """Parameters (k,) that data of the design may tell where this is the true plant: one draw.
+
+    None where the experiment does not tell them all.
+    """
+    at = design.problem.on(design.result.basis)
+    power = max(at.power("excitation").at(design.result.x), np.finfo(float).tiny)
+    try:
+        alone = _alone(design, at.basis, power, samples, plant)
+        (information,) = alone.informations(design.result.x)
+        root = alone.experiment.factor @ np.linalg.cholesky(information)
+        scatter = np.linalg.solve(root.T, rng.standard_normal(len(root)))
+    except (np.linalg.LinAlgError, IdesignError):
+        return None
+    return plant.experiment.model.theta + scatter
+
+
 def _tried(
     design: Design, basis: Basis, power: float, samples: int, plant: Alternative, above: float
 ) -> Kept:
     seconds_left()
     try:
-        of_length = replace(plant.experiment, samples=samples)
-        own = replace(plant, experiment=of_length).at(of_length.whitened(power))
-        alone = replace(
-            design.problem,
-            experiment=own.experiment,
-            requirements=own.requirements,
-            side=own.side,
-            others=(),
-            limits=(),
-            basis=basis,
-            finer=None,
-        )
+        alone = _alone(design, basis, power, samples, plant)
         informations = alone.informations(design.result.x)
         worst = Kept(0.0)
         for side in (False, True):
@@ -203,3 +211,19 @@ def _tried(
         return worst
     except (np.linalg.LinAlgError, IdesignError):  # a plant of which the experiment does not tell everything
         return Kept(np.inf)
+
+
+def _alone(design: Design, basis: Basis, power: float, samples: int, plant: Alternative) -> Problem:
+    """What is asked at one plant only, in coordinates of its own."""
+    of_length = replace(plant.experiment, samples=samples)
+    own = replace(plant, experiment=of_length).at(of_length.whitened(power))
+    return replace(
+        design.problem,
+        experiment=own.experiment,
+        requirements=own.requirements,
+        side=own.side,
+        others=(),
+        limits=(),
+        basis=basis,
+        finer=None,
+    )

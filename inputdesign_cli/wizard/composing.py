@@ -16,6 +16,7 @@ from inputdesign_cli.wizard.wishes import wished
 
 _MOST, LEAST = 5000, 50  # samples
 _PLANTS, _FRESH = 30, 200
+_REACH = 0.95  # of an ellipsoid, in which the worst plants are sought; of intervals it is all
 _FIRST = "{type: fir, order: 20}"
 
 
@@ -138,12 +139,14 @@ def _uncertain(plant: PlantAnswer, nonparametric: bool) -> list[str]:
     if nonparametric or not (plant.covariance or plant.intervals):
         return []
     drawn = (
-        f"  scenarios: {_PLANTS}  # what is asked holds at so many plants drawn from that\n  fresh: {_FRESH}"
+        f"  scenarios: {_PLANTS}  # what is asked holds at so many plants drawn from that",
+        f"  worst_case: {_REACH}  # and at the worst ones that a search finds there",
+        f"  fresh: {_FRESH}",
     )
     if plant.covariance is not None:
-        return ["uncertainty:", f"  covariance: {plant.covariance}", drawn]
+        return ["uncertainty:", f"  covariance: {plant.covariance}", *drawn]
     listed = [f"    {name}: [{short(low)}, {short(high)}]" for name, (low, high) in plant.intervals.items()]
-    return ["uncertainty:  # how well it is known", "  intervals:", *listed, drawn]
+    return ["uncertainty:  # how well it is known", "  intervals:", *listed, *drawn]
 
 
 def _periodic(tails: list[str]) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from inputdesign_cli.errors import IdesignError, OutputError
 from inputdesign_cli.wizard.composing import Draft, compose
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
-from inputdesign_cli.wizard.questions import QUESTIONS, Question
+from inputdesign_cli.wizard.questions import QUESTIONS, Question, told_by_plant
 
 # In place of what was not asked yet: it goes with every other answer.
 _MEANWHILE = {
@@ -31,7 +31,8 @@ class Conversation:
     @property
     def question(self) -> Question | None:
         """The next one; None where the draft is there."""
-        return next((one for one in QUESTIONS if one.key not in self._answers), None)
+        there = {*self._answers, *told_by_plant(self._answers)}
+        return next((one for one in QUESTIONS if one.key not in there), None)
 
     def answer(self, text: str) -> IdesignError | None:
         """Answer the question; what is wrong, if something is: then its question comes again.

@@ -233,7 +233,14 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
         lines = (f"include: [{name}]  # {path.name}: a gain, a lag and a dead time explain it, too",)
         model, tunable = first, True
     return PlantAnswer(
-        lines, 20.0 * step, 0.0, files={name: model}, sampling=step, tunable=tunable, channels=channels
+        lines,
+        20.0 * step,
+        0.0,
+        files={name: model},
+        covariance=name if channels == 1 else None,
+        sampling=step,
+        tunable=tunable,
+        channels=channels,
     )
 
 

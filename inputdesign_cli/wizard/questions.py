@@ -71,6 +71,12 @@ def question(key: str) -> Question:
     return next(one for one in QUESTIONS if one.key == key)
 
 
+def told_by_plant(answers: Mapping[str, str]) -> dict[str, str]:
+    """What needs no answer since the plant tells it: of a log what the noise is, and whether it drifts."""
+    explored = answers.get("plant", "").strip().lower().startswith("log ")
+    return dict.fromkeys(("noise", "drift"), "as the log") if explored else {}
+
+
 def bad_answer(key: str, why: str) -> SpecError:
     """The error that names the question and tells what is allowed."""
     asked = question(key)
@@ -112,9 +118,9 @@ def complete(answers: Mapping[str, str]) -> dict[str, str]:
     Raises:
         SpecError: `bad-answer` for questions that need one.
     """
-    found = {}
+    found, told = {}, told_by_plant(answers)
     for one in QUESTIONS:
-        text = answers.get(one.key, one.default)
+        text = told.get(one.key, answers.get(one.key, one.default))
         if text is None or not text.strip():
             raise bad_answer(one.key, "there is no answer")
         found[one.key] = text.strip()

@@ -35,7 +35,7 @@ class Verdict:
 
 
 def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None) -> Verdict:
-    """What is to be told, with a length that would do, which is tried.
+    """What is to be told, with a length that would do at the estimate too, which is tried.
 
     Args:
         there: seconds that may be taken, where the experiment is shorter.
@@ -43,8 +43,15 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     ratio, taken = float(result["signal"]["worst_ratio"]), result["samples"] * spec.sample_time
     means = f"{lasting(taken)} at {_used(spec, result)}"
     times = f"the model that it leaves errs {ratio:.3g} times as much as is admitted"
-    found = _length_that_does(spec, ratio, solve)
+    surely = ratio * _scatter(result)
+    found = _length_that_does(spec, surely, solve)
     said = [f"{means} is enough: {times}." if ratio <= 1.0 else f"{means} is not enough: {times}."]
+    if ratio <= 1.0 < surely:
+        said.append(
+            "But assess judges at the plant that the data tell, and that scatters: where the plant is the "
+            "worst that you allow, 5 % of such experiments would tell one at which it errs "
+            f"{surely:.3g} times as much or more, and be called missed."
+        )
     if found is not None:
         needed = found * spec.sample_time
         would = f"{lasting(needed)} would do"
@@ -83,7 +90,14 @@ def _elsewhere(result: Result, ratio: float) -> list[str]:
     robust = result.get("robust", {})
     if not robust.get("scenarios"):
         return []
-    at = f"at the plant as you stated it and at {robust['scenarios']} others within what you said of it"
+    searched = robust.get("searched")
+    others = f"{robust['scenarios'] - (searched or {}).get('added', 0)} others within what you said of it"
+    at = f"at the plant as you stated it and at {others}"
+    if searched:
+        values = ", ".join(f"{name} {value:.3g}" for name, value in searched["parameters"].items())
+        at = (
+            f"at the plant as you stated it, at {others}, and at the worst one that a search found ({values})"
+        )
     said, fresh = [f"This was tried {at}."], robust.get("fresh")
     if not fresh:
         return said
@@ -109,6 +123,12 @@ def _elsewhere(result: Result, ratio: float) -> list[str]:
     return said
 
 
+def _scatter(result: Result) -> float:
+    """How many times as large errors are at plants that data of the worst one may tell."""
+    foreseen = result.get("robust", {}).get("estimates", {})
+    return max(1.0, float(foreseen.get("largest", 1.0)))
+
+
 def _open_dead_times(result: Result) -> list[str]:
     """Where the record would not tell dead times apart."""
     if not result.get("foreseen", {}).get("rivals"):
@@ -120,7 +140,11 @@ def _open_dead_times(result: Result) -> list[str]:
 
 
 def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
-    """Samples of a record that was designed and meets what is asked; None where none was found."""
+    """Samples of a record that was designed and meets what is asked; None where none was found.
+
+    Args:
+        ratio: of errors, at estimates too; one is enough.
+    """
     # Errors fall with the root of the length, but not in records hardly longer than the plant is slow.
     samples = max(int(np.ceil(spec.experiment.samples * ratio**2 * _ROOM)), LEAST)
     if ratio <= 1.0 and samples >= spec.experiment.samples:
@@ -132,9 +156,9 @@ def _length_that_does(spec: Spec, ratio: float, solve: Solve) -> int | None:
         except IdesignError:
             result = {}
         found = result.get("signal", {}).get("worst_ratio")
-        if found is not None and found <= 1.0:
+        if found is not None and (found := float(found) * _scatter(result)) <= 1.0:
             return int(result["signal"]["samples"])
-        longer = _LONGER if found is None else float(np.clip(_ROOM * float(found) ** 2, _ROOM, _LONGER))
+        longer = _LONGER if found is None else float(np.clip(_ROOM * found**2, _ROOM, _LONGER))
         samples = int(np.ceil(samples * longer))
         if ratio <= 1.0 and samples >= spec.experiment.samples:
             return None

@@ -88,7 +88,7 @@ def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
         rule = "{amigo: {type: pid}}" if re.search(r"\bpid\b", text, re.I) else "{simc: {}}"
         named = "Astrom and Hagglund" if "amigo" in rule else "Skogestad, as fast as the dead time"
         return [
-            "accuracy:  # the controller follows from the plant; whatever the data leave keeps the margin",
+            "accuracy:  # the controller follows from the plant; all that the data leave keep the margin",
             f"  loop: {{tuning: {rule}, {margin}}}  # tuned by the rule of {named}",
         ]
     if controlled:

@@ -66,3 +66,12 @@ def test_numbers_stand_under_the_lowest_panel_only(page):
     above, below = figure.axes
     assert not any(text.get_visible() and text.get_text() for text in above.get_xticklabels(which="both"))
     assert any(text.get_visible() and text.get_text() for text in below.get_xticklabels(which="both"))
+
+
+def test_ratios_far_below_the_limit_keep_their_shape(page):
+    """On a linear axis with the limit in it they would be one flat line."""
+    _, below = page(bound(BoundPanel(W, 0.0002 * G * (1 + W), G, 0.01 * G))).axes
+    assert below.get_yscale() == "log"
+    low, high = below.get_ylim()
+    assert low > 0.01
+    assert high > 1.0

@@ -164,3 +164,19 @@ def test_points_that_stand_too_close_have_common_ticks(pages, tmp_path):
 def test_of_a_criterion_the_largest_is_the_best(pages, tmp_path):
     given = table({M: ["0", "4", "8"]}, [3.0, 4.5, 4.0], kind="D")
     assert given.best == ("objective.value", f"{M} = 4")
+
+
+def test_a_long_title_has_several_lines_within_the_page():
+    """Of three keys with long names: the sentence reached over the edge of a narrow page."""
+    keys = ("spectrum.order", "experiment.samples", "noise.variance")
+    points = [(n, m, x) for n in ("10", "20", "40") for m in ("1", "2") for x in ("1", "3")]
+    given = table(
+        dict(zip(keys, map(list, zip(*points, strict=True)), strict=True)), [*map(float, range(12, 0, -1))]
+    )
+    seen = []
+    for _, make in sweep_figures(given):
+        rendered(make, "svg", narrow=True, seen=seen.append)
+    (page,) = seen
+    title = page.legends[0].get_title()
+    assert "\n" in title.get_text()
+    assert title.get_window_extent().x1 <= page.bbox.x1

@@ -29,3 +29,14 @@ def test_an_exact_confidence_that_is_exceeded_is_told(limits, said):
     result = {"model_error": {"confidence": told, "alpha": 7.7}}
     (line,) = [text for name, text, _ in facts(result, "s") if name == "confidence"]
     assert ("more than asked" in line) is said
+
+
+def test_channels_are_enumerated_and_equal_costs_are_told_as_such():
+    result = {
+        "objective": {"kind": "least_cost", "value": 2.0},
+        "power": {"input": [1.0, 0.5, 0.25], "output": [3.0]},
+        "baseline": {"white": {"cost": 2.0, "ratio": 1.0000001}},
+    }
+    told = {name: (value, note) for name, value, note in facts(result, "s")}
+    assert told["power"][0] == "input 1, 0.5 and 0.25, output 3"
+    assert told["cost"][1] == "white excitation: 2, as much"

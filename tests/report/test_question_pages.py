@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.signal
+import scipy.stats
 
 from inputdesign_cli import analyse, assess, identify, load_spec, parse_spec, simulate, solve
 from inputdesign_cli.figures.plots import draw_all
@@ -90,7 +91,11 @@ def test_the_page_of_an_assessment(relative, met, data, tmp_path):
     ]
     identified = result["identification"]
     for name, value in identified["theta"].items():
-        assert [name, f"{value:.6g}", f"{identified['standard_deviation'][name]:.2g}"] in cells
+        deviation = identified["standard_deviation"][name]
+        row = next(r for r in cells if r[0] == name)
+        assert row[1:3] == [f"{value:.6g}", f"{deviation:.2g}"]
+        limits = [scipy.stats.norm.ppf(p, value, deviation) for p in (0.025, 0.975)]
+        assert [*map(float, row[3].split(" to "))] == pytest.approx(limits, abs=0.02 * deviation)
 
 
 def test_the_page_of_an_estimate_and_of_its_figures(data, tmp_path):

@@ -63,3 +63,17 @@ def test_the_hint_for_one_channel_speaks_of_one_channel():
     assert found.code == "unstable-loop"
     assert "ascending" in found.hint
     assert "column" not in found.hint
+
+
+def test_a_record_stands_beside_a_design_per_sample():
+    """What is known per sample does not shrink with the length of the record that shows it."""
+    text = """
+plant: {B: [0, 1], F: [1, -0.5]}
+noise: {variance: 1}
+limits: {input_power: 1}
+accuracy: {criterion: D}
+spectrum: {type: white}
+signal: {samples: 4000, candidates: 1, seed: 1}
+"""
+    (panel,) = solve(parse_spec(text)).curves["bound"].panels
+    assert panel.r_u_record / panel.r_u == pytest.approx(np.ones(panel.r_u.size), abs=0.1)

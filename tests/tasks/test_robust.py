@@ -258,3 +258,27 @@ def test_fresh_plants_are_tried_as_long_as_there_is_time():
     assert cut.entry["fresh"]["draws"] == first
     assert cut.entry["fresh"]["missed"] == sum(share > 1.0 + 1e-6 for share in shares[:first])
     assert f"after {first} of 120" in cut.notes[0]
+
+
+def test_what_data_will_tell_of_the_worst_plant_is_foreseen():
+    """One gain b: r_u is the same everywhere, r_adm a share of |b|, and the estimate is normal."""
+    deviation, worst = 0.1, 0.8
+    text = """
+plant: {B: [0, 1]}
+noise: {variance: 4}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.2}}
+limits: {input_power: 1}
+objective: best_accuracy
+spectrum: {type: white}
+uncertainty: {intervals: {b1: [0.8, 1.2]}, scenarios: 3, worst_case: 0.95, fresh: 5}
+signal: {candidates: 1, seed: 1}
+"""
+    found = solved(text)["robust"]
+    assert found["searched"]["parameters"]["b1"] == pytest.approx(worst)
+    assert found["estimates"]["draws"] == 100
+    # The 5 % quantile of 100 estimates scatters itself by (q (1 - q)/n)^0.5 over the density, here 0.1031.
+    own = 3.0 * np.sqrt(0.05 * 0.95 / 100) / 0.1031
+    least, most = (worst - (1.645 + side * own) * deviation for side in (1, -1))
+    assert worst / most < found["estimates"]["largest"] < worst / least
+    assert "estimates" not in solved(text, "uncertainty.fresh=0")["robust"]

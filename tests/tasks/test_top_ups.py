@@ -181,3 +181,28 @@ def test_the_spec_of_a_top_up_counts_the_record_before(heater_record, tmp_path, 
     for given in (first, copied):
         (error,) = ran("a/spec.yaml", given, second, "-o", "e")["errors"]
         assert error["code"] == "data-repeated"
+
+
+def test_an_estimate_outside_of_the_intervals_is_topped_up(tmp_path):
+    """What was thought before is no reason to stop: the intervals then reach the estimate."""
+    text = """
+plant: {B: [0, 1]}
+noise: {variance: 4}
+experiment: {samples: 400}
+accuracy: {model_error: {relative: 0.1}}
+spectrum: {type: white}
+uncertainty: {intervals: {b1: [0.8, 1.2]}, scenarios: 3, fresh: 0}
+signal: {candidates: 1, seed: 1}
+"""
+    rng = np.random.default_rng(3)
+    u, e = rng.standard_normal((2, 400))
+    rows = np.c_[np.arange(400), u, 0.6 * np.r_[0, u[:-1]] + 2 * e]
+    path = tmp_path / "log.csv"
+    np.savetxt(path, rows, delimiter=",", header="time,u,y", comments="")
+    found = assess(parse_spec(text), path)
+    result = found.results.result
+    assert found.verdict == "missed"
+    assert result["identification"]["theta"]["b1"] < 0.8
+    assert "no_top_up" not in result["assessment"]
+    assert result["robust"]["scenarios"] == 3
+    assert found.results.signal.size

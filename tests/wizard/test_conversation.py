@@ -95,3 +95,11 @@ def test_a_step_response_stands_beside_the_spec(tmp_path):
     (tmp_path / "x-model.yaml").mkdir()
     with pytest.raises(OutputError):  # no other answer would help
         talk.answer("no")
+
+
+def test_of_a_log_the_noise_is_not_asked(tmp_path):
+    talk = Conversation({"plant": "log log.csv", "wish": "prediction within 5 % up to 0.1"}, "x", tmp_path)
+    assert talk.question.key == "range"
+    known = {key: text for key, text in GOOD.items() if key not in ("noise", "drift", "converter")}
+    assert Conversation({**known, "plant": "log log.csv"}, "x", tmp_path).question.key == "converter"
+    assert Conversation(known, "x", tmp_path).question.key == "noise"

@@ -92,6 +92,28 @@ def test_what_is_known_of_other_plants_is_said_in_words_of_the_wish(ratio, fresh
     assert "drawn afresh" not in said
 
 
+def test_a_record_that_is_just_enough_may_be_called_missed():
+    """The data tell a plant at which the error is larger: a length has room for that."""
+    robust = {"scenarios": 32, "estimates": {"draws": 100, "confidence": 0.95, "largest": 1.1}}
+
+    def solve(changed):
+        ratio = 0.95 * (720 / changed.experiment.samples) ** 0.5
+        samples = changed.experiment.samples
+        return {"signal": {"worst_ratio": ratio, "samples": samples}, "samples": samples, "robust": robust}
+
+    said = told(0.95, solve=solve, **robust)
+    assert "60 min at plus/minus 5 is enough" in said
+    assert "5 % of such experiments would tell one at which it errs 1.04 times" in said
+    assert f"{lasting(5.0 * math.ceil(720 * 1.1 * (0.95 * 1.1) ** 2))} would do" in said
+    assert "missed" not in told(0.9, **robust)
+
+
+def test_the_worst_plant_that_was_found_is_named():
+    said = told(scenarios=32, searched={"added": 2, "parameters": {"gain": 1.4, "dead_time": 17.5}})
+    assert "at 30 others" in said
+    assert "at the worst one that a search found (gain 1.4, dead_time 17.5)" in said
+
+
 @pytest.mark.parametrize(
     ("peaks", "words"),
     [

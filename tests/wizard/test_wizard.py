@@ -40,6 +40,7 @@ def test_the_sentence_of_the_engineer_is_a_spec():
     assert spec.accuracy.loop.peak == pytest.approx(10 ** (6 / 20))
     assert spec.accuracy.loop.tuning.simc is not None
     assert (spec.limits.amplitude.input, spec.signal.offset, spec.experiment.samples) == (5.0, 40.0, 720)
+    assert spec.uncertainty.worst_case == 0.95
     assert spec.noise.variance == pytest.approx(0.04)
     assert spec.plant.continuous.time_constant == 180.0
 
@@ -181,10 +182,13 @@ def test_a_log_is_explored(tmp_path):
     rows = np.c_[5.0 * np.arange(300), u, y + 0.05 * rng.standard_normal(300)]
     np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="time,u,y", comments="")
     wish = "prediction within 5 % up to 0.1"
-    draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
+    # What the log tells is not asked.
+    asked = {key: text for key, text in ENGINEER.items() if key != "noise"}
+    draft = compose({**asked, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
     draft.validate()
     spec = draft.spec()
     assert spec.sample_time == 5.0
+    assert spec.uncertainty.covariance == "x-model.yaml"
     gain = build_model(spec).plant_at(np.array([1e-6]))[0, 0, 0]
     assert abs(gain) == pytest.approx(2.5, rel=0.01)
 

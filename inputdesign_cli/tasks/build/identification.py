@@ -79,6 +79,17 @@ def _offset(spec: Spec, levels: Mapping[str, float]) -> list[str]:
     return [f"signal.offset={json.dumps(offsets if len(offsets) > 1 else offsets[0])}"]
 
 
+def _reaching(spec: Spec, values: Mapping[str, float]) -> list[str]:
+    """The override that lets intervals reach the estimate, which may be outside of them."""
+    if spec.uncertainty is None or spec.uncertainty.intervals is None:
+        return []
+    reaching = {
+        name: (min(low, values.get(name, low)), max(high, values.get(name, high)))
+        for name, (low, high) in spec.uncertainty.intervals.items()
+    }
+    return [f"uncertainty.intervals={json.dumps(reaching)}"]
+
+
 def restated(spec: Spec, model: Model, source: str) -> Spec:
     """The spec with another model in place of its nominal plant and noise."""
     return parse_spec(
@@ -107,7 +118,11 @@ def ask(spec: Spec, samples: int, factor: Array) -> ModelQuestion:
             parse_spec(
                 spec.to_yaml(),
                 file="top-up",
-                overrides=[f"experiment.prior={json.dumps(prior)}", *_offset(spec, levels)],
+                overrides=[
+                    f"experiment.prior={json.dumps(prior)}",
+                    *_offset(spec, levels),
+                    *_reaching(spec, values),
+                ],
                 folder=spec.resolve_path("."),
             )
         )

@@ -78,6 +78,7 @@ def build_plants(spec: Spec, experiment: Experiment, basis: Basis) -> Plants | N
         discard=int(stated.discard * number),
         afresh=afresh if stated.fresh else None,
         fresh=stated.fresh,
+        at=scenario.possible,
         unknowns=None if basis.free else _unknowns(spec, basis),
         region=None if stated.worst_case is None else scenario.region(stated.worst_case),
     )
@@ -258,14 +259,14 @@ class _Scenarios(Unsure):
     def region(self, confidence: float) -> Region:
         """All plants that the draws are from, up to this confidence."""
         name, centre, columns, box = reach(self.spec, self.stated, self.experiment, confidence)
+        return Region(name, centre, columns, box, self.possible)
 
-        def at(theta: Array) -> Alternative | None:
-            try:
-                return self.at(theta, self._radius)
-            except _NoPlantError:
-                return None
-
-        return Region(name, centre, columns, box, at)
+    def possible(self, theta: Array) -> Alternative | None:
+        """The plant with these parameters; None where it is unstable, or they are those of no plant."""
+        try:
+            return self.at(theta, self._radius)
+        except _NoPlantError:
+            return None
 
     def batch(self, draw: Draw, number: int, rng: np.random.Generator) -> Batch:
         """So many plants, drawn again where they are unstable, or no plants.

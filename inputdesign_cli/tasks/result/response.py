@@ -232,7 +232,7 @@ def _notes(terms: ResponseTerms, plan: Planned, result: dict[str, Json]) -> list
     if terms.goal in ("cost", "samples") and ratio > 1.0 + _ROUNDING:
         notes.append(
             f"the record leaves {ratio:.7g} times the deviation admitted, by the noise that leaks through "
-            "its finite length, and the limits leave no room to make up for it: a little more power or a few "
+            "its finite length, and the limits leave no room to mend that: a little more power or a few "
             "more periods would do"
         )
     if terms.goal != "samples" and plan.length < terms.asked:

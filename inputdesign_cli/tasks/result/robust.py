@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import cycle, islice
 
 import numpy as np
 
 from inputdesign_cli.compute.time_limit import OutOfTimeError, what_ended
 from inputdesign_cli.compute.watching import Counted, tell
 from inputdesign_cli.design.convex.scenario_theory import risk_after, risk_before
+from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import binomial_limits
 from inputdesign_cli.plant.polynomial import Array
@@ -18,11 +20,23 @@ from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.design import Designed, costs_of
 from inputdesign_cli.tasks.result.fan import fan_curves
-from inputdesign_cli.tasks.robust import CONFIDENCE, MET, Batch, Kept, Plants, Searched, kept_by, tried_on
+from inputdesign_cli.tasks.robust import (
+    CONFIDENCE,
+    MET,
+    Batch,
+    Kept,
+    Plants,
+    Searched,
+    estimate_from,
+    kept_by,
+    tried_on,
+)
 
 # A plant binds when it keeps all but this share of what is admitted.
 _BINDS = 1e-5
 _LISTED = 12
+# Estimates that are foreseen, and the part of them that is told.
+_ESTIMATES, _MOST_OF_THEM = 100, 0.95
 _FEWER = "{} ended the trial on fresh plants after {} of {} (uncertainty.fresh)"
 
 
@@ -79,6 +93,7 @@ def robust_result(done: Designed, plants: Plants, peak: Peak | None = None) -> R
     if plants.afresh is not None:
         fresh = _fresh(done, plants, plants.afresh(), peak)
         entry |= {"fresh": fresh} if fresh else {}
+        entry |= _estimates(done, plants, binding)
         tried = fresh.get("draws", 0)
         if tried < plants.fresh:
             notes = (*notes, _FEWER.format(what_ended(), tried, plants.fresh))
@@ -171,6 +186,36 @@ def _fresh(done: Designed, plants: Plants, afresh: Iterator[Batch], peak: Peak |
         entry["beyond_limits"] = {"draws": sum(one > MET for one in peaks), "largest": max(peaks)}
     promised = plants.paid == "worst" and done.problem.goal == "cost"
     return entry | ({"dearer": int(np.sum(dearer))} if promised else {})
+
+
+def _estimates(done: Designed, plants: Plants, binding: Sequence[int]) -> dict[str, Json]:
+    """How near the best accuracy comes to being missed where the data will tell the plant to be.
+
+    Data are judged at their estimate: some are drawn of the plants that bind.
+
+    Args:
+        binding: places among those that are kept, the nominal plant being 0.
+    """
+    worst = [plants.batch.plants[done.kept[place - 1]] for place in binding if place > 0]
+    if done.problem.goal != "factor" or plants.at is None or not worst:
+        return {}
+    rng, samples, shares = np.random.default_rng(0), done.experiment.samples, list[float]()
+    try:
+        for plant in islice(cycle(worst), _ESTIMATES):
+            theta = estimate_from(done.design, samples, plant, rng)
+            told = None if theta is None else plants.at(theta)
+            if theta is None or told is None:
+                shares.append(np.inf)
+            else:
+                shares += [
+                    one.share for one in tried_on(done.design, samples, Batch(theta[None], (told,), 1))
+                ]
+    except IdesignError:  # no time is left, or what is asked cannot be asked of such a plant
+        return {}
+    highest = float(np.quantile(shares, _MOST_OF_THEM, method="higher"))
+    if not np.isfinite(highest):
+        return {}
+    return {"estimates": {"draws": len(shares), "confidence": _MOST_OF_THEM, "largest": highest}}
 
 
 def _table(units: Units, plants: Plants, numbers: Sequence[int], at_each: Sequence[Kept]) -> Table:
