@@ -51,7 +51,12 @@ QUESTIONS = (
         "What is the noise of the output?",
         '"standard deviation 0.2", "resolution 0.1" (of the sensor), or "rest FILE" (column y, u at rest)',
     ),
-    Question("drift", "Does the output drift by itself?", '"yes" or "no"', "no"),
+    Question(
+        "drift",
+        "Does the output drift by itself?",
+        '"yes", "no", or "not known": then a log tells, and without one it does not',
+        "not known",
+    ),
     Question(
         "loop",
         "Does the experiment run in open loop, or under a controller?",
