@@ -77,6 +77,8 @@ def wizard(
         draft = with_spectrum(draft, _result)
         write_text(output, draft.text)
     if not quiet:
+        for sentence in draft.told:
+            typer.echo(sentence)
         typer.echo(f"{output}: written; every line says why it stands there, and may be changed")
     if solve is None:
         solve = terminal and typer.confirm("Design the experiment now?", default=True)

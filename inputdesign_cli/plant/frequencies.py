@@ -13,6 +13,9 @@ from inputdesign_cli.plant.polynomial import Array, ComplexArray
 _REFINEMENT = 6
 # Points and steps that narrow a bracket ten thousandfold: few peaks cost their steps, many their points.
 _ZOOM_FEW, _ZOOM_MANY, _FEW = (40, 3), (8, 6), 64
+# Beside a kink the value falls in proportion to the width: narrowed on until it falls by no more than this
+# share of it, or so many times in all.
+_KINK, _MOST_ZOOMS = 1e-9, 16
 SLACK = 0.05
 """A peak between two grid points may stand this much higher than both, as a share of itself."""
 # Values that differ by less are those of a function that is flat there.
@@ -109,13 +112,18 @@ def local_maxima(
     best, best_value = finer[index], values[index]
     points, repeats = _ZOOM_FEW if index.size <= _FEW else _ZOOM_MANY
     steps, rows = _fractions(points), np.arange(index.size)
-    for _ in range(repeats):
+    for zoom in range(_MOST_ZOOMS):
         samples = left[:, None] + (right - left)[:, None] * steps
         found = function(samples.ravel()).reshape(samples.shape)
         top = np.argmax(found, axis=1)
         better = found[rows, top] > best_value
         best = np.where(better, samples[rows, top], best)
         best_value = np.where(better, found[rows, top], best_value)
+        inside_grid = (grid[0] < best) & (best < grid[-1])
+        lowest = np.minimum(found[rows, np.maximum(top - 1, 0)], found[rows, np.minimum(top + 1, points - 1)])
+        kinked = inside_grid & (best_value - lowest > _KINK * np.abs(best_value))
+        if zoom + 1 >= repeats and not np.any(kinked):
+            break
         width = (right - left) / (points + 1)
         left, right = np.maximum(left, best - width), np.minimum(right, best + width)
     for end, inner in ((0, 1), (-1, -2)):

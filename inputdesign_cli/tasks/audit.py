@@ -38,8 +38,9 @@ _NODES_AT_ONCE = 1024
 # spectrum itself varies faster.
 _STEPS = 4
 _FAST = 200
-# The highest peaks on the grid are looked at more closely, so many points at a time.
-_PEAKS, _ZOOMS, _INSIDE = 8, 3, 17
+# The highest peaks on the grid are looked at more closely, so many points at a time. Where r_adm of a plant
+# passes that of its floor they have kinks, at which what is missed is in proportion to the last step.
+_PEAKS, _ZOOMS, _INSIDE = 8, 8, 17
 _KNOWN = ("white", "fir", "polynomial")
 _TABLES = {"chebyshev": chebyshev.chebvander, "monomial": polynomial.polyvander}
 

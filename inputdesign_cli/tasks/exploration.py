@@ -36,6 +36,7 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_curves,
     validation_entry,
 )
+from inputdesign_cli.tasks.result.refutations import refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
 from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
@@ -49,10 +50,11 @@ _KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residua
 
 @dataclass(frozen=True)
 class Exploration:
-    """The results, and why no model deserves trust; nothing where one does."""
+    """The results, why no model deserves trust (nothing where one does), and what tests say against it."""
 
     results: Results
     reasons: tuple[str, ...] = ()
+    against: tuple[str, ...] = ()
 
 
 def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
@@ -100,7 +102,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         curves={**results.curves, **structure_curves(found)},
         files=files,
     )
-    return Exploration(_without_model(complete, task.header.units, log, found), reasons)
+    against = tuple(refutations(found.model, found.estimate))
+    return Exploration(_without_model(complete, task.header.units, log, found), reasons, against)
 
 
 def _without_model(explored: Results, units: Units, log: Log, found: Found) -> Results:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.wizard.faults import in_their_words
+from inputdesign_cli.wizard.log_noise import log_noise_lines
 from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
 from inputdesign_cli.wizard.phrases import seconds, short, with_plain_numbers
 from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
@@ -29,6 +30,7 @@ class Draft:
         spectrum: as in a spec; None where the accuracy tells it.
         said: the answers.
         there: seconds that may be taken.
+        told: what is to be known of the plant that was understood, a sentence each.
         why: the comment on the spectrum.
     """
 
@@ -39,6 +41,7 @@ class Draft:
     folder: Path
     said: Mapping[str, str]
     there: float
+    told: tuple[str, ...] = ()
     why: str = "filtered noise"
 
     @property
@@ -111,10 +114,12 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         "time_unit: s",
         *plant.lines,
     ]
-    if plant.lines[0].startswith("plant:"):
+    if plant.explored is None:
         heads += noise_lines(said["noise"], said["drift"], folder)
     else:
-        heads[2:4] = []
+        heads[2:4] = []  # the included file has them
+        heads += [f"# against this model: {one}" for one in plant.against]
+        heads += log_noise_lines(plant.explored, plant.source, said["noise"], said["drift"], folder)
     heads += _uncertain(plant, nonparametric)
     if controller is not None:
         heads += ["experiment:", f"  controller: {controller}  # u = r - C y; r is designed"]
@@ -122,10 +127,11 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     heads += limit_lines(span, said["limits"], duration, step)
     if duration < there:
         heads[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
+    notes = tuple(f"against the model of {plant.source}: {one}" for one in plant.against)
     tails = signal_lines(said["signals"], said["converter"], span, said["limits"])
     if nonparametric:
-        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said, there)
-    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said, there)
+        return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said, there, notes)
+    return Draft(tuple(heads), tuple(tails), plant.files, _FIRST, folder, said, there, notes)
 
 
 def _why_step(plant: PlantAnswer) -> str:

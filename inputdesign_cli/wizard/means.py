@@ -16,6 +16,7 @@ from inputdesign_cli.wizard.wishes import pid
 
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
 _LEAST_BITS, _MOST_BITS = 2, 32
+DRIFTING = (1.0, -0.8)  # C of noise that drifts
 _WHITE = 3.0  # correlations above so many deviations of chance colour the noise
 
 
@@ -81,23 +82,46 @@ def noise_lines(text: str, drift: str, folder: Path) -> list[str]:
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    if drift.lower() not in ("yes", "no"):
-        raise bad_answer("drift", f'"{drift}" is neither yes nor no')
-    drifts = (
-        ["  drift: true  # an integrator in the noise", "  C: [1, -0.8]"] if drift.lower() == "yes" else []
-    )
+    size, colour, comment = noise_level(text, folder)
+    lines = ["noise:", f"  variance: {short(size)}  # {comment}"]
+    if drifts(drift):
+        return [*lines, "  drift: true  # an integrator in the noise", f"  C: {list(DRIFTING)}"]
+    return [*lines, f"  D: [1, {short(-colour)}]  # {comment}"] if colour else lines
+
+
+def drifts(text: str, *, otherwise: bool = False) -> bool:
+    """Whether the noise has an integrator.
+
+    Args:
+        otherwise: where that is not known.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    known = {"yes": True, "no": False, "not known": otherwise}
+    if text.lower() not in known:
+        raise bad_answer("drift", f'"{text}" is neither yes nor no')
+    return known[text.lower()]
+
+
+def noise_level(text: str, folder: Path) -> tuple[float, float, str]:
+    """The variance of white noise, or of what a pole (0 where there is none) colours, and how it is known.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
     word, _, name = text.partition(" ")
     if word.lower() == "rest":
         level, colour, comment = _at_rest(folder / name.strip())
-        extra = drifts or ([f"  D: [1, {short(-colour)}]  # {comment}"] if colour else [])
-        return ["noise:", f"  variance: {short(level)}  # of {name.strip()}: {comment}", *extra]
+        return level, colour, f"of {name.strip()}: {comment}"
     deviation, step = after(text, "standard deviation|deviation|std"), after(text, "resolution")
     if deviation is not None:
         size = needed(deviation, "noise", "the standard deviation")
-        return ["noise:", f"  variance: {short(size**2)}  # standard deviation {short(size)}", *drifts]
+        return size**2, 0.0, f"standard deviation {short(size)}"
     size = needed(step, "noise", "a standard deviation or a resolution")
     told = f"rounding to {short(size)} has a variance of its square over 12: the least that noise can be"
-    return ["noise:", f"  variance: {short(size**2 / 12.0)}  # {told}", *drifts]
+    return size**2 / 12.0, 0.0, told
 
 
 def _at_rest(path: Path) -> tuple[float, float, str]:

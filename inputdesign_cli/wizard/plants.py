@@ -19,6 +19,7 @@ from inputdesign_cli.wizard.questions import bad_answer
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 _LEAST_ROWS = 10  # of a step response
+_NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
 
 
@@ -37,6 +38,9 @@ class PlantAnswer:
         sampling: seconds between samples, where that is known already.
         tunable: whether rules of tuning know it.
         channels: the larger number of its inputs and outputs.
+        explored: the model of a log, whose noise is told in the spec.
+        source: the name of that log.
+        against: what the log says against that model, a sentence each.
     """
 
     lines: tuple[str, ...]
@@ -50,6 +54,9 @@ class PlantAnswer:
     sampling: float | None = None
     tunable: bool = False
     channels: int = 1
+    explored: Spec | None = None
+    source: str = ""
+    against: tuple[str, ...] = ()
 
     @property
     def sample_time(self) -> float:
@@ -226,21 +233,25 @@ def _explored(path: Path, stem: str) -> PlantAnswer:
     spec = parse_spec(model.decode(), name, design=False)
     step, plant = spec.sample_time, spec.plant
     assert plant.kind != "regression"
-    lines = (f"include: [{name}]  # plant and noise, explored in {path.name}",)
-    channels = max(plant.inputs, plant.outputs)
+    lines = (f"include: [{name}]  # the plant, explored in {path.name}",)
+    channels, against = max(plant.inputs, plant.outputs), found.against
     tunable = _is_process(spec)
     if not tunable and channels == 1 and (first := _first_order(path, spec)) is not None:
         lines = (f"include: [{name}]  # {path.name}: a gain, a lag and a dead time explain it, too",)
-        model, tunable = first, True
+        model, tunable, against = first, True, ()
+        spec = parse_spec(model.decode(), name, design=False)
     return PlantAnswer(
         lines,
         20.0 * step,
         0.0,
-        files={name: model},
+        files={name: _NOISE_BLOCK.sub("", model.decode()).encode()},  # that stands in the spec
         covariance=name if channels == 1 else None,
         sampling=step,
         tunable=tunable,
         channels=channels,
+        explored=spec,
+        source=path.name,
+        against=against,
     )
 
 

@@ -51,7 +51,12 @@ QUESTIONS = (
         "What is the noise of the output?",
         '"standard deviation 0.2", "resolution 0.1" (of the sensor), or "rest FILE" (column y, u at rest)',
     ),
-    Question("drift", "Does the output drift by itself?", '"yes" or "no"', "no"),
+    Question(
+        "drift",
+        "Does the output drift by itself?",
+        '"yes", "no", or "not known": then a log tells, and without one it does not',
+        "not known",
+    ),
     Question(
         "loop",
         "Does the experiment run in open loop, or under a controller?",
@@ -71,10 +76,13 @@ def question(key: str) -> Question:
     return next(one for one in QUESTIONS if one.key == key)
 
 
+AS_LOG = "as the log"
+
+
 def told_by_plant(answers: Mapping[str, str]) -> dict[str, str]:
     """What needs no answer since the plant tells it: of a log what the noise is, and whether it drifts."""
     explored = answers.get("plant", "").strip().lower().startswith("log ")
-    return dict.fromkeys(("noise", "drift"), "as the log") if explored else {}
+    return {"noise": AS_LOG, "drift": "not known"} if explored else {}
 
 
 def bad_answer(key: str, why: str) -> SpecError:
@@ -120,7 +128,7 @@ def complete(answers: Mapping[str, str]) -> dict[str, str]:
     """
     found, told = {}, told_by_plant(answers)
     for one in QUESTIONS:
-        text = told.get(one.key, answers.get(one.key, one.default))
+        text = answers.get(one.key, told.get(one.key, one.default))
         if text is None or not text.strip():
             raise bad_answer(one.key, "there is no answer")
         found[one.key] = text.strip()

@@ -99,3 +99,15 @@ def test_roots_without_delays(coefficients, roots):
     found = roots_in_z(coefficients)
     np.testing.assert_allclose(np.sort(found.real), roots, rtol=1e-12)
     np.testing.assert_array_equal(found.imag, 0.0)
+
+
+def test_a_steep_kink_is_found_as_exactly_as_a_smooth_maximum():
+    # Where r_adm is all but used up, the error in units of it has kinks as steep as this one.
+    place = 0.245528
+
+    def function(w):
+        return 1.0 / (1e-4 + np.abs(w - place))
+
+    grid = graded_grid([], 0.0, np.pi)
+    _, values = local_maxima(function, grid, function(grid))
+    assert np.max(values) == pytest.approx(1e4, rel=1e-8)

@@ -10,6 +10,7 @@ from inputdesign_cli import parse_spec, tasks
 from inputdesign_cli.errors import DataError, SpecError
 from inputdesign_cli.tasks.build.system import build_model
 from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.log_noise import log_noise_lines
 from inputdesign_cli.wizard.plants import TEMPLATES
 from inputdesign_cli.wizard.questions import QUESTIONS, read_answers
 from inputdesign_cli.wizard.solving import lasting, verdict
@@ -279,3 +280,54 @@ def test_a_margin_that_is_kept_is_said():
     peak = 10.0 ** (6.0 / 20.0)
     assert f"a gain margin of {peak / (peak - 1.0):.3g}" in said
     assert f"a phase margin of {np.degrees(2.0 * np.arcsin(0.5 / peak)):.3g} degrees" in said
+
+
+def _log(folder, samples=1200, *, beside=0.0):
+    """The first-order plant above at rest in 60 and 40, with white noise of 0.3 on the output."""
+    rng = np.random.default_rng(5)
+    u, y = np.repeat(rng.choice([-5.0, 5.0], samples // 20), 20), np.zeros(samples)
+    time, a = 5.0 * np.arange(samples), np.exp(-5.0 / 180.0)
+    for t in range(6, samples):
+        y[t] = a * y[t - 1] + 2.0 * (1.0 - a) * u[t - 6]
+    y += 0.3 * rng.standard_normal(samples) + beside * np.sin(time / 200.0)
+    np.savetxt(
+        folder / "log.csv", np.c_[time, u + 40.0, y + 60.0], "%.6g", ",", header="time,u,y", comments=""
+    )
+
+
+@pytest.mark.parametrize(("drift", "drifts"), [("yes", True), ("no", False), ("not known", False)])
+def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
+    _log(tmp_path)
+    answers = {**ENGINEER, "plant": "log log.csv", "noise": "standard deviation 0.2", "drift": drift}
+    draft = compose(answers, "x", tmp_path)
+    draft.validate()
+    noise = draft.spec().noise
+    assert (noise.variance, noise.drift) == (0.04, drifts)
+    assert "the log tells a variance of 0.08" in draft.text
+
+
+def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
+    _log(tmp_path)
+    answers = {**ENGINEER, "plant": "log log.csv", "noise": "resolution 0.1"}
+    draft = compose(answers, "x", tmp_path)
+    draft.validate()
+    assert draft.spec().noise.variance == pytest.approx(0.09, rel=0.1)
+
+
+def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
+    _log(tmp_path, 300, beside=4.0)
+    wish = "prediction within 5 % up to 0.1"
+    draft = compose({**ENGINEER, "plant": "log log.csv", "wish": wish}, "x", tmp_path)
+    draft.validate()
+    assert any("residuals" in one for one in draft.told)
+    for one in draft.told:
+        assert f"# against this model: {one.partition(': ')[2]}\n" in draft.text
+
+
+def test_noise_is_that_of_the_output_also_where_the_log_has_it_behind_a_lag():
+    """Noise e C / A of A = 1 - 0.7 q^-1 is white where C is A, whatever the order in the log."""
+    explored = parse_spec(
+        "sample_time: 5\nplant: {A: [1, -0.7], B: [0, 1]}\nnoise: {variance: 1}\n", design=False
+    )
+    lines = log_noise_lines(explored, "log.csv", "standard deviation 0.2", "no", Path())
+    assert lines[-1] == "  C: [1.0, -0.7]"

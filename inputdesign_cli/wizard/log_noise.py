@@ -1,0 +1,88 @@
+"""The noise of a plant that was explored in a log: what the user says of it holds, the log tells the rest."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.runs.results import Json
+from inputdesign_cli.specification import Noise, Spec
+from inputdesign_cli.wizard.means import DRIFTING, drifts, noise_level
+from inputdesign_cli.wizard.phrases import after, short
+from inputdesign_cli.wizard.questions import AS_LOG
+
+
+def log_noise_lines(explored: Spec, source: str, text: str, drift: str, folder: Path) -> list[str]:
+    """The lines of `noise` from the answers, and from the model of a log where they leave it open.
+
+    The size is the one that is stated; a resolution is the least that noise can be, and the log may tell
+    more. Where no drift is stated, the log says whether there is one.
+
+    Args:
+        explored: the model of the log.
+        source: the name of the log.
+        text, drift: the answers.
+
+    Raises:
+        SpecError: `bad-answer`.
+        DataError: a file cannot be used.
+    """
+    told = explored.noise
+    found = np.atleast_1d(np.asarray(told.variance, dtype=float))
+    powers = np.diag(found) if found.ndim == 2 else found
+    moves = bool(np.any(told.drift))
+    if text == AS_LOG and drifts(drift, otherwise=moves) == moves:
+        return _as_told(told, source)
+    size, colour, comment = _level(text, folder, powers)
+    variance: Json = float(f"{size:.6g}")
+    if after(text, "resolution") is not None and np.max(powers) > size:
+        variance, comment = np.asarray(told.variance).tolist(), f"of {source}: more than rounding leaves"
+    wanted = drifts(drift, otherwise=moves)
+    listed = ", ".join(map(short, powers.tolist()))
+    has = f"the log tells a variance of {listed}, {'and drift' if moves else 'and no drift'}"
+    lines = [f"noise:  # as you said; {has}", f"  variance: {json.dumps(variance)}  # {comment}"]
+    if wanted and moves:  # with the colour that was estimated along
+        return [*lines, f"  drift: {json.dumps(told.drift)}  # an integrator in the noise", *_colour(told)]
+    base = DRIFTING if wanted else (1.0,)
+    lines += ["  drift: true  # an integrator in the noise"] if wanted else []
+    lines += [] if wanted or not colour else [f"  D: [1, {short(-colour)}]"]
+    shaped = _times(base, getattr(explored.plant, "A", None) or (1.0,))
+    return [*lines, f"  C: {json.dumps(shaped)}"] if shaped != [1.0] else lines
+
+
+def _as_told(told: Noise, source: str) -> list[str]:
+    """All of the noise of the model."""
+    lines = [f"noise:  # as {source} tells", f"  variance: {json.dumps(np.asarray(told.variance).tolist())}"]
+    lines += (
+        [f"  drift: {json.dumps(told.drift)}  # an integrator in the noise"] if np.any(told.drift) else []
+    )
+    return [*lines, *_colour(told)]
+
+
+def _level(text: str, folder: Path, powers: NDArray[np.float64]) -> tuple[float, float, str]:
+    """See `noise_level`; the largest variance of the log where that is to tell it."""
+    if text == AS_LOG:
+        return float(np.max(powers)), 0.0, "the variance that the log tells"
+    return noise_level(text, folder)
+
+
+def _colour(told: Noise) -> list[str]:
+    """C and D, where they are not 1."""
+    return [
+        f"  {name}: {json.dumps(rows)}" for name, rows in (("C", told.C), ("D", told.D)) if rows != (1.0,)
+    ]
+
+
+def _flat(polynomials: Sequence[Json]) -> bool:
+    return not isinstance(polynomials[0], Sequence)
+
+
+def _times(base: Sequence[float], A: Sequence[Json]) -> Json:
+    """C that makes the noise of y that of `base`, whatever the A (1/A stands before it)."""
+    if _flat(A):
+        return np.convolve(base, A).tolist()
+    return [np.convolve(base, row).tolist() for row in A]
