@@ -126,8 +126,11 @@ def replace_text(path: Path, text: str | Iterable[str]) -> None:
             partial.unlink(missing_ok=True)
 
 
-def read_run(directory: Path) -> dict[str, Json]:
+def read_run(directory: Path, *, remedy: str = "run the spec again") -> dict[str, Json]:
     """The content of `result.json` of a whole run.
+
+    Args:
+        remedy: what is said of a file that is gone.
 
     Raises:
         DataError: `run-missing` (no such directory, or no run in it), `run-incomplete` (one of its files is
@@ -139,7 +142,7 @@ def read_run(directory: Path) -> dict[str, Json]:
     missing = [name for name in result.get("files", ()) if not (directory / name).is_file()]
     if missing:
         message = f"{directory} lacks {', '.join(missing)}, which its {RESULT} lists"
-        raise DataError.because("run-incomplete", message, hint="run the spec again")
+        raise DataError.because("run-incomplete", message, remedy)
     return result
 
 
