@@ -1,4 +1,4 @@
-"""What an earlier call left is looked at before it is relied on, and another sweep does not take its place."""
+"""What an earlier call left is looked at before it is relied on; another sweep does not take its place."""
 
 import json
 import shutil
