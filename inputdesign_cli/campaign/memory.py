@@ -5,7 +5,7 @@
     plan_01.csv, ..        what was to be applied in every part
     record_01.csv, ..      what was recorded; record_01_as_given.csv is the file of the user
     model_01.yaml, ..      the estimate after so many records
-    result.json            under `campaign` all decisions
+    result.json            under `campaign` all decisions, and digests of the plans and records
 
 A decision replaces the directory as a run replaces another: whatever kills the writer, it holds the state
 before or after.
@@ -14,6 +14,7 @@ before or after.
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -52,6 +53,8 @@ _HINTS = {
     "run-unreadable": _FROM_A_COPY,
 }
 _KEPT = re.compile(r"(plan|record|model)_\d\d+(_as_given)?\.[a-z0-9]+")
+# Of these, what decisions are made by.
+_READ = re.compile(r"(plan|record)_\d\d+\.csv")
 
 
 @dataclass(frozen=True)
@@ -96,15 +99,25 @@ class Memory:
         return self.directory / self.campaign["folder"]
 
 
-def read_memory(directory: Path) -> Memory:
+def digests(files: Mapping[str, bytes]) -> dict[str, str]:
+    """SHA-256 of each file that decisions are made by."""
+    return {
+        name: hashlib.sha256(content).hexdigest() for name, content in files.items() if _READ.fullmatch(name)
+    }
+
+
+def read_memory(directory: Path, *, withdrawing: int | None = None) -> Memory:
     """What the directory remembers.
+
+    Args:
+        withdrawing: the number of a record that is about to be left out, whatever has become of it.
 
     Raises:
         DataError: `run-missing`, `run-incomplete`, `run-unreadable`; `campaign-missing`, it holds something
-            else; `campaign-version`.
+            else; `campaign-version`; `campaign-changed`, a plan or record is not as it was kept.
     """
     try:
-        return _read(directory)
+        return _read(directory, withdrawing)
     except DataError as error:
         # What a run may do, begin anew, would lose what has been recorded.
         raise DataError(
@@ -112,7 +125,7 @@ def read_memory(directory: Path) -> Memory:
         ) from error
 
 
-def _read(directory: Path) -> Memory:
+def _read(directory: Path, withdrawing: int | None) -> Memory:
     result = read_run(directory)
     campaign = result.get("campaign")
     if not isinstance(campaign, dict) or "records" not in campaign:
@@ -138,10 +151,36 @@ def _read(directory: Path) -> Memory:
         kept = [name for name in names if isinstance(name, str) and _KEPT.fullmatch(name)]
         files = {name: read_regular(directory / name) for name in kept}
         spec = read_regular(directory / SPEC).decode("utf-8")
+    _check_kept(directory, found, files, withdrawing)
     if not found.fits(files):
         raise unreadable(directory / RESULT, "its campaign does not fit the plans and records beside it")
     origin = tuple(map(str, result.get("made_from", ())))
     return Memory(directory, campaign, spec, str(campaign["time_unit"]), origin, files)
+
+
+def _check_kept(
+    directory: Path, found: _Campaign, files: Mapping[str, bytes], withdrawing: int | None
+) -> None:
+    """Raise `DataError` (`campaign-changed`) for plans and records that are not as they were kept.
+
+    Those that are left out may be anything, and directories of before digests were kept have none to compare.
+    """
+    numbers = {record.file: n for n, record in enumerate(found.records, 1)}
+    out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
+    for name, digest in digests(files).items():
+        if name in out or found.digests.get(name, digest) == digest:
+            continue
+        message = f"{directory / name} is not what the campaign kept under this name: it was changed since"
+        hint = "put it back as it was"
+        if name in numbers:
+            given = next((n for n in files if n.startswith(f"{name[:-4]}_as_given.")), "your own file")
+            hint += (
+                f", or go on without it: `idesign next {directory} --withdraw {numbers[name]}` "
+                f"(what you gave is in {given})"
+            )
+        elif name == getattr(found.rounds[-1].plan, "file", None):
+            hint += ": signal.csv beside it holds the same samples"
+        raise DataError.because("campaign-changed", message, hint)
 
 
 class _Kept(BaseModel):
@@ -180,6 +219,7 @@ class _Campaign(_Kept):
     rounds: list[_Round] = Field(min_length=1)
     last: dict[str, FiniteFloat] | None = None
     first_cost: PositiveFloat | None = Field(default=None, allow_inf_nan=False)
+    digests: dict[str, str] = {}
 
     def fits(self, files: Mapping[str, bytes]) -> bool:
         """Whether all files are there that it speaks of, plans as long as what was applied of them."""

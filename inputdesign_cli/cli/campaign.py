@@ -103,7 +103,7 @@ def proceed(
 
     with held(directory):
         with computing(directory, quiet=quiet):
-            memory = read_memory(directory)
+            memory = read_memory(directory, withdrawing=withdraw)
             stated = parse_spec(memory.spec, str(directory / SPEC), folder=memory.folder)
             decide = partial(tasks.next_round, stated)
             if withdraw is not None:

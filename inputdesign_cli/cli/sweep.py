@@ -39,6 +39,12 @@ def sweep(
     ] = False,
     confine: Confine = None,
     output: SweepOutput = None,
+    overwrite: Annotated[
+        bool,
+        typer.Option(
+            "--overwrite", help="Replace the table of a sweep of another spec, other keys or another command."
+        ),
+    ] = False,
     verb: Annotated[
         str, one_of(("solve", "analyse", "simulate"), "The command to run at every point")
     ] = "solve",
@@ -98,6 +104,7 @@ def sweep(
             fail_fast=fail_fast,
             rerun_failed=rerun_failed,
             figures=plots,
+            overwrite=overwrite,
             watch=line,
         )
     except (KeyboardInterrupt, SystemExit):  # Ctrl-C, SIGTERM
@@ -107,6 +114,8 @@ def sweep(
         raise
     finally:
         line.close()
+    for why in () if quiet else done.damaged:
+        typer.echo(f"note: {why}; the point was computed again", err=True)
     if json_output:
         typer.echo((directory / "sweep.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:

@@ -26,12 +26,14 @@ class SilentLines:
         over_noise: (p,) mean of the power there over that of the noise; about one for noise alone.
         probability: (p,) that noise alone has as much, by an F test over all lines.
         rms: (p,) of what is beyond the noise.
+        beyond: (lines, p) mean squares of the transforms that are beyond the noise, over neighbouring lines.
     """
 
     lines: int
     over_noise: Array
     probability: Array
     rms: Array
+    beyond: NDArray[np.float64]
 
 
 def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> SilentLines | None:
@@ -52,12 +54,16 @@ def silent_lines(Y: ComplexArray, shape: NDArray[np.float64] | None = None) -> S
     # Over the shape of the noise all lines count alike.
     ratio = np.sum(level / even, axis=0) / np.sum(noise / even, axis=0)
     freedom = 2 * blocks * lines
-    beyond = np.maximum(np.sum(level - noise, axis=0), 0.0)
+    # Where strong noise at some lines hides the sum, what is beyond it is taken to have its shape.
+    like_noise = (ratio - 1.0) * np.mean(noise / even, axis=0) * np.sum(even, axis=0)
+    plain = np.sum(level - noise, axis=0)
+    beyond = np.where(plain > 0.0, plain, np.maximum(like_noise, 0.0))
     return SilentLines(
         lines,
         np.asarray(ratio),
         np.asarray(scipy.special.fdtrc(freedom, freedom * (periods - 1), ratio)),
         np.sqrt(2.0 * beyond / periods),
+        np.maximum(_smoothed(level - noise), 0.0) / periods,
     )
 
 

@@ -95,6 +95,7 @@ _UNDECIDED = {
     "unasked": "what is asked cannot be asked of this estimate",
     "undetermined": "the data do not determine the model: other parameters explain them nearly as well",
     "chance": "chance may stand behind what was measured",
+    "nonlinearity": "the plant is not linear enough for what is asked",
 }
 
 _RIGHT = " if the structure of the model is right"

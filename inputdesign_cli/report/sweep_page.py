@@ -24,6 +24,7 @@ from inputdesign_cli.report.sources import citations
 from inputdesign_cli.runs.objectives import OBJECTIVES, objective
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import read_run
+from inputdesign_cli.sweep.kept import run_flaw
 
 MOST_ROWS = 200
 _SHOWN = (
@@ -36,8 +37,13 @@ _SHOWN = (
 
 
 def sweep_page(root: Path, trail: Trail) -> dict[str, Json]:
-    """The content of the template for a sweep. Raises `DataError` as `read_sweep` does."""
+    """The content of the template for a sweep.
+
+    Raises:
+        DataError: as `read_sweep`; `run-unreadable`, what is there of a point does not hold.
+    """
     table = read_sweep(root)
+    _check_points(table, root)
     summary = trail.follow(table.summary)
     columns = [(name, title) for name, title in _columns(table) if any(table.columns.get(name, []))]
     names = [*table.axes, *(name for name, _ in columns)]
@@ -67,6 +73,15 @@ def sweep_page(root: Path, trail: Trail) -> dict[str, Json]:
         "provenance": provenance(summary.get("environment", {})),
         "citations": citations(question, result) if question else [],
     }
+
+
+def _check_points(table: SweepTable, root: Path) -> None:
+    """Runs that were moved away are not missed, but one that is there is to be what the table was made of."""
+    for run in filter(None, table.columns["run"]):
+        why = run_flaw(root / run) if (root / run).is_dir() else ""
+        if why:
+            hint = "give the command of the sweep again: it computes this point anew"
+            raise DataError.because("run-unreadable", why, hint)
 
 
 def _columns(table: SweepTable) -> list[tuple[str, str]]:

@@ -72,6 +72,17 @@ class Layout:
                 return content
         return None
 
+    def discard(self, key: str) -> None:
+        """Remove what is there of a point, its run in one step, so that it is computed again."""
+        run = self.run(key)
+        with output_errors(run):
+            if run.exists():
+                partial = run.parent / f".{key}.partial-{os.getpid()}"
+                shutil.rmtree(partial, ignore_errors=True)
+                run.rename(partial)
+                shutil.rmtree(partial, ignore_errors=True)
+            self.failure(key).unlink(missing_ok=True)
+
     def write_failure(self, key: str, text: str) -> None:
         """Note why a point has no result, in one step."""
         path = self.failure(key)

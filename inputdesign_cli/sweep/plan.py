@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
 from inputdesign_cli.errors import SpecError, bad_spec
+from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import SpecTemplate, read_template
 from inputdesign_cli.sweep.grid import Grid, build_grid, parse_settings
 from inputdesign_cli.sweep.point import PointJob
@@ -54,6 +55,13 @@ class Plan:
                 files = {name: (self.draft.folder / name).read_bytes() for name in names}
         return PointJob(index, self.key(index), self.draft, overrides, self.verb, figures, root, files)
 
+    def resolved(self, index: int) -> str | None:
+        """The `spec.yaml` of a point; None where it is no valid spec."""
+        try:
+            return self.draft.spec(self.grid.overrides(self.grid[index])).to_yaml()
+        except SpecError:
+            return None
+
     def check(self) -> None:
         """Refuse a sweep that is wrong as a whole (a misspelt key), rather than fail its every point.
 
@@ -73,8 +81,12 @@ class Plan:
 
     def data(self) -> dict[str, object]:
         """The spec with the grid as its `sweep` block: it repeats the sweep without any settings."""
-        content = {key: value for key, value in self.draft.data.items() if key != "sweep"}
-        return {**content, "sweep": self.grid.block()}
+        return {**without_sweep(self.draft.data), "sweep": self.grid.block()}
+
+
+def without_sweep(data: Mapping[str, Json]) -> dict[str, Json]:
+    """The content of a spec but for what it says of a sweep."""
+    return {key: value for key, value in data.items() if key != "sweep"}
 
 
 def build_plan(

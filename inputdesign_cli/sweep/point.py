@@ -27,6 +27,8 @@ from inputdesign_cli.sweep.verbs import Verb, run_verb
 
 STATUS = {EXIT_BAD_INPUT: "invalid", EXIT_INFEASIBLE: "infeasible", EXIT_INACCURATE: "inaccurate"}
 LOST, BROKEN = "lost", "error"
+FAILURES = frozenset({*STATUS.values(), LOST, BROKEN})
+"""The statuses of points that were tried and have no result."""
 
 # So far below the temporary folder stand the data files, so that a name such as ../tables/r.csv stays in it.
 _DEPTH = ["data"] * 8

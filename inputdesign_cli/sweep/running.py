@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +13,7 @@ from typing import NamedTuple
 
 from inputdesign_cli.compute.executor import Executor, Finished, InProcess, WorkerLostError
 from inputdesign_cli.errors import (
+    STANDARD_INPUT,
     DataError,
     Diagnostic,
     IdesignError,
@@ -20,17 +22,20 @@ from inputdesign_cli.errors import (
     OutputError,
     SpecError,
 )
+from inputdesign_cli.runs.origin import Origin
 from inputdesign_cli.runs.provenance import environment
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import output_errors, replace_text
 from inputdesign_cli.runs.text_formats import json_text
 from inputdesign_cli.specification.yaml.writer import to_yaml
+from inputdesign_cli.sweep.earlier import check_same_sweep
+from inputdesign_cli.sweep.kept import flaw
 from inputdesign_cli.sweep.layout import SPEC, SUMMARY, TABLE, Layout, opened
 from inputdesign_cli.sweep.plan import Plan, build_plan
 from inputdesign_cli.sweep.point import (
     BROKEN,
+    FAILURES,
     LOST,
-    STATUS,
     PointEnd,
     PointJob,
     failed,
@@ -40,7 +45,8 @@ from inputdesign_cli.sweep.point import (
 from inputdesign_cli.sweep.table import PENDING, table_lines
 from inputdesign_cli.sweep.verbs import Verb
 
-FAILURES = frozenset({*STATUS.values(), LOST, BROKEN})
+DAMAGED = "damaged"
+"""Of a listed point: what is there of it does not hold, so that it is computed again."""
 _ERRORS: dict[str, type[IdesignError]] = {
     "infeasible": InfeasibleError,
     "inaccurate": InaccurateError,
@@ -71,7 +77,10 @@ class Progress:
 
 @dataclass(frozen=True)
 class SweepSummary:
-    """What a sweep has come to: how many points have which status, and the first failure, if any."""
+    """What a sweep has come to: how many points have which status, and the first failure, if any.
+
+    `damaged` tells of points that were computed again what was wrong with what an earlier call left.
+    """
 
     directory: Path
     total: int
@@ -79,6 +88,7 @@ class SweepSummary:
     statuses: dict[str, int]
     first_failure: IdesignError | None
     files: list[Path] = field(default_factory=list)
+    damaged: list[str] = field(default_factory=list)
 
     @property
     def failures(self) -> int:
@@ -102,6 +112,7 @@ def list_points(
     for index, point in enumerate(plan.grid):
         key = plan.key(index)
         status = "done" if layout.has_result(key) else "failed" if layout.has_failure(key) else PENDING
+        status = DAMAGED if flaw(layout, key, plan.resolved(index)) else status
         names = (axis.key for axis in plan.grid.axes)
         yield Listing(dict(zip(names, point, strict=True)), key, status)
 
@@ -119,6 +130,7 @@ def sweep(
     fail_fast: bool = False,
     rerun_failed: bool = False,
     figures: bool = False,
+    overwrite: bool = False,
     watch: Callable[[Progress], None] | None = None,
 ) -> SweepSummary:
     """Run a verb at every point of a grid, but for the points that are done already.
@@ -131,6 +143,7 @@ def sweep(
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
         figures: draw the figures of every point too.
+        overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
         watch: is told after every point how far the sweep is.
 
     Raises:
@@ -139,20 +152,25 @@ def sweep(
     """
     plan = build_plan(spec, settings, zipped=zipped, verb=verb, confine=confine, text=text)
     with opened(directory) as layout:
+        source = Path(STANDARD_INPUT) if text is not None else spec
+        made_from = Origin([source]).seen_from(Path(os.path.realpath(directory)))
+        if not overwrite:
+            check_same_sweep(plan, made_from, directory)
         layout.remove_page()
+        _write_summary(plan, layout, made_from, {})
         replace_text(layout.root / SPEC, to_yaml(plan.data()))
-        _write_summary(plan, layout, {})
         run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, figures, watch)
         try:
             run.compute()
         finally:
             statuses = run.write_table()
-            _write_summary(plan, layout, statuses)
+            _write_summary(plan, layout, made_from, statuses)
         if fail_fast and run.first_failure:
             raise run.first_failure
         files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
         files += _draw(directory)
-        return SweepSummary(directory, len(plan.grid), run.computed, statuses, run.first_failure, files)
+        found = (run.computed, statuses, run.first_failure, files, run.damaged)
+        return SweepSummary(directory, len(plan.grid), *found)
 
 
 @dataclass
@@ -169,6 +187,8 @@ class _Run:
     failed: int = 0
     stopped: bool = False
     lost: dict[str, dict[str, Json]] = field(default_factory=dict)
+    damaged: list[str] = field(default_factory=list)
+    seen: set[str] = field(default_factory=set)  # keys of which nothing is left that was not looked at
     first_failure: IdesignError | None = None
 
     def compute(self) -> None:
@@ -193,7 +213,7 @@ class _Run:
         statuses: Counter[str] = Counter()
 
         def read(key: str) -> dict[str, Json] | None:
-            content = self.layout.read(key) or self.lost.get(key)
+            content = self._read(key) or self.lost.get(key)
             statuses[content.get("status", "done") if content else PENDING] += 1
             return content
 
@@ -201,23 +221,35 @@ class _Run:
         # The table reads every point twice.
         return {status: n // 2 for status, n in sorted(statuses.items())}
 
+    def _read(self, key: str) -> dict[str, Json] | None:
+        """What is there of a point, unless it does not hold."""
+        damaged = key not in self.seen and flaw(self.layout, key)
+        return None if damaged else self.layout.read(key)
+
     def _jobs(self) -> Iterator[PointJob]:
-        seen: set[str] = set()
         here = self.executor.shares_files
         root = self.layout.root if here else Path()
         for index in range(len(self.plan.grid)):
             if self.stopped:
                 return
             key = self.plan.key(index)
-            known = self.layout.has_result(key) or key in seen
+            if key not in self.seen:
+                self._discard_damaged(index, key)
+            known = self.layout.has_result(key) or key in self.seen
             if not known and self.layout.has_failure(key) and not self.rerun_failed:
                 known = True
                 self._note_failure(index, self.layout.read(key) or {})
-            seen.add(key)
+            self.seen.add(key)
             if known:
                 self._tell()
             else:
                 yield self.plan.job(index, root, figures=self.figures, with_files=not here)
+
+    def _discard_damaged(self, index: int, key: str) -> None:
+        """What does not hold is no result: the point is computed again, and that is told."""
+        if why := flaw(self.layout, key, self.plan.resolved(index)):
+            self.damaged.append(why)
+            self.layout.discard(key)
 
     def _take(self, finished: Finished[PointJob, PointEnd]) -> None:
         """File what a worker has answered."""
@@ -268,12 +300,13 @@ def _draw(root: Path) -> list[Path]:
     return draw_sweep(read_sweep(root), root)
 
 
-def _write_summary(plan: Plan, layout: Layout, statuses: dict[str, int]) -> None:
+def _write_summary(plan: Plan, layout: Layout, made_from: Sequence[str], statuses: dict[str, int]) -> None:
     content = {
         "format": 1,
         "kind": "sweep",
         "title": str(plan.draft.data.get("title", "")),
         "verb": plan.verb,
+        "made_from": list(made_from),
         "axes": [{"key": axis.key, "values": list(axis.texts)} for axis in plan.grid.axes],
         "zip": plan.grid.zipped,
         "points": len(plan.grid),

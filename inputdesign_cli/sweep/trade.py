@@ -43,7 +43,8 @@ def run_trade(
         OutputError: see `sweep`.
     """
     settings = [*overrides, *trade_settings(spec, words)]
-    sweep(file, settings, directory=directory, confine=confine, executor=executor)
+    # The directory belongs to the run beside it, whatever was traded there before.
+    sweep(file, settings, directory=directory, confine=confine, executor=executor, overwrite=True)
     return read_trade(read_sweep(directory), spec)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.identification import frequency_response
+from inputdesign_cli.identification.distortion import response_error
 from inputdesign_cli.identification.frequency_response import of_periods
 from inputdesign_cli.identification.periodic_response import PeriodicResponse, Periods, periodic_response
 from inputdesign_cli.identification.silent_lines import SilentLines, silent_lines
@@ -25,6 +26,7 @@ from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.response import ResponseTask
 from inputdesign_cli.tasks.result.measured_response import Judged, measured_results
 from inputdesign_cli.tasks.result.responses import response_of_data
+from inputdesign_cli.tasks.result.silent_lines import distorted
 
 # Degrees of freedom (of complex numbers) over which the noise is averaged along the lines.
 _FREEDOM = 60
@@ -85,6 +87,10 @@ def measure(
         found = of_periods(by_lines, periods.period)
         judged = _judged(task, by_lines, data, periods, repeats)
         silent = _silent(task, data, periods, repeats)
+        if "odd" in silent:
+            kept = repeats * periods.kept(data.lengths[0])
+            error = response_error(by_lines, periods.period, kept, silent["odd"], task.grid.odd)
+            judged = replace(judged, distorted=distorted(silent, judged.lines.ratios(error)))
         data = replace(data, notes=(*data.notes, *_seen(data, periods, repeats)))
     shown = response_of_data(units, question.model, found, by_reference=data.r is not None and task is None)
     results = measured_results(

@@ -1,5 +1,7 @@
 """Frequency responses from data: how sure they are, whether they meet the spec, what silent lines say."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from inputdesign_cli.identification.periodic_response import periodic_response
 from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.build.response import build_measurement
 from inputdesign_cli.tasks.measured_response import _judged, _silent
+from inputdesign_cli.tasks.result.silent_lines import silent_notes
 
 TEXT = """
 plant: {B: [0, 0.4, 0.1], F: [1, -1.5, 0.8]}
@@ -179,3 +182,82 @@ def test_what_does_not_repeat_and_what_is_left_out_is_told(write):
     noise = np.random.default_rng(5).standard_normal(u.shape)
     other = identify(spec, write(table(noise, y)), frequency_response=True).result["notes"]
     assert any("they do not repeat as the spec says" in note for note in other)
+
+
+SHIPPED = (Path(__file__).parents[2] / "specs" / "frequency_response.yaml").read_text()
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    spec = parse_spec(SHIPPED)
+    question = build_measurement(spec)
+    u = 1.6 * solve(spec).signal
+    return question, u
+
+
+def recorded_noise(question, u, seed, size=0.1):
+    e = size * np.random.default_rng(seed).standard_normal((1, len(u), 1))
+    return question.model.simulate(np.zeros_like(u)[None], e, 1.0)[1][0]
+
+
+def through(question, u):
+    return question.model.simulate(u[None], np.zeros((1, len(u), 1)), 1.0)[0][0]
+
+
+def changed(question, u, answer):
+    """The largest change of the response at the lines without noise, over 5 % of its size."""
+    periods, lines = question.task.periods, question.task.grid.excited
+    curved, linear = (periods.means(y, lines)[:, 0, 0] for y in (answer, through(question, u)))
+    return float(np.max(np.abs(curved / linear - 1.0)) / 0.05)
+
+
+def cubic(share):
+    return lambda x: x + share * x**3 / np.var(x)
+
+
+def saturating(share):
+    return lambda x: np.tanh(share * x / np.std(x)) / share * np.std(x)
+
+
+def clipping(share):
+    return lambda x: np.clip(x, -share * np.abs(x).max(), share * np.abs(x).max())
+
+
+@pytest.mark.parametrize("where", ["input", "output"])
+@pytest.mark.parametrize(
+    "curve",
+    [cubic(0.02), cubic(-0.02), cubic(0.1), saturating(0.3), saturating(1.0), clipping(0.8), clipping(0.5)],
+)
+def test_a_response_that_a_nonlinearity_changes_is_never_called_met(write, shipped, where, curve):
+    question, u = shipped
+    answer = curve(through(question, u)) if where == "output" else through(question, curve(u))
+    assert changed(question, u, answer) > 1.0
+    for seed in range(4):
+        found = assess(parse_spec(SHIPPED), write(table(u, answer + recorded_noise(question, u, seed))))
+        assert found.verdict != "met"
+    if found.verdict == "undecided":
+        assert "nonlinearity" in found.results.result["assessment"]["causes"]
+        assert "smaller amplitude" in found.results.result["notes"][-1]
+
+
+def test_a_linear_plant_is_hardly_ever_doubted(shipped):
+    question, u = shipped
+    task, doubted, answer = question.task, 0, through(question, u)
+    for seed in range(100):
+        y = answer + recorded_noise(question, u, seed)
+        silent = _silent(task, data_of(u, y), task.periods, 1)
+        doubted += bool(silent_notes(silent))
+        assert all(np.all(lines.rms > 0.0) for lines in silent.values() if lines.probability.min() < 0.05)
+    assert doubted <= 4
+
+
+def test_a_nonlinearity_that_changes_little_is_told_and_met(write, shipped):
+    # As noise is a tenth of what the spec says, it is seen long before it matters.
+    question, u = shipped
+    answer = cubic(0.003)(through(question, u))
+    assert changed(question, u, answer) < 0.4
+    found = assess(parse_spec(SHIPPED), write(table(u, answer + recorded_noise(question, u, 1, size=0.01))))
+    assert found.verdict == "met"
+    odd = found.results.result["frequency_response"]["nonlinearity"]["odd"]
+    assert 0.3 * changed(question, u, answer) < odd["worst_ratio"] < 0.5
+    assert any("is small" in note for note in found.results.result["notes"])

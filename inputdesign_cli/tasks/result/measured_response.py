@@ -18,7 +18,7 @@ from inputdesign_cli.runs.results import Array, Json, Results, Table
 from inputdesign_cli.runs.units import Header
 from inputdesign_cli.signal.harmonic_grid import HarmonicGrid
 from inputdesign_cli.tasks.build.data import Data
-from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
+from inputdesign_cli.tasks.result.silent_lines import MATTERS, Distorted, silent_entry, silent_notes
 
 Verdict = Literal["met", "missed", "undecided"]
 
@@ -32,6 +32,7 @@ class Judged:
         ratios: (L,) of the latter over r_adm, the largest entry.
         least, largest: (L,), between which the true ratios lie, with 95 % all of them.
         counted: samples that count.
+        distorted: what a nonlinearity does to the response; None where none is seen, or none is watched for.
     """
 
     grid: HarmonicGrid
@@ -43,6 +44,12 @@ class Judged:
     least: Array
     largest: Array
     counted: int
+    distorted: Distorted | None = None
+
+    @property
+    def doubted(self) -> bool:
+        """Whether a nonlinearity may decide."""
+        return self.distorted is not None and self.distorted.matters
 
     @property
     def worst(self) -> int:
@@ -51,9 +58,9 @@ class Judged:
 
     @property
     def verdict(self) -> Verdict:
-        """Met or missed where chance does not decide."""
+        """Met or missed where neither chance nor a nonlinearity decides."""
         if np.all(self.largest <= 1.0):
-            return "met"
+            return "undecided" if self.doubted else "met"
         return "missed" if np.any(self.least > 1.0) else "undecided"
 
 
@@ -102,6 +109,12 @@ def measured_results(
     if silent:
         entry["nonlinearity"] = silent_entry(silent)
         notes += silent_notes(silent)
+        if judged is not None and judged.distorted is not None:
+            found_at = {"worst_ratio": judged.distorted.share, "frequency": float(w[judged.distorted.line])}
+            entry["nonlinearity"]["odd"] |= found_at
+            # As the reason of a verdict it stands among the notes anyway.
+            if not (assess and judged.verdict == "undecided" and judged.doubted):
+                notes.append(_of_nonlinearity(header, judged.distorted, w))
     if assess and judged is not None:
         assessment = _assessment(header, judged, w)
         result |= {"status": judged.verdict, "assessment": assessment}
@@ -140,17 +153,36 @@ def _assessment(header: Header, judged: Judged, w: Array) -> dict[str, Json]:
         "requirements": [{"name": "frequency_response", "worst_ratio": ratio, "frequency": float(w[worst])}],
     }
     times = high**2
-    if verdict != "met":
+    causes, reasons = list[str](), list[str]()
+    if high > 1.0:
         counted = int(np.ceil(times * judged.counted / judged.grid.period))
         entry["periods"] = counted
         enough = f"about {counted} periods that count would do"
         if verdict == "undecided":
-            entry["causes"] = ["chance"]
-            entry["undecided"] = [
+            causes.append("chance")
+            reasons.append(
                 f"the largest deviation is {ratio:.4g} of what is admitted, at {w[worst]:.4g} "
                 f"{header.units.per_time}, and by chance anything between {low:.3g} and {high:.3g} may stand "
                 f"behind that: {enough}"
-            ]
+            )
         else:
             entry["no_top_up"] = f"repeat the record: {enough}"
+    if verdict == "undecided":
+        if judged.distorted is not None and judged.distorted.matters:
+            causes.append("nonlinearity")
+            reasons.append(_of_nonlinearity(header, judged.distorted, w))
+        entry |= {"causes": causes, "undecided": reasons}
     return entry
+
+
+def _of_nonlinearity(header: Header, distorted: Distorted, w: Array) -> str:
+    """What a nonlinearity of odd degree does to the response, and what to do."""
+    share = f"{distorted.share:.2g} of what is admitted, at {w[distorted.line]:.3g} {header.units.per_time}"
+    if not distorted.matters:
+        return f"what a nonlinearity of odd degree changes of the response is small: about {share}"
+    return (
+        "odd lines that are not excited tell of a nonlinearity, or a drift (probability of chance "
+        f"{distorted.probability:.2g}), that changes the response by about {share}; from {MATTERS:g} on that "
+        "is not called met. More periods do not help: measure at a smaller amplitude, and see whether the "
+        "response stays"
+    )

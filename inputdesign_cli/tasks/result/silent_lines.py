@@ -3,12 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
 
 from inputdesign_cli.identification.silent_lines import SilentLines
-from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.results import Array, Json
 
-# Silent lines whose probability is below this speak.
+# Silent lines speak where the smallest probability, times how many there are, is below this.
 _SPEAKS = 0.01
+MATTERS = 0.5
+"""From this share of what is admitted on, a quarter in mean square, a nonlinearity leaves a verdict open."""
+
+
+@dataclass(frozen=True)
+class Distorted:
+    """What a nonlinearity of odd degree does to a response: at most this share of what is admitted.
+
+    Attributes:
+        line: at which that is.
+        probability: that noise alone has as much at the silent lines.
+    """
+
+    share: float
+    line: int
+    probability: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether it may decide on what is met."""
+        return self.share >= MATTERS
+
+
+def distorted(silent: Mapping[str, SilentLines], shares: Array) -> Distorted | None:
+    """From the error of G over what is admitted (L,); None where odd lines have what noise has."""
+    chance = _chance(silent, "odd")
+    line = int(np.argmax(shares))
+    return Distorted(float(shares[line]), line, chance) if chance < _SPEAKS else None
+
+
+def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:
+    """That any of all lines has by noise alone as much as those of a kind have at some output."""
+    tests = sum(found.probability.size for found in silent.values())
+    return min(float(silent[kind].probability.min()) * tests, 1.0)
 
 
 def silent_entry(silent: Mapping[str, SilentLines]) -> dict[str, Json]:
@@ -28,7 +65,7 @@ def silent_notes(silent: Mapping[str, SilentLines]) -> list[str]:
     """A sentence for each kind of lines that speaks."""
     notes = []
     for kind, found in silent.items():
-        chance = float(found.probability.min())
+        chance = _chance(silent, kind)
         if chance < _SPEAKS:
             level = ", ".join(f"{value:.3g}" for value in found.rms)
             notes.append(

@@ -1,0 +1,50 @@
+"""What a nonlinearity does to a measured frequency response, estimated from lines that were not excited.
+
+Excited lines are odd harmonics, so that a nonlinearity of even degree leaves them alone. One of odd degree
+adds to each what it adds to the odd lines without excitation beside it, and changes the gain as well
+([pintelon-schoukens-2012], Sections 3.4 and 4.3). The former is measured. The latter has the frequencies of
+the excitation, so that no line tells it; it is estimated by what a cubic does to a Gaussian signal. With
+y = x + c x^3 and E x^2 = s the gain is 1 + 3 c s, and what is left of c x^3 has the mean square 6 c^2 s^3:
+the square of the relative change is 9/6 of the share that is left of the power of x. A third of what is left
+is beyond the highest line (three times the band), so that the share that is seen counts 9/6 times 3/2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inputdesign_cli.identification.periodic_response import PeriodicResponse
+from inputdesign_cli.identification.silent_lines import SilentLines
+from inputdesign_cli.plant.polynomial import Array
+
+_OF_THE_SHARE = 9.0 / 6.0 * 3.0 / 2.0
+
+
+def response_error(
+    found: PeriodicResponse, period: int, kept: int, odd: SilentLines, harmonics: NDArray[np.int_]
+) -> NDArray[np.float64]:
+    """(L, p, r): errors of G at the excited lines, of what is added to each and of the gain in mean square.
+
+    Args:
+        found: the response, of so many periods that are `kept` in all.
+        odd: what odd lines without excitation have, at these `harmonics`.
+    """
+    added = _between(harmonics, odd.beyond, found.harmonics)
+    of_inverse = kept * period * found.deviation**2 / found.noise[:, :, None]  # sum over blocks of |U^-1|^2
+    at_lines = added[:, :, None] * of_inverse
+    # The power of the inputs behind each output, and of what is added as seen from there.
+    gain = np.sum(np.abs(found.G) ** 2, axis=2)
+    before = found.explained / gain
+    seen = _between(found.harmonics, gain, harmonics)
+    shares = np.maximum(
+        (odd.beyond.sum(axis=0) + added.sum(axis=0)) / found.explained.sum(axis=0),
+        ((odd.beyond / seen).sum(axis=0) + (added / gain).sum(axis=0)) / before.sum(axis=0),
+    )
+    changed = _OF_THE_SHARE * shares[None, :, None] * np.abs(found.G) ** 2
+    return np.asarray(np.sqrt(at_lines + changed))
+
+
+def _between(known: NDArray[np.int_], values: NDArray[np.float64], at: NDArray[np.int_]) -> Array:
+    """(n, p): values (l, p) at harmonics between those that are known."""
+    return np.stack([np.interp(np.log(at), np.log(known), column) for column in values.T], axis=1)

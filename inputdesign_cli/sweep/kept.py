@@ -1,0 +1,87 @@
+"""Whether what an earlier call left of a point may be relied on: its files, its spec and its proof."""
+
+from __future__ import annotations
+
+import json
+from math import isfinite
+from pathlib import Path
+
+from inputdesign_cli.errors import DataError
+from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.runs.origin import digest
+from inputdesign_cli.runs.record import SPEC
+from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.run_directory import read_run
+from inputdesign_cli.sweep.layout import Layout
+from inputdesign_cli.sweep.point import FAILURES
+
+# Values and bounds are written to all digits; a gap may be of a bound that was rounded up to the value.
+_ROUNDING = 1e-6
+_OF_GAP = 1e-3
+
+
+def flaw(layout: Layout, key: str, spec: str | None = None) -> str:
+    """What is wrong with what is there of a point; nothing where it holds, or where there is nothing.
+
+    Args:
+        spec: the resolved spec of the point, where it is known.
+    """
+    if layout.has_result(key):
+        return run_flaw(layout.run(key), spec)
+    return _failure_flaw(layout.failure(key)) if layout.has_failure(key) else ""
+
+
+def run_flaw(directory: Path, spec: str | None = None) -> str:
+    """What is wrong with the run of a point, of this `spec` if it is known; nothing where it holds."""
+    try:
+        result = read_run(directory)
+        written = digest(read_regular(directory / SPEC).decode("utf-8"))
+    except DataError as error:
+        return error.diagnostics[0].message
+    except (OSError, ValueError) as error:
+        return f"{directory / SPEC} cannot be read: {error}"
+    if result.get("spec_sha256") != written or (spec is not None and written != digest(spec)):
+        return f"{directory} is not the run of this point: its spec is another one"
+    why = _contradiction(result.get("objective"))
+    return f"{directory / 'result.json'} contradicts itself: {why}" if why else ""
+
+
+def _contradiction(objective: Json) -> str:
+    """How an objective contradicts its own bounds and gap; nothing where it does not, or there is none."""
+    if objective is None:
+        return ""
+    if not isinstance(objective, dict):
+        return "its objective is no mapping"
+    names = ("value", "lower_bound", "upper_bound", "any_spectrum_bound", "relative_gap")
+    known = {name: objective[name] for name in names if name in objective}
+    for name, number in known.items():
+        if isinstance(number, bool) or not isinstance(number, int | float) or not isfinite(number):
+            return f"objective.{name} is no number"
+    if "value" not in known:
+        return "its objective has no value"
+    value, sign = known["value"], -1.0 if "upper_bound" in known else 1.0
+    slack = _ROUNDING * (abs(value) + (objective.get("kind") == "D"))  # a logarithm may be zero
+    for name in ("lower_bound", "upper_bound", "any_spectrum_bound"):
+        if name in known and sign * (known[name] - value) > slack:
+            return f"objective.value is {value:.6g}, beyond its {name} {known[name]:.6g}"
+    bound = known.get("lower_bound", known.get("upper_bound"))
+    # That of D is relative to the number of parameters.
+    if bound is None or "relative_gap" not in known or objective.get("kind") == "D" or value == 0:
+        return ""
+    gap, told = abs(value - bound) / abs(value), known["relative_gap"]
+    if abs(gap - told) > _ROUNDING + _OF_GAP * told:
+        return f"objective.value {value:.6g} and its bound {bound:.6g} have another gap than {told:.3g}"
+    return ""
+
+
+def _failure_flaw(path: Path) -> str:
+    """What is wrong with the file that says why a point has no result; nothing where it can be read."""
+    try:
+        content = json.loads(read_regular(path))
+    except (OSError, ValueError, RecursionError) as error:
+        return f"{path} cannot be read: {error}"
+    whole = isinstance(content, dict) and content.get("status") in FAILURES
+    texts = ("code", "message", "hint", "key")
+    if whole and content.get("code") and all(isinstance(content.get(name), str) for name in texts):
+        return ""
+    return f"{path} is not what idesign writes of a failure"
