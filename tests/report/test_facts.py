@@ -2,6 +2,7 @@
 
 import pytest
 
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.report.facts import facts, proofs
 
 
@@ -51,3 +52,8 @@ def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
     assert told["plants"].endswith("the plant of the spec and 30 drawn and 1 that a search found")
     assert told["worst plant"] == "1 of what is admitted is the worst that was found in the intervals"
     assert told["limits"] == "input amplitude exhausted"
+
+
+def test_the_terminal_tells_estimates_with_their_deviations():
+    found = {"theta": {"gain": 2.0, "L": 25.0}, "standard_deviation": {"gain": 0.1, "L": 2.5}}
+    assert "gain 2 +- 0.1, L 25 +- 2.5" in summary({"identification": found}, "s", [])
