@@ -50,7 +50,7 @@ def _data(result: Result, time_unit: str) -> Iterator[Line]:
     """An estimate with its standard deviations; each requirement with what the data reach."""
     estimate = estimate_table(result)
     if estimate:
-        yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread in estimate.rows)
+        yield "estimate", ", ".join(f"{name} {value} +- {spread}" for name, value, spread, _ in estimate.rows)
     yield from ((name, text) for name, text, _ in estimate_facts(result))
     verdicts = []
     for name, ratio, frequency, found in (requirement_table(result, time_unit) or _NONE).rows:

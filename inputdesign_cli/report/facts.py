@@ -92,14 +92,19 @@ def _beyond(told: Mapping[str, Json]) -> bool:
 
 def _limits(result: Result) -> Iterator[str]:
     """Which limits the design exhausts, and how far single samples of the record use theirs."""
-    binding = [spoken(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
+    binding = [_limit(entry["name"]) for entry in result.get("limits", []) if entry["binding"]]
     shares = result.get("signal", {}).get("of_limits", {})
     if binding:
         by = " by the spectrum" if shares else ""
         yield f"{', '.join(dict.fromkeys(binding))} exhausted{by}"
     if shares:
         taken = sorted(shares, key=lambda name: -shares[name])
-        yield f"single samples take {', '.join(f'{100 * shares[k]:.3g} % of {spoken(k)}' for k in taken)}"
+        yield f"single samples take {', '.join(f'{100 * shares[k]:.3g} % of {_limit(k)}' for k in taken)}"
+
+
+def _limit(name: str) -> str:
+    """What a limit is called: `input amplitude`."""
+    return " ".join(reversed(spoken(name).split(".")))
 
 
 def _lines(found: Mapping[str, Json], time_unit: str) -> Fact:
@@ -148,7 +153,10 @@ def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
     again = (
         f"{found['rejected']} that were unstable, or no plants, were drawn again" if found["rejected"] else ""
     )
-    yield "plants", f"what is asked holds at the plant of the spec and {kept} {drawn}{left}", again
+    added = found.get("searched", {}).get("added", 0)
+    sought = f" and {added} that a search found" if added else ""
+    holds = f"what is asked holds at the plant of the spec and {kept - added} {drawn}{sought}{left}"
+    yield "plants", holds, again
     if bound:
         yield "binding", ", ".join(bound) + more, ""
     if "dearest" in found:
@@ -157,10 +165,9 @@ def _robust(found: Mapping[str, Json], best: bool) -> Iterator[Fact]:
         yield "dearest", f"{at}, where it costs {shown(told['cost'])}", ""
     if "searched" in found:
         told = found["searched"]
-        more = f" after {told['added']} were added" if told["added"] else ""
         yield (
             "worst plant",
-            f"{told['share']:.4g} of what is admitted is the worst that was found in {told['region']}{more}",
+            f"{told['share']:.4g} of what is admitted is the worst that was found in {told['region']}",
             f"searched by ascent from {told['tried']} plants, not proved",
         )
     if "fresh" in found:

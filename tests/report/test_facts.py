@@ -2,6 +2,7 @@
 
 import pytest
 
+from inputdesign_cli.cli.summary import summary
 from inputdesign_cli.report.facts import facts, proofs
 
 
@@ -40,3 +41,19 @@ def test_channels_are_enumerated_and_equal_costs_are_told_as_such():
     told = {name: (value, note) for name, value, note in facts(result, "s")}
     assert told["power"][0] == "input 1, 0.5 and 0.25, output 3"
     assert told["cost"][1] == "white excitation: 2, as much"
+
+
+def test_plants_that_a_search_found_are_told_apart_from_those_that_were_drawn():
+    robust = {"source": "intervals", "scenarios": 31, "discarded": 0, "rejected": 0, "active": []}
+    robust["searched"] = {"share": 1.0, "region": "the intervals", "added": 1, "tried": 40}
+    limits = [{"name": "amplitude.input", "binding": True}]
+    result = {"objective": {"kind": "accuracy_factor", "value": 0.5}, "robust": robust, "limits": limits}
+    told = {name: value for name, value, _ in facts(result, "s")}
+    assert told["plants"].endswith("the plant of the spec and 30 drawn and 1 that a search found")
+    assert told["worst plant"] == "1 of what is admitted is the worst that was found in the intervals"
+    assert told["limits"] == "input amplitude exhausted"
+
+
+def test_the_terminal_tells_estimates_with_their_deviations():
+    found = {"theta": {"gain": 2.0, "L": 25.0}, "standard_deviation": {"gain": 0.1, "L": 2.5}}
+    assert "gain 2 +- 0.1, L 25 +- 2.5" in summary({"identification": found}, "s", [])
