@@ -122,7 +122,7 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
 
 def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> None:
     """Raise `SpecError` (`too-large`) for records that would take long, or more memory than there is."""
-    size = SIZES["samples of `idesign signal`"]
+    size = SIZES["samples of a ready-made signal"]
     fit = size.most // inputs
     if samples <= fit:
         return

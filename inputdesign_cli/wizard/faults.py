@@ -76,7 +76,8 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     quieter = _QUIETER.search(one.hint)
     hint = _HINTS.get(one.code, "")
     if quieter:
-        hint = f"ask for more than {quieter[1]} dB (the nearer, the longer the experiment), such as {quieter[2]} dB"
+        least, roomy = quieter.groups()
+        hint = f"ask for more than {least} dB (the nearer, the longer the experiment), such as {roomy} dB"
     place = one.location if one.location and not one.location.file.startswith("<") else None
     return replace(
         one,
