@@ -95,3 +95,10 @@ def test_what_would_not_fit_is_refused_before_it_is_made(asked):
         make_signal(asked)
     assert caught.value.diagnostics[0].code == "too-large"
     assert "at most" in caught.value.diagnostics[0].hint
+
+
+def test_levels_are_written_without_rounding():
+    levels = scaled(steps(11, 11, 1, rng()), [(40.0, 60.0)])[:, 0]
+    assert sorted(levels.tolist()) == [float(x) for x in range(40, 61, 2)]
+    tiny = scaled(np.array([[-1.0], [0.0], [1.0]]), [(0.0, 1e-20)])[:, 0]
+    assert tiny == pytest.approx([0.0, 5e-21, 1e-20], rel=1e-12)
