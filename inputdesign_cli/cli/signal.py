@@ -43,8 +43,7 @@ def signal(
         typer.Option("--steps", metavar="N", min=2, help="N levels over the range, in random order."),
     ] = None,
     samples: Annotated[
-        int | None,
-        typer.Option(min=3, max=10_000_000, help="Length. The default is one period of a prbs, or 1000."),
+        int | None, typer.Option(min=3, help="Length. The default is one period of a prbs, or 1000.")
     ] = None,
     span: Annotated[
         str,

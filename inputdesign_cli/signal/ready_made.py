@@ -17,6 +17,7 @@ from inputdesign_cli.signal.shift_register import shifted_sequences
 
 # Of the largest line: smaller ones are rounding.
 _EXCITED = 1e-9
+_DIGITS = 13
 _MIDDLE = (0.05, 0.95)
 # Of more lines phases are not optimised: those of Schroeder are nearly as good.
 _OPTIMISED = 2000
@@ -120,4 +121,8 @@ def excites(u: Array, period: int) -> list[Excites]:
 def scaled(u: Array, levels: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
     """A record (N, r) from -1 to 1 taken to a least and a largest value of each channel."""
     low, high = np.array(levels).T
-    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * u)
+    values = 0.5 * (low + high) + 0.5 * (high - low) * u
+    # Rounding in the last digits would be written, as 56.00000000000001.
+    digits = _DIGITS - np.ceil(np.log10(np.maximum(np.abs(low), np.abs(high)))).astype(int)
+    rounded = [np.round(one, digit) for one, digit in zip(values.T, digits.tolist(), strict=True)]
+    return np.asarray(np.clip(np.stack(rounded, axis=1), low, high))

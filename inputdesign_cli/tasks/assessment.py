@@ -209,9 +209,20 @@ def _from_nominal(
     task: Identification, found: Identified, question: ModelQuestion
 ) -> tuple[dict[str, Json], list[str]]:
     """How far the estimate is from the plant of the spec, and a note where that is far."""
-    errors = model_errors(question.requirements) or question.entries
+    asked = model_errors(question.requirements)
     information, estimate = question.information, found.estimate
-    return from_nominal(task.header.units, task.nominal, found.model, estimate, errors, information)
+    told, notes = from_nominal(
+        task.header.units,
+        task.nominal,
+        found.model,
+        estimate,
+        asked or question.entries,
+        information,
+        asked=bool(asked),
+    )
+    if task.foreseen is None or not task.foreseen(estimate.theta, estimate.covariance):
+        return told, notes
+    return told | {"within_uncertainty": True}, []
 
 
 def _with_notes(results: Results, notes: Sequence[str]) -> Results:

@@ -72,6 +72,8 @@ class Identification:
         has_prior: whether it states prior information.
         controller: C of the loop u = r - C y that the data come from; None: there is none, or not in q^-1.
         knowledge: what else it says of the parameters; None where it says nothing.
+        foreseen: whether the design was made for a plant of these parameters (k,), known with this covariance
+            (k, k), as well; None where it was made for that of the spec.
         at: the question of the spec at another model with the given number of samples, the factor (k, k) of
             whose information sets the coordinates; the text names the source of that model in diagnostics.
     """
@@ -84,6 +86,7 @@ class Identification:
     has_prior: bool
     controller: TransferMatrix | None
     knowledge: Knowledge | None
+    foreseen: Callable[[Array, Array], bool] | None
     at: Callable[[Model, int, Array, str], ModelQuestion]
 
 

@@ -14,6 +14,7 @@ from inputdesign_cli.runs.results import Curves, Json, Results, Table
 from inputdesign_cli.signal.harmonic_grid import TooFewHarmonicsError
 from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
 from inputdesign_cli.signal.shift_register import register_length
+from inputdesign_cli.specification.models.sizes import SIZES
 
 _USUAL = 1000
 
@@ -95,9 +96,11 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
         bits = asked.bits or register_length(-(-(asked.samples or _USUAL) // asked.hold))
         period = asked.hold * (2**bits - 1)
         samples = asked.samples or period
+        _check_size(max(samples, asked.hold), r, whole_period=asked.samples is None)
         values = prbs(bits, -(-samples // asked.hold), r, rng)
         return np.repeat(values, asked.hold, axis=0)[:samples], min(period, samples)
     samples = asked.samples or _USUAL
+    _check_size(samples, r)
     if asked.kind == "multisine":
         return _multisine(asked, samples, rng), samples // asked.periods
     if asked.kind == "chirp":
@@ -108,7 +111,27 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
                 hint="use a multisine for several inputs, or one chirp after the other",
             )
         return chirp(samples, _band(asked)), samples
+    if asked.number is not None and asked.number > samples:
+        raise bad_spec(
+            "too-large",
+            f"{asked.number} levels are more than the {samples} samples",
+            hint=f"write at most --steps {samples}, or more --samples",
+        )
     return steps(asked.number or 2, samples, r, rng), samples
+
+
+def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> None:
+    """Raise `SpecError` (`too-large`) for records that would take long, or more memory than there is."""
+    size = SIZES["samples of a ready-made signal"]
+    fit = size.most // inputs
+    if samples <= fit:
+        return
+    each = f" for each of {inputs} inputs" if inputs > 1 else ""
+    raise bad_spec(
+        "too-large",
+        f"the signal has {samples} samples{each}, and {fit} fit: {size.why}",
+        hint=f"write {'fewer --prbs BITS, a shorter --hold, or ' * whole_period}--samples {fit} at most",
+    )
 
 
 def _multisine(asked: ReadyMade, samples: int, rng: np.random.Generator) -> Array:

@@ -18,6 +18,10 @@ from inputdesign_cli.wizard.wishes import wished
 _MOST, LEAST = 5000, 50  # samples
 _PLANTS, _FRESH = 30, 200
 _REACH = 0.95  # of an ellipsoid, in which the worst plants are sought; of intervals it is all
+_UNUSED = (
+    "how well the plant is known is not used: a Bode plot is designed at the plant as stated, and one that "
+    "is another needs other powers"
+)
 _FIRST = "{type: fir, order: 20}"
 
 
@@ -128,6 +132,8 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     if duration < there:
         heads[-1] += f": {_MOST} samples to begin with; up to {short(there)} may be taken"
     notes = tuple(f"against the model of {plant.source}: {one}" for one in plant.against)
+    if nonparametric and (plant.covariance or plant.intervals):
+        notes += (_UNUSED,)
     tails = signal_lines(said["signals"], said["converter"], span, said["limits"])
     if nonparametric:
         return Draft(tuple(heads), tuple(_periodic(tails)), plant.files, None, folder, said, there, notes)
@@ -142,8 +148,10 @@ def _why_step(plant: PlantAnswer) -> str:
 
 def _uncertain(plant: PlantAnswer, nonparametric: bool) -> list[str]:
     """How well the plant is known, where that is said and a design can heed it."""
-    if nonparametric or not (plant.covariance or plant.intervals):
+    if not (plant.covariance or plant.intervals):
         return []
+    if nonparametric:
+        return [f"# {_UNUSED}"]
     drawn = (
         f"  scenarios: {_PLANTS}  # what is asked holds at so many plants drawn from that",
         f"  worst_case: {_REACH}  # and at the worst ones that a search finds there",

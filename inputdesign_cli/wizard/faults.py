@@ -47,7 +47,7 @@ _HINTS = {
 }
 _TERMS = {"nominal plant": "plant as stated", "the offset": "the operating point"}
 _PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)+")
-_QUIETER = re.compile(r"max_sensitivity_db: ([\d.]+)")
+_QUIETER = re.compile(r"above max_sensitivity_db: ([\d.]+).*such as ([\d.]+)")
 
 
 @contextmanager
@@ -74,7 +74,10 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
         return one  # by a block inside
     why = _MESSAGES.get(one.code) or _in_words(one.message)
     quieter = _QUIETER.search(one.hint)
-    hint = f"ask for {quieter[1]} dB or more" if quieter else _HINTS.get(one.code, "")
+    hint = _HINTS.get(one.code, "")
+    if quieter:
+        least, roomy = quieter.groups()
+        hint = f"ask for more than {least} dB (the nearer, the longer the experiment), such as {roomy} dB"
     place = one.location if one.location and not one.location.file.startswith("<") else None
     return replace(
         one,

@@ -15,6 +15,7 @@ from inputdesign_cli.wizard.questions import bad_answer
 from inputdesign_cli.wizard.wishes import pid
 
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
+_MADE = {"multisine": "  # how samples are made of the spectrum: sinusoids as dense as the record allows"}
 _LEAST_BITS, _MOST_BITS = 2, 32
 DRIFTING = (1.0, -0.8)  # C of noise that drifts
 _WHITE = 3.0  # correlations above so many deviations of chance colour the noise
@@ -171,7 +172,7 @@ def signal_lines(kind: str, converter: str, span: Range, limits: str) -> list[st
     """
     if kind.lower() not in _TYPES:
         raise bad_answer("signals", f'"{kind}" is none of these')
-    lines = ["signal:", f"  type: {_TYPES[kind.lower()]}", "  seed: 1"]
+    lines = ["signal:", f"  type: {_TYPES[kind.lower()]}{_MADE.get(_TYPES[kind.lower()], '')}", "  seed: 1"]
     if after(limits, "output") is not None:
         lines.append("  candidates: 1  # it is fitted to the limit on the output at every plant")
     lines.append(f"  offset: {short(span.offset)}  # the operating point, added to signal.csv")

@@ -45,7 +45,7 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     times = f"the model that it leaves errs {ratio:.3g} times as much as is admitted"
     surely = ratio * _scatter(result)
     found = _length_that_does(spec, surely, solve)
-    said = [f"{means} is enough: {times}." if ratio <= 1.0 else f"{means} is not enough: {times}."]
+    said = [f"{means} is {_for_which(result, ratio)}: {times}."]
     if ratio <= 1.0 < surely:
         said.append(
             "But assess judges at the plant that the data tell, and that scatters: where the plant is the "
@@ -71,6 +71,20 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
             f"{loop['phase_margin']:.3g} degrees are kept."
         )
     return Verdict(ratio, (*said, *_elsewhere(result, ratio), *_open_dead_times(result)))
+
+
+def _for_which(result: Result, ratio: float) -> str:
+    """Enough or not, and for which of the plants that were tried."""
+    if ratio > 1.0:
+        return "not enough"
+    robust = result.get("robust", {})
+    fresh = robust.get("fresh") or {"missed": 0, "largest": 0.0}
+    if not fresh["missed"] or fresh["largest"] * ratio <= 1.0:
+        return "enough"
+    return (
+        f"enough at the plant as you stated it and at {robust['scenarios']} others, but not at every one "
+        "within what you said of it"
+    )
 
 
 def _used(spec: Spec, result: Result) -> str:

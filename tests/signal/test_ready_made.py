@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from inputdesign_cli.errors import SpecError
 from inputdesign_cli.signal.ready_made import chirp, excites, multisine, prbs, scaled, steps
+from inputdesign_cli.tasks.ready_made import ReadyMade, make_signal
 
 
 def rng():
@@ -75,3 +77,28 @@ def test_ranges_are_those_asked_for():
 def test_a_constant_excites_nothing():
     (found,) = excites(np.ones((10, 1)), 10)
     assert (found.order, found.power, found.crest_factor) == (0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ReadyMade("prbs", bits=30),
+        ReadyMade("prbs", bits=4, hold=2_000_000_000),
+        ReadyMade("multisine", number=5, samples=1_000_000_000),
+        ReadyMade("chirp", samples=1_000_000_000),
+        ReadyMade("steps", number=3, samples=9_000_000, levels=((0.0, 1.0),) * 2),
+        ReadyMade("steps", number=1_000_000_000),
+    ],
+)
+def test_what_would_not_fit_is_refused_before_it_is_made(asked):
+    with pytest.raises(SpecError) as caught:
+        make_signal(asked)
+    assert caught.value.diagnostics[0].code == "too-large"
+    assert "at most" in caught.value.diagnostics[0].hint
+
+
+def test_levels_are_written_without_rounding():
+    levels = scaled(steps(11, 11, 1, rng()), [(40.0, 60.0)])[:, 0]
+    assert sorted(levels.tolist()) == [float(x) for x in range(40, 61, 2)]
+    tiny = scaled(np.array([[-1.0], [0.0], [1.0]]), [(0.0, 1e-20)])[:, 0]
+    assert tiny == pytest.approx([0.0, 5e-21, 1e-20], rel=1e-12)

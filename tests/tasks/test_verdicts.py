@@ -186,3 +186,19 @@ def test_a_far_estimate_contradicts_the_spec_by_its_statistic_alone(deviations, 
     assert told["probability"] == pytest.approx(np.exp(-(deviations**2) / 2), rel=1e-6)
     assert ("contradicts the plant" in notes[0]) == contradicts
     assert ("does not contradict" in notes[0]) != contradicts
+
+
+@pytest.mark.parametrize(("admitted", "contradicts"), [(0.5, True), (30.0, False)])
+def test_a_difference_that_nothing_is_asked_of_contradicts_nothing(admitted, contradicts):
+    """b1 goes from 1 to 3, so that G differs by at most 2/0.3 = 6.7."""
+    nominal = build_model(parse_spec("plant: {B: [0, 1], F: [1, -0.7]}\n", design=False))
+    theta = nominal.theta + np.array([2.0, 0.0])
+    estimate = SimpleNamespace(theta=theta, covariance=0.01 * np.eye(2), names=["b1", "f1"])
+    error = SimpleNamespace(
+        grid=np.array([0.1]),
+        entry=None,
+        error_bound=lambda information, w: np.zeros(w.shape),
+        admissible=SimpleNamespace(at=lambda w: np.full(w.shape, admitted)),
+    )
+    _, notes = from_nominal(UNITS, nominal, nominal.at(theta), estimate, [error], np.eye(2), asked=True)
+    assert ("contradicts the plant" in notes[0]) == contradicts

@@ -10,6 +10,7 @@ from inputdesign_cli.wizard.composing import compose
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.questions import KEYS, QUESTIONS, question
 from inputdesign_cli.wizard.spectra import with_spectrum
+from tests.wizard.test_wizard import ENGINEER
 
 GOOD = {
     "plant": "gain 2, time constant 180 s, dead time 25 s",
@@ -229,3 +230,17 @@ def test_a_file_that_cannot_be_written_is_no_fault_of_an_answer():
 
 def test_every_question_is_tried():
     assert set(HOSTILE) == {one.key for one in QUESTIONS}
+
+
+def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
+    """The peak of |S| of this loop is 4.04 dB."""
+    with pytest.raises(SpecError) as caught:
+        compose({**ENGINEER, "wish": "PI loop with 0.5 dB"}, "x", tmp_path).validate()
+    hint = caught.value.diagnostics[0].hint
+    least = re.search(r"more than ([\d.]+) dB", hint)
+    assert least is not None
+    barely = float(least[1]) + 0.1
+    compose({**ENGINEER, "wish": f"PI loop with {barely:.3g} dB"}, "x", tmp_path).validate()
+    below = float(least[1]) - 0.02
+    with pytest.raises(SpecError):
+        compose({**ENGINEER, "wish": f"PI loop with {below:.3g} dB"}, "x", tmp_path).validate()

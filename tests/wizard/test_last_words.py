@@ -153,3 +153,21 @@ def test_nothing_is_said_twice():
 def test_ranges_in_many_words(text):
     span = input_range(text)
     assert (span.amplitude, span.offset) == (5.0, 40.0)
+
+
+def test_what_is_enough_is_said_of_the_plants_that_it_is_enough_for():
+    spec = compose(ENGINEER, "x", Path()).spec()
+    fresh = {"draws": 200, "missed": 6, "largest": 1.6}
+    result = {"samples": 720, "signal": {"worst_ratio": 0.9}, "robust": {"scenarios": 30, "fresh": fresh}}
+    answer = {"signal": {"worst_ratio": 2.0}, "samples": 0}
+    first = verdict(spec, result, lambda changed: answer).sentences[0]
+    assert "but not at every one within what you said of it" in first
+    fresh["largest"] = 1.05
+    assert "is enough:" in verdict(spec, result, lambda changed: answer).sentences[0]
+
+
+def test_what_is_not_used_for_a_bode_plot_is_said():
+    wish = "Bode plot within 5 % from 0.005 to 0.05"
+    draft = compose({**ENGINEER, "wish": wish, "time": "8 h"}, "x", Path())
+    assert any("how well the plant is known is not used" in one for one in draft.told)
+    assert "# how well the plant is known is not used" in draft.text

@@ -85,6 +85,7 @@ SIZES = {
     "uncertainty.fresh": Size(100_000, "every plant has integrals and peaks of its own"),
     "campaign.stages": Size(1000, "every stage has an estimate and a plan"),
     "signal.samples": Size(1_000_000, "a record has an entry for each sample and parameter"),
+    "samples of a ready-made signal": Size(10_000_000, "it has a number for each sample and input"),
     "signal.lines": Size(1_000_000, "a period has no more harmonics than samples"),
     "signal.candidates": Size(1000, "every candidate takes as long as one record"),
     "signal.order": Size(100, "the filter is fitted by a search over its states"),

@@ -17,6 +17,7 @@ from inputdesign_cli.runs.results import Results
 from inputdesign_cli.specification import Spec, parse_spec
 from inputdesign_cli.tasks.build.controllers import controller_matrix
 from inputdesign_cli.tasks.build.convex import build_convex
+from inputdesign_cli.tasks.build.foreseen import build_foreseen
 from inputdesign_cli.tasks.build.header import build_header
 from inputdesign_cli.tasks.build.knowledge import build_knowledge
 from inputdesign_cli.tasks.build.model_error import build_calibration, model_error_alpha, unstated_errors
@@ -58,6 +59,7 @@ def build_identification(spec: Spec) -> Identification:
         if controller is None
         else controller_matrix(controller, spec.sample_time, (nominal.inputs, nominal.outputs)),
         knowledge=build_knowledge(spec),
+        foreseen=build_foreseen(spec, nominal),
         at=lambda model, samples, factor, source: ask(restated(spec, model, source), samples, factor),
     )
 

@@ -24,6 +24,11 @@ _SHORTEST = 10
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
 _COARSE = 0.1
+# Evidence that a signal is rounded: off a grid by these shares of its step, at least as counted and at most;
+# the chance that a value comes again, of which so many count; less than this by chance in all.
+_LEAST_OFF, _MOST_OFF, _REFINED, _PARTS = 1e-3, 0.1, 3, (1, 2, 3)
+_AGAIN, _ENOUGH_RETURNS = 0.1, 10
+_BY_CHANCE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -163,10 +168,34 @@ def limits_of_sensor(name: str, x: Array) -> list[str]:
                 told.append(
                     f"{name} stays at its {word} value {value:.6g} for {stays} samples: is it saturated?"
                 )
-    step = float(np.min(np.diff(levels), initial=np.inf))
     spread = float(np.std(x))
-    if np.isfinite(step) and step > _COARSE * spread > 0.0:
+    step, chance = _grid(x, levels)
+    if step > _COARSE * spread > 0.0 and chance < _BY_CHANCE:
         told.append(
             f"{name} is rounded to steps of {step:.3g}, {step / spread:.2f} of its standard deviation"
         )
     return told
+
+
+def _grid(x: Array, levels: Array) -> tuple[float, float]:
+    """The step between the distinct levels of x, and how probable it is that they lie on a grid by chance.
+
+    Of continuous values the gaps in units of the step lie anywhere between two integers, and no value comes
+    again after another. Where levels are missing the smallest gap is a few steps.
+    """
+    gaps = np.diff(levels)
+    if not gaps.size:
+        return 0.0, 1.0
+    returns = min(int(np.sum(np.diff(x) != 0.0)) + 1 - levels.size, _ENOUGH_RETURNS)
+    tried = [_on_grid(gaps, float(gaps.min()) / part) for part in _PARTS]
+    step, chance = min(tried, key=lambda one: one[1])
+    return step, min(len(_PARTS) * chance, 1.0) * (_AGAIN**returns if chance < 1.0 or gaps.size == 1 else 1.0)
+
+
+def _on_grid(gaps: Array, step: float) -> tuple[float, float]:
+    """The step that suits the gaps best, near to one, and the probability that all suit it as well."""
+    for _ in range(_REFINED):
+        whole = np.round(gaps / step)
+        step = float(whole @ gaps / (whole @ whole))
+    off = max(float(np.max(np.abs(gaps / step - np.round(gaps / step)))), _LEAST_OFF)
+    return step, (2.0 * off) ** (gaps.size - 1) if off < _MOST_OFF else 1.0

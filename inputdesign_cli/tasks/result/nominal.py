@@ -42,19 +42,22 @@ def from_nominal(
     estimate: Estimate,
     errors: Sequence[OnModelError],
     information: Array,
+    *,
+    asked: bool = False,
 ) -> tuple[dict[str, Json], list[str]]:
     """What `assessment.nominal` says, and a note where the two are different plants.
 
     Args:
         nominal, estimated: of one structure.
         errors: what has r_u and a band, entry by entry; information (k, k) is in their coordinates.
+        asked: whether they have an r_adm, below which a difference of G matters to nothing.
     """
     of_plant = np.flatnonzero(estimated.in_plant)
     away = (nominal.theta - estimate.theta)[of_plant]
     scale = np.sqrt(np.diag(estimate.covariance))[of_plant]
     correlation = estimate.covariance[np.ix_(of_plant, of_plant)] / np.outer(scale, scale)
     statistic = float((away / scale) @ np.linalg.lstsq(correlation, away / scale, rcond=None)[0])
-    found = [_apart(units, nominal, estimated, error, information) for error in errors]
+    found = [_apart(units, nominal, estimated, error, information, asked) for error in errors]
     worst = max((one for places in found for one in places), key=lambda one: one.share, default=None)
     told: dict[str, Json] = {
         "deviations": float(np.sqrt(statistic)),
@@ -106,13 +109,15 @@ def _far(told: dict[str, Json], listed: Sequence[str]) -> list[str]:
 
 
 def _apart(
-    units: Units, nominal: Model, estimated: Model, error: OnModelError, information: Array
+    units: Units, nominal: Model, estimated: Model, error: OnModelError, information: Array, asked: bool
 ) -> list[_Apart]:
-    """The entries of G that a model error is about, where they differ by more than r_u leaves open."""
+    """The entries of G that a model error is about, where they differ by more than r_u and r_adm."""
     w = error.grid
     with np.errstate(divide="ignore", invalid="ignore"):  # the nominal plant may have a pole on the grid
         before, now = nominal.plant_at(w), estimated.plant_at(w)
     beyond = _BEYOND_ERROR * error.error_bound(information, w)
+    if asked:
+        beyond = np.maximum(beyond, error.admissible.at(w))
     found = []
     for i, j in [error.entry] if error.entry is not None else np.ndindex(units.outputs, units.inputs):
         old, new = before[:, i, j], now[:, i, j]

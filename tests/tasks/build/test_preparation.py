@@ -220,3 +220,30 @@ def test_rows_of_which_none_is_whole_are_refused(header, tmp_path):
         with pytest.raises(DataError, match=r"no row of log\.csv has a number in every column") as caught:
             read_one()
         assert "join the rows" in caught.value.diagnostics[0].hint
+
+
+def _said_to_be_rounded(x):
+    return any("rounded" in one for one in limits_of_sensor("y", x))
+
+
+@pytest.mark.parametrize("samples", [3, 4, 5, 7, 10, 20, 50])
+@pytest.mark.parametrize("digits", [3, 5, None])
+def test_continuous_records_are_not_said_to_be_rounded(samples, digits):
+    rng = np.random.default_rng(samples)
+    drawn = np.cumsum(rng.standard_normal((1000, samples)), axis=1)
+    if digits is not None:
+        drawn = np.round(drawn, digits)
+    assert sum(map(_said_to_be_rounded, drawn)) <= 10
+
+
+def test_a_periodic_record_is_not_said_to_be_rounded():
+    assert not _said_to_be_rounded(np.tile([0.0, 1.03, 2.61, 0.37, -1.2], 20))
+
+
+@pytest.mark.parametrize("samples", [10, 20, 200])
+def test_short_rounded_records_still_are(samples):
+    rng = np.random.default_rng(samples)
+    for _ in range(100):
+        x = np.round(2.0 * rng.standard_normal(samples)) * 1.04
+        assert _said_to_be_rounded(np.round(40.0 + x, 3))
+    assert _said_to_be_rounded(np.array([0.0, 1.0] * 5))
