@@ -46,8 +46,9 @@ _CHANNEL = re.compile(r"[uy]([1-9]\d*)?|time", re.ASCII)
 def identify(
     data: DataFiles,
     spec: Annotated[
-        Path, typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure.")
-    ],
+        Path | None,
+        typer.Option("--spec", "-s", metavar="SPEC", help="Its plant and noise give the structure."),
+    ] = None,
     overrides: Overrides = None,
     confine: Confine = None,
     output: EstimateOutput = None,
@@ -80,6 +81,11 @@ def identify(
     model.yaml, the estimate as blocks to paste into a spec, with figures of the fit, the residuals and the
     model error; prints a summary. In closed loop the direct method is used, from u and y alone.
     """
+    if spec is None:
+        raise typer.BadParameter(
+            "it says which structure is estimated; `idesign explore DATA` finds one without a spec",
+            param_hint="--spec",
+        )
     place = Place(output, f"{data[0].stem}_identified", [spec, *data], overwrite, no_output)
     with computing(data[0], quiet=quiet):
         from inputdesign_cli import tasks

@@ -150,7 +150,9 @@ def run_page(
 
 
 def _check_fields(run: Path, result: Result) -> None:
-    """Raise `DataError` (`run-unreadable`) that names the first field which is not of its kind."""
+    """Raise `DataError` (`run-unreadable`) that names the first field which is missing or not of its kind."""
+    if "spec_sha256" not in result:  # every run has it, of whatever kind
+        raise unreadable(run / RESULT, 'it has no "spec_sha256"')
     for kind, (names, called) in _FIELDS.items():
         for name in names:
             if not isinstance(result.get(name, kind()), kind):

@@ -69,3 +69,11 @@ def test_what_does_not_read_standard_input_says_so(command):
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 2
     assert "standard input" in done.stderr
+
+
+def test_identify_without_a_spec_names_what_needs_none(run, tmp_path):
+    (tmp_path / "data.csv").write_text("u1,y1\n0,0\n1,1\n")
+    code, out, err = run("identify", "data.csv")
+    assert (code, out) == (2, "")
+    assert "--spec" in err
+    assert "idesign explore DATA" in err

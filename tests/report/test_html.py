@@ -76,6 +76,13 @@ def test_a_result_that_somebody_changed_is_an_error_or_a_page(runs, tmp_path, mo
             report_text(tmp_path / "a")
 
 
+def test_a_result_that_says_nothing_is_no_run(runs, tmp_path):
+    shutil.copytree(runs / "open", tmp_path / "run")
+    (tmp_path / "run" / "result.json").write_text('{"format": 1}')
+    with pytest.raises(DataError, match="cannot be read as the result of a run"):
+        report_text(tmp_path / "run")
+
+
 @pytest.mark.parametrize("field", ["power", "signal", "objective", "notes", "title", "information"])
 def test_a_field_that_is_not_of_its_kind_is_named(runs, tmp_path, field):
     shutil.copytree(runs / "open", tmp_path / "run")

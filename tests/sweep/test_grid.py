@@ -43,7 +43,8 @@ def test_a_single_value_holds_for_all_points():
 @pytest.mark.parametrize(
     ("setting", "code"),
     [("a=0:40", "bad-range"), ("a=0:40:0", "bad-range"), ("a=0:40:-1", "bad-range"),
-     ("a=0:1:1e-9", "bad-range"), ("a=1,,2", "bad-override")],
+     ("a=0:1:1e-9", "bad-range"), ("a=nan:4:1", "bad-range"), ("a=0:.inf:1", "bad-range"),
+     ("a=0:4:-Infinity", "bad-range"), ("a=1,,2", "bad-override")],
 )  # fmt: skip
 def test_bad_settings(setting, code):
     with pytest.raises(SpecError) as caught:

@@ -246,9 +246,9 @@ def test_a_linear_plant_is_hardly_ever_doubted(shipped):
     for seed in range(100):
         y = answer + recorded_noise(question, u, seed)
         silent = _silent(task, data_of(u, y), task.periods, 1)
-        doubted += bool(silent_notes(silent))
+        doubted += bool(silent_notes(silent)) or silent["odd"].probability[0] < 0.04
         assert all(np.all(lines.rms > 0.0) for lines in silent.values() if lines.probability.min() < 0.05)
-    assert doubted <= 4
+    assert doubted <= 7  # 4 are expected
 
 
 def test_a_nonlinearity_that_changes_little_is_told_and_met(write, shipped):

@@ -18,6 +18,10 @@ from inputdesign_cli.specification.yaml.scalars import resolve
 
 MOST_VALUES = 100_000
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_INFINITE = r"[-+]?\.?(?:nan|inf|infinity)"
+_NO_RANGE = re.compile(
+    rf"\s*(?:{_NUMBER}|{_INFINITE})(?:\s*:\s*(?:{_NUMBER}|{_INFINITE})){{1,2}}\s*", re.IGNORECASE
+)
 _RANGE = re.compile(rf"\s*({_NUMBER})\s*:\s*({_NUMBER})\s*(?::\s*({_NUMBER})\s*)?")
 
 
@@ -31,6 +35,9 @@ def range_values(text: str) -> tuple[str, ...] | None:
     """
     match = _RANGE.fullmatch(text)
     if match is None:
+        if _NO_RANGE.fullmatch(text):
+            message = f'the range "{text.strip()}" has an end or a step that is not finite'
+            raise bad_spec("bad-range", message, hint="write low:high:step with numbers, as 0:40:5")
         return None
     if match.group(3) is None:
         message = f'the range "{text.strip()}" has no step'

@@ -12,6 +12,8 @@ from inputdesign_cli.runs.results import Array, Json
 
 # Silent lines speak where the smallest probability, times how many there are, is below this.
 _SPEAKS = 0.01
+# Less is enough to doubt a response that a nonlinearity would change by much: the odd lines, by themselves.
+_DOUBT = 0.04
 MATTERS = 0.5
 """From this share of what is admitted on, a quarter in mean square, a nonlinearity leaves a verdict open."""
 
@@ -37,9 +39,11 @@ class Distorted:
 
 def distorted(silent: Mapping[str, SilentLines], shares: Array) -> Distorted | None:
     """From the error of G over what is admitted (L,); None where odd lines have what noise has."""
-    chance = _chance(silent, "odd")
-    line = int(np.argmax(shares))
-    return Distorted(float(shares[line]), line, chance) if chance < _SPEAKS else None
+    line, odd = int(np.argmax(shares)), silent["odd"].probability
+    chance = min(float(odd.min()) * odd.size, 1.0)
+    found = Distorted(float(shares[line]), line, chance)
+    seen = chance < _DOUBT if found.matters else _chance(silent, "odd") < _SPEAKS
+    return found if seen else None
 
 
 def _chance(silent: Mapping[str, SilentLines], kind: str) -> float:
