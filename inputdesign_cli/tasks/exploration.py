@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.errors import IdesignError, SpecError, bad_spec
 from inputdesign_cli.identification import frequency_response, silent_in
 from inputdesign_cli.identification.explore import (
     Found,
@@ -45,6 +45,7 @@ from inputdesign_cli.tasks.result.unrelated import driven_by_nothing
 _LEAST_FIT = 5.0
 # One that is refuted besides needs more.
 _HALF = 50.0
+_DRIVE = "move the reference of the loop, or add dither to the input, and record again"
 _KINDS = ({"recent_inputs", "older_inputs"}, {"recent_residuals", "older_residuals"})
 
 
@@ -66,15 +67,23 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     started = time.perf_counter()
     log = read_logs(paths, preparation)
     loops = answers_output(log.parts)
+    undriven = _undriven(log)
     with blaming_columns(paths[0]):
-        found = explore_records(log.parts, feedback=bool(loops), step=log.step)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *_undriven(log))
+        try:
+            found = explore_records(log.parts, feedback=bool(loops), step=log.step)
+        except SpecError as error:
+            if not undriven:
+                raise
+            raise bad_spec("no-structure", undriven[0], hint=_DRIVE, key="u") from error
+    loose = (f"{told}: {_DRIVE}" for told in undriven)
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *loose)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
     lengths = tuple(len(part) for _, part in found.used)
     times = np.concatenate([log.step * np.arange(length) for length in lengths])
-    heard = exploration_notes(log, found, loops, order_of_excitation(log.parts))
+    moving = [(part_u[:, found.moving], part_y) for part_u, part_y in log.parts]
+    heard = exploration_notes(log, found, loops, order_of_excitation(moving))
     notes = (*log.steps, *heard, *(f"no trust: {reason}" for reason in reasons))
     identified = _asked(
         task,
@@ -108,12 +117,14 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
 
 def _without_model(explored: Results, units: Units, log: Log, found: Found) -> Results:
     """The results with the frequency response of the data alone beside the model, where it can be had."""
-    moving = [j for j in range(log.u.shape[1]) if j not in found.still]
-    response = frequency_response(log.u[:, moving], log.y, lengths=log.lengths)
+    moving = log.u[:, found.moving]
+    response = frequency_response(moving, log.y, lengths=log.lengths)
     if response is None:
         return explored
-    silent = silent_in(log.u[:, moving], log.y) if len(log.lengths) == 1 else {}
-    table, curves, told = response_of_data(units, found.model, response, by_reference=False, inputs=moving)
+    silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
+    table, curves, told = response_of_data(
+        units, found.model, response, by_reference=False, inputs=found.moving
+    )
     result = explored.result
     return replace(
         explored,
@@ -202,7 +213,7 @@ def _undriven(log: Log) -> tuple[str, ...]:
     return tuple(
         f"{'u' if single else f'u{j + 1}'} follows from the outputs and its own past: data from a loop "
         "without excitation, from which a plant is not identifiable (the inverse of the controller explains "
-        "them as well). Move the reference of the loop, or add dither to the input, and record again"
+        "them as well)"
         for j in only_answers(log.parts)
     )
 

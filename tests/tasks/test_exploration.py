@@ -114,6 +114,27 @@ def test_an_input_without_effect_earns_no_trust(tmp_path):
     assert "no trust" in told.stdout
 
 
+def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):
+    path = record(tmp_path / "log.csv")
+    _, *rows = path.read_text().splitlines()
+    parts = [row.split(",") for row in rows]
+    path.write_text("time_min,u1,u2,y\n" + "".join(f"{time},3,{u},{y}\n" for time, u, y in parts))
+    notes = explore(path).results.result["notes"]
+    assert any(note.startswith("u1 never moves") for note in notes)
+    assert not any("persistently exciting" in note for note in notes)
+
+
+def test_a_loop_whose_input_is_a_share_of_the_output_is_told_as_one(tmp_path):
+    """u = -0.6 y explains y to the last digit: not for want of noise."""
+    rng = np.random.default_rng(0)
+    y = scipy.signal.lfilter([1.0], [1.0, -0.66], rng.standard_normal(200))  # 0.9 y - 0.4 * 0.6 y
+    path = tmp_path / "log.csv"
+    path.write_text("u,y\n" + "".join(f"{-0.6 * x!r},{x!r}\n" for x in y.tolist()))
+    with pytest.raises(DataError, match="data from a loop without excitation") as caught:
+        explore(path)
+    assert caught.value.diagnostics[0].hint.startswith("move the reference of the loop")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

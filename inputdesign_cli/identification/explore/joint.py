@@ -24,6 +24,7 @@ _BLOCKS = 10
 _STILL = 0.02
 _FEWEST = 30
 _MOST_SAMPLES = 20_000
+_UNKNOWN = ("gain and dynamics",)
 _TOO_SIMPLE = "the input moves too little or too simply: apply steps of several lengths, or a PRBS"
 # So many structures, the best first, are tried for all outputs together where those that were chosen fail.
 _MOST_TRIED = 4
@@ -55,6 +56,11 @@ class Found:
     interleaved: bool
     still: tuple[int, ...]
 
+    @property
+    def moving(self) -> list[int]:
+        """The other inputs."""
+        return [j for j in range(self.model.inputs) if j not in self.still]
+
 
 def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) -> Found:
     """The model that records u (n, r), y (n, p) speak for, samples `step` apart.
@@ -65,9 +71,9 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) 
     u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
     still = tuple(int(j) for j in np.flatnonzero(np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0)))
     if len(still) == u.shape[1]:
-        check_varying(("a gain", "its dynamics"), u, y)
+        check_varying(_UNKNOWN, u, y)
     moving = [j for j in range(u.shape[1]) if j not in still]
-    check_varying(("a gain", "its dynamics"), u[:, moving], y)
+    check_varying(_UNKNOWN, u[:, moving], y)
     needed = _FEWEST * (len(moving) + 1) // 2
     if len(y) < needed:
         raise bad_spec(

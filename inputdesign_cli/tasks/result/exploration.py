@@ -87,10 +87,9 @@ def exploration_notes(
     for i, (chosen, taken, ranges) in enumerate(zip(found.outputs, found.taken, found.ranges, strict=True)):
         name = "y" if single else f"y{i + 1}"
         orders = ", ".join(f"{letter} {n}" for letter, n in taken.orders.numbers.items())
-        moving = [j for j in range(found.model.inputs) if j not in found.still]
         delays = " and ".join(
             f"{delay} from {'u' if alone else f'u{j + 1}'} (95 %: {low} to {high})"
-            for j, delay, (low, high) in zip(moving, taken.orders.delays, ranges, strict=True)
+            for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
         )
         notes.append(
             f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; estimated on one part it "
@@ -129,11 +128,10 @@ def exploration_notes(
 
 def _least_moved(log: Log, found: Found) -> str:
     """The input that changes in the fewest samples, of several, where these are few."""
-    moving = [j for j in range(found.model.inputs) if j not in found.still]
-    if len(moving) < 2:
+    if len(found.moving) < 2:
         return ""
-    changes = {j: sum(int(np.sum(np.diff(u[:, j]) != 0.0)) for u, _ in log.parts) for j in moving}
-    least = min(moving, key=lambda j: changes[j])
+    changes = {j: sum(int(np.sum(np.diff(u[:, j]) != 0.0)) for u, _ in log.parts) for j in found.moving}
+    least = min(found.moving, key=lambda j: changes[j])
     few = changes[least] <= _FEW_CHANGES
     return f" (u{least + 1} changes in {changes[least]} of its samples only)" if few else ""
 
