@@ -111,6 +111,8 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
     controller = loop_line(said["loop"], plant)
     asked = wished(said["wish"], plant, controller is not None, duration)
     nonparametric = any("frequency_response" in line for line in asked)
+    if nonparametric:  # its lines are as far apart as one over the time
+        duration = there
     heads = [
         "# Written by `idesign wizard`: every line follows from an answer. Change what you know better.",
         f"title: {_quoted(said['wish'])}",

@@ -32,14 +32,12 @@ _OF_CODE = {"coarse-converter": "converter", "delay-beyond-record": "time", "too
 _MESSAGES = {
     "unstable-loop": "with these settings the loop is unstable even with the plant as stated",
     "unbounded-error": "the plant integrates, and no experiment bounds its error at the lowest frequencies",
-    "too-few-lines": "too few frequencies between these two repeat within the time",
     "delay-beyond-record": "the dead time of the plant is as long as the experiment, or longer",
     "not-identifiable": "no experiment can tell the parameters of this plant apart",
 }
 _HINTS = {
     "unstable-loop": "take a smaller Kp, of the same sign as the gain of the plant, or a larger Ti",
     "unbounded-error": 'ask for "parameters within 5 %", or for a Bode plot from a frequency above zero on',
-    "too-few-lines": "widen the band, or take more time",
     "delay-beyond-record": "take more time; what is a second, and what a minute?",
     "not-identifiable": "has it a factor that cancels, or is it too small to be seen?",
     "coarse-converter": "move the operating point, or let the converter reach further",
@@ -47,6 +45,8 @@ _HINTS = {
 }
 _TERMS = {"nominal plant": "plant as stated", "the offset": "the operating point"}
 _PATH = re.compile(r"\b(?:accuracy|experiment|limits|noise|plant|signal|spectrum|uncertainty)(?:\.\w+)+")
+_LINES_THERE = re.compile(r"holds (\d+) .* (\d+) are asked")
+_LONG_ENOUGH = re.compile(r"samples or ([\d.e+]+) s in all")
 _QUIETER = re.compile(r"above max_sensitivity_db: ([\d.]+).*such as ([\d.]+)")
 
 
@@ -73,11 +73,17 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
     if one.message.startswith(f"{asked.asks} ({asked.key}): "):
         return one  # by a block inside
     why = _MESSAGES.get(one.code) or _in_words(one.message)
+    lines = _LINES_THERE.search(one.message)
+    if one.code == "too-few-lines" and lines is not None:
+        why = f"{lines[1]} frequencies between these two repeat within the time, and {lines[2]} are needed"
     quieter = _QUIETER.search(one.hint)
     hint = _HINTS.get(one.code, "")
     if quieter:
         least, roomy = quieter.groups()
         hint = f"ask for more than {least} dB (the nearer, the longer the experiment), such as {roomy} dB"
+    if one.code == "too-few-lines":
+        enough = _LONG_ENOUGH.search(one.hint)
+        hint = f"take {enough[1]} s or more, or a band that reaches higher" if enough else "take more time"
     place = one.location if one.location and not one.location.file.startswith("<") else None
     return replace(
         one,

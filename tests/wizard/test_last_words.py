@@ -171,3 +171,17 @@ def test_what_is_not_used_for_a_bode_plot_is_said():
     draft = compose({**ENGINEER, "wish": wish, "time": "8 h"}, "x", Path())
     assert any("how well the plant is known is not used" in one for one in draft.told)
     assert "# how well the plant is known is not used" in draft.text
+
+
+def test_a_bode_plot_that_is_refused_says_which_time_would_do():
+    """Harmonics of a fifth of an hour are 2 pi/720 s = 0.0087 rad/s apart."""
+    answers = {**ENGINEER, "wish": "Bode plot within 5 % from 0.001 to 0.01"}
+    with pytest.raises(SpecError) as caught:
+        compose(answers, "x", Path()).validate()
+    (told,) = caught.value.diagnostics
+    assert "1 frequencies between these two" in told.message
+    assert "20 are needed" in told.message
+    seconds = float(told.hint.split("take ")[1].split(" s or more")[0])
+    compose({**answers, "time": f"{seconds:g} s"}, "x", Path()).validate()
+    with pytest.raises(SpecError):
+        compose({**answers, "time": f"{0.95 * seconds:g} s"}, "x", Path()).validate()

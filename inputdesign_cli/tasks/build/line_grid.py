@@ -22,6 +22,9 @@ from inputdesign_cli.tasks.response import KEY
 # Beside the transient, periods of a block where nothing is said: their scatter tells the noise.
 _COUNTED = 4
 
+# Longer periods that are tried, up to so many times as long.
+_LONGEST, _TRIED = 1e3, 400
+
 
 def stated_response(spec: Spec) -> FrequencyResponse:
     """What `accuracy.frequency_response` says.
@@ -133,8 +136,9 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
     candidates = stated.lines
     if group is not None and candidates is not None:
         candidates += (candidates - 1) // (group - 1)
+    band, odd = (lo * step, hi * step), group is not None
     try:
-        found = harmonics_between(period, (lo * step, hi * step), candidates, odd=group is not None)
+        found = harmonics_between(period, band, candidates, odd=odd)
     except TooFewHarmonicsError as error:
         kind = "odd harmonics" if group is not None else "harmonics"
         asked = "at least one is" if candidates is None else f"{candidates} are"
@@ -143,12 +147,26 @@ def _in_band(spec: Spec, stated: FrequencyResponse, period: int) -> NDArray[np.i
             "too-few-lines",
             f"the band holds {error.there} {kind} of a period of {period} samples, and {asked} "
             f"asked for{left_out}",
-            hint="take a longer period (more samples, or fewer periods), fewer lines, or a wider band",
+            hint="take a longer period (more samples, or fewer periods"
+            f"{_longer(spec, period, band, candidates, odd=odd)}), fewer lines, or a higher end of the band",
             key=f"{KEY}.lines" if candidates is not None else f"{KEY}.band",
         ) from None
     if group is None:
         return found
     return thinned(found, group, np.random.default_rng(spec.signal.seed or 0))[: stated.lines]
+
+
+def _longer(spec: Spec, period: int, band: tuple[float, float], lines: int | None, *, odd: bool) -> str:
+    """Which period holds the lines, and which experiment of as many periods; nothing where none is found."""
+    for longer in np.unique(np.ceil(period * np.geomspace(1.0, _LONGEST, _TRIED)).astype(int)).tolist():
+        try:
+            harmonics_between(longer, band, lines, odd=odd)
+        except TooFewHarmonicsError:
+            continue
+        whole = longer * max(spec.experiment.samples // period, 1)
+        lasts = whole * spec.sample_time
+        return f": {longer} samples hold them, {whole} samples or {lasts:.6g} {spec.time_unit} in all"
+    return ""
 
 
 def _check_inside(spec: Spec, wanted: Array, period: int) -> None:
