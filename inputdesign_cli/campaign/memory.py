@@ -44,7 +44,7 @@ from inputdesign_cli.runs.run_directory import output_errors, read_run
 
 VERSION = 1
 _FROM_A_COPY = (
-    "bring it back from a copy of the directory; without one, begin another campaign, and let "
+    "put it back from a copy of the directory; without one, begin another campaign, and let "
     "`idesign identify` make a prior of the records that are left"
 )
 _HINTS = {

@@ -20,6 +20,7 @@ solver: {any_spectrum: false}
 
 
 # |S| of this loop reaches 4.038 dB: what a sound check of the result would refuse, it must not refuse here.
+@pytest.mark.slow
 @pytest.mark.parametrize("margin", [4.08, 4.1, 4.2])
 def test_the_design_passes_its_own_last_check(margin):
     found = tasks.solve(parse_spec(SPEC).with_(**{"accuracy.loop.max_sensitivity_db": margin}))
