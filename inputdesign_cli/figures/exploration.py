@@ -7,7 +7,7 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from inputdesign_cli.figures.style import ORANGE, PALETTE, legend_above
+from inputdesign_cli.figures.style import ORANGE, PALETTE, legend_over_all
 from inputdesign_cli.runs.curves import OrderCurves
 
 _LEAST_SHOWN = -20.0
@@ -27,4 +27,4 @@ def draw_orders(page: Figure, curves: OrderCurves, time_unit: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     name = "y" if curves.output is None else f"y{curves.output + 1}"
     axes.set_ylabel(f"fit of {name} on unseen data (%)")
-    legend_above(axes, handles)
+    legend_over_all(page, handles)
