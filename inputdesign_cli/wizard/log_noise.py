@@ -46,7 +46,7 @@ def log_noise_lines(explored: Spec, source: str, text: str, drift: str, folder: 
     has = f"the log tells a variance of {listed}, {'and drift' if moves else 'and no drift'}"
     lines = [f"noise:  # as you said; {has}", f"  variance: {json.dumps(variance)}  # {comment}"]
     if wanted and moves:  # with the colour that was estimated along
-        return [*lines, f"  drift: {json.dumps(told.drift)}  # an integrator in the noise", *_colour(told)]
+        return [*lines, *_shape(told)]
     base = DRIFTING if wanted else (1.0,)
     lines += ["  drift: true  # an integrator in the noise"] if wanted else []
     lines += [] if wanted or not colour else [f"  D: [1, {short(-colour)}]"]
@@ -56,11 +56,8 @@ def log_noise_lines(explored: Spec, source: str, text: str, drift: str, folder: 
 
 def _as_told(told: Noise, source: str) -> list[str]:
     """All of the noise of the model."""
-    lines = [f"noise:  # as {source} tells", f"  variance: {json.dumps(np.asarray(told.variance).tolist())}"]
-    lines += (
-        [f"  drift: {json.dumps(told.drift)}  # an integrator in the noise"] if np.any(told.drift) else []
-    )
-    return [*lines, *_colour(told)]
+    variance = json.dumps(np.asarray(told.variance).tolist())
+    return [f"noise:  # as {source} tells", f"  variance: {variance}", *_shape(told)]
 
 
 def _level(text: str, folder: Path, powers: NDArray[np.float64]) -> tuple[float, float, str]:
@@ -70,11 +67,11 @@ def _level(text: str, folder: Path, powers: NDArray[np.float64]) -> tuple[float,
     return noise_level(text, folder)
 
 
-def _colour(told: Noise) -> list[str]:
-    """C and D, where they are not 1."""
-    return [
-        f"  {name}: {json.dumps(rows)}" for name, rows in (("C", told.C), ("D", told.D)) if rows != (1.0,)
-    ]
+def _shape(told: Noise) -> list[str]:
+    """The drift, where there is one, and C and D, where they are not 1."""
+    drift = [f"  drift: {json.dumps(told.drift)}  # an integrator in the noise"] if np.any(told.drift) else []
+    rows = (("C", told.C), ("D", told.D))
+    return [*drift, *(f"  {name}: {json.dumps(found)}" for name, found in rows if found != (1.0,))]
 
 
 def _flat(polynomials: Sequence[Json]) -> bool:

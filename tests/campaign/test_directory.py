@@ -9,23 +9,7 @@ import numpy as np
 import pytest
 
 from inputdesign_cli.runs.run_directory import read_run
-from tests.support.campaigns import SPEC, answered, applied, planned, written
-from tests.support.commands import caller
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run `idesign` in an empty folder with the spec in it: its exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "s.yaml").write_text(SPEC)
-    return caller(monkeypatch, capsys)
-
-
-@pytest.fixture
-def begun(run, tmp_path):
-    """A campaign with its first plan."""
-    assert run("campaign", "s.yaml", "-o", "c", "--no-figures")[0] == 0
-    return tmp_path / "c"
+from tests.support.campaigns import answered, applied, planned, written
 
 
 def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_path):
@@ -123,120 +107,6 @@ def test_what_does_not_belong_is_refused_and_changes_nothing(run, begun, tmp_pat
         assert code == 2
         assert error in err
     assert (begun / "result.json").read_bytes() == before
-
-
-EDITS = {
-    "record elsewhere": lambda c, r: c["records"][0].update(file="../../etc/passwd"),
-    "record of no plan": lambda c, r: c["records"][0].update(plan="plan_99.csv"),
-    "too many samples": lambda c, r: c["records"][0].update(samples=5000),
-    "negative samples": lambda c, r: c["records"][0].update(samples=-7),
-    "half a sample": lambda c, r: c["records"][0].update(samples=20.5),
-    "energy in words": lambda c, r: c["records"][0].update(energy="nan"),
-    "plan in words": lambda c, r: c["rounds"][-1]["plan"].update(samples="many"),
-    "another state": lambda c, r: c.update(state="banana"),
-    "no rounds": lambda c, r: c.update(rounds=[]),
-    "a round that is none": lambda c, r: c["rounds"].append("x"),
-    "other parameters": lambda c, r: c.update(last={"b1": 1.0}),
-    "a parameter in words": lambda c, r: c["rounds"][-1]["estimate"].update(b1="x"),
-    "no cost": lambda c, r: c.update(first_cost=0.0),
-    "files that are left out": lambda c, r: r.update(files=["spec.yaml"]),
-    "no files": lambda c, r: r.pop("files"),
-}
-
-
-@pytest.mark.parametrize("name", EDITS)
-def test_what_was_edited_by_hand_is_told(name, run, begun, tmp_path):
-    run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")
-    result = json.loads((begun / "result.json").read_text())
-    record = applied(begun, tmp_path / "r2.csv")
-    EDITS[name](result["campaign"], result)
-    (begun / "result.json").write_text(json.dumps(result))
-    for command in (("status", "c"), ("next", "c", record, "--no-figures")):
-        code, _, err = run(*command)
-        assert code == 2
-        assert "run-unreadable" in err
-
-
-@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"time,u1\n0,x\n", b"time,u1\n0,nan\n"])
-def test_plans_that_are_no_plans_any_more_are_told(content, run, begun):
-    (begun / "plan_01.csv").write_bytes(content)
-    code, _, err = run("status", "c")
-    assert (code, "campaign-changed" in err) == (2, True)
-    without_digests(begun)
-    code, _, err = run("status", "c")
-    assert (code, "run-unreadable" in err) == (2, True)
-
-
-def without_digests(directory):
-    """As directories were before digests were kept."""
-    result = json.loads((directory / "result.json").read_text())
-    del result["campaign"]["digests"]
-    (directory / "result.json").write_text(json.dumps(result))
-
-
-def halved(text):
-    lines = text.splitlines()
-    return "\n".join(lines[: len(lines) // 2]) + "\n"
-
-
-def tenfold(text):
-    head, *rows = [row.split(",") for row in text.splitlines()]
-    return "\n".join(",".join(row) for row in [head, *([*r[:2], f"{10 * float(r[2])}"] for r in rows)]) + "\n"
-
-
-@pytest.mark.parametrize("damage", [halved, lambda text: text[:40], tenfold, lambda text: text + "\n"])
-def test_a_record_that_was_changed_decides_nothing(damage, run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    kept, before = (begun / "record_01.csv").read_text(), (begun / "result.json").read_bytes()
-    (begun / "record_01.csv").write_text(damage(kept))
-    for command in (
-        ("next", "c"),
-        ("next", "c", applied(begun, tmp_path / "r2.csv")),
-        ("next", "c", "--withdraw", 2),
-        ("status", "c"),
-    ):
-        code, _, err = run(*command)
-        assert code == 2
-        assert "campaign-changed" in err
-        assert "c/record_01.csv" in err
-        assert "--withdraw 1" in err
-    assert (begun / "result.json").read_bytes() == before
-    # Both ways that are told of mend it.
-    code, out, _ = run("next", "c", "--withdraw", 1, "--json", "--no-figures")
-    assert (code, json.loads(out)["campaign"]["rounds"][-1]["records"]) == (0, [])
-    assert run("next", "c", applied(begun, tmp_path / "r3.csv"), "--no-figures")[0] == 0
-    kept = (begun / "record_02.csv").read_text()
-    (begun / "record_02.csv").write_text(damage(kept))
-    assert run("next", "c", "--no-figures")[0] == 2
-    (begun / "record_02.csv").write_text(kept)
-    assert run("next", "c", "--no-figures")[0] == 0
-
-
-def test_a_plan_that_was_changed_decides_nothing(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    record = applied(begun, tmp_path / "r2.csv")
-    for name in ("plan_01.csv", "plan_02.csv"):
-        kept = (begun / name).read_text()
-        (begun / name).write_text(kept[:-3] + "9\n")
-        code, _, err = run("next", "c", record)
-        assert (code, "campaign-changed" in err, f"c/{name}" in err) == (2, True, True)
-        (begun / name).write_text(kept)
-    assert (begun / "signal.csv").read_text() == kept  # which the message says of the plan that is due
-
-
-def test_directories_without_digests_go_on_and_have_them_from_then_on(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    without_digests(begun)
-    assert run("next", "c", applied(begun, tmp_path / "r2.csv"), "--no-figures")[0] == 0
-    assert {f"record_0{n}.csv" for n in (1, 2)} < set(read_run(begun)["campaign"]["digests"])
-
-
-def test_a_record_that_is_gone_is_to_be_put_back(run, begun, tmp_path):
-    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
-    (begun / "record_01.csv").unlink()
-    code, _, err = run("next", "c")
-    assert (code, "run-incomplete" in err, "put it back" in err) == (2, True, True)
-    assert "run the spec again" not in err
 
 
 def test_rows_without_values_leave_the_others_where_they_are(run, begun, tmp_path):
