@@ -155,6 +155,7 @@ def test_estimates_that_are_normal_at_every_length_need_no_correction():
     assert error["confidence"]["kept"] == pytest.approx(0.95, abs=0.025)
 
 
+@pytest.mark.slow
 def test_short_records_need_a_larger_alpha_by_what_a_plain_simulation_tells():
     """The records are simulated and fitted plainly here: a pole, by least squares of the simulation error."""
     runs = "{exact: 0.9, draws: 1000, runs: 1000}"

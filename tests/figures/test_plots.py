@@ -58,15 +58,11 @@ def test_names_and_units_are_drawn_as_they_are():
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_no_text_of_a_figure_is_a_formula(name, page):
+def test_text_has_one_size_is_no_formula_and_no_legend_hides_a_curve(name, page):
     figure = page(CURVES[name])
     texts = [text for text in figure.findobj(Text) if text.get_text()]
     assert not [text.get_text() for text in texts if text.get_parse_math() or "$" in text.get_text()]
-
-
-@pytest.mark.parametrize("name", CURVES)
-def test_no_curve_lies_under_a_legend(name, page):
-    figure = page(CURVES[name])
+    assert {text.get_fontsize() for text in texts if text.get_text().strip()} == {TYPE_SIZE}
     for axes in figure.axes:
         legend = axes.get_legend()
         if legend:
@@ -109,12 +105,6 @@ def overlap(one, other):
     """Pixels by which two boxes lie on each other, across or down, whichever is less."""
     both = Bbox.intersection(one, other)
     return min(both.width, both.height) if both else 0.0
-
-
-@pytest.mark.parametrize("name", CURVES)
-def test_all_text_has_one_size(name, page):
-    figure = page(CURVES[name])
-    assert {text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()} == {TYPE_SIZE}
 
 
 @pytest.mark.parametrize(("kind", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])

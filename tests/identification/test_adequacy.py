@@ -52,6 +52,7 @@ def test_the_level_is_shared_by_all_tests():
     assert failed([*five[1:], one]) == (one,)
 
 
+@pytest.mark.slow
 def test_probabilities_of_right_models_are_uniform():
     """Kolmogorov and Smirnov over 20 records each of one output and of two."""
     rng = np.random.default_rng(2)
@@ -88,6 +89,7 @@ def test_noise_is_known_no_better_than_its_zero(w):
     assert white.probability(11.0, along / np.linalg.norm(along)) == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_slow_noise_that_is_hardly_known_is_no_drift():
     """Taken for known, the noise below its zero had a probability below 0.05 in 9 of these 25 records."""
     rng, model = np.random.default_rng(9), one_channel([0, 1.0], C=[1, -0.9])

@@ -37,7 +37,7 @@ def cut_out(delay, seed, *, colour=0.0):
 
 
 @pytest.mark.parametrize("words", [IN_S, IN_STATES], ids=["s", "states"])
-@pytest.mark.parametrize("delay", [0.4, 12.3])
+@pytest.mark.parametrize("delay", [0.4, pytest.param(12.3, marks=pytest.mark.slow)])
 def test_inputs_before_a_record_that_come_late_are_not_taken_for_faults(words, delay):
     """The first dead time of the record holds what nobody recorded."""
     model, failed, deviations, variances = model_of(words, delay), 0, [], []
@@ -76,6 +76,7 @@ def test_a_start_that_no_output_shows_changes_nothing():
     np.testing.assert_allclose(told[1], told[0], atol=0.03 * np.abs(told[0]).max())
 
 
+@pytest.mark.slow
 def test_the_same_behind_coloured_noise():
     model, failed = model_of(IN_S, 5.4, COLOUR), 0
     for seed in range(2):
@@ -124,6 +125,7 @@ def test_what_many_starts_hide_is_still_found():
         assert identify(model, u, y, lengths=lengths, rest=False).failed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zero", [0.97, 0.5])
 def test_noise_from_before_needs_no_free_start(zero):
     """A plant at rest; of noise that was there before, 0.97^20 = 0.54 is left after a tenth of the record."""

@@ -108,6 +108,7 @@ def test_what_acts_alike_where_it_is_small_shares_a_test():
     assert set(by_name(found)) == {"b3 or f3", "b0", "c2 or d2"}
 
 
+@pytest.mark.slow
 def test_probabilities_of_right_models_are_uniform():
     """Kolmogorov and Smirnov over 12 records of one output; the share below 5 % in 8 of two."""
     rng = np.random.default_rng(4)

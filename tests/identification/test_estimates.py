@@ -81,6 +81,7 @@ def test_a_model_that_is_too_small_fails_the_residual_tests():
     assert small.independence.probability < 1e-6
 
 
+@pytest.mark.slow
 def test_residuals_of_a_right_model_pass_as_often_as_they_should():
     u, y = data("oe", 400, np.random.default_rng(8), runs=60)
     p = [identify(SYSTEMS["oe"], u[i], y[i]) for i in range(60)]

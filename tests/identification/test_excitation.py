@@ -54,7 +54,7 @@ def test_the_covariance_of_collinear_gradients_is_that_of_exact_arithmetic():
 
 @settings(max_examples=6, deadline=None)
 @given(of_u=DECADES, of_y=DECADES)
-@pytest.mark.parametrize("rest", [True, False])
+@pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_units_of_signals_change_no_answer(rest, of_u, of_y):
     # With a level to be estimated a root of C at 0.98 runs to the circle in 400 samples: no minimum there.
     of_noise = np.array([name == "c1" for name in SLOW.names])

@@ -38,7 +38,10 @@ def seen(u, y, model):
     )
 
 
-@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize(
+    "step",
+    [step if step in (None, 0.5, 5.0) else pytest.param(step, marks=pytest.mark.slow) for step in STEPS],
+)
 def test_a_sensor_that_moves_is_not_frozen(step):
     assert [seed for seed in range(4) if seen(*record(seed, step))] == []
 

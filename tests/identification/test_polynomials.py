@@ -179,6 +179,7 @@ def test_a_batch_reaches_the_covariance_of_theory():
     np.testing.assert_allclose(found.information[3], alone.information, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_residual_tests_are_as_often_significant_as_they_should():
     model = arx()
     u, y = simulated(model, 400, np.random.default_rng(12), 40)

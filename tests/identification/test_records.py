@@ -84,6 +84,7 @@ def test_joint_estimates_of_records_about_different_levels_reach_the_covariance(
     assert np.mean(squares) == pytest.approx(k, abs=5 * np.sqrt(2 * k / 15))
 
 
+@pytest.mark.slow
 def test_records_at_rest_are_taken_for_such():
     u, y = data("bj", 400, np.random.default_rng(7), runs=30)
     free = [identify(SYSTEMS["bj"], u[i], y[i]).free for i in range(30)]

@@ -118,6 +118,7 @@ def test_the_unit_of_the_input_does_not_matter():
         assert other[name].size == pytest.approx(found.size, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_probabilities_of_right_models_are_uniform():
     rng = np.random.default_rng(4)
     u, y = data("bj", 300, rng, runs=12)

@@ -127,7 +127,9 @@ def browser():
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])
+@pytest.mark.parametrize(
+    ("width", "scheme"), [(400, "dark"), pytest.param(1400, "light", marks=pytest.mark.slow)]
+)
 def test_a_page_is_accessible_and_nothing_is_clipped(pages, browser, name, scheme, width):
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     page.goto((pages / f"{name}.html").as_uri())

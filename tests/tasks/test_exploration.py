@@ -187,6 +187,7 @@ def test_a_sample_time_of_the_file_is_positive(tmp_path):
             read(path)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_stands_still_is_told_with_its_rows(tmp_path):
     path = record(tmp_path / "log.csv", samples=400)
     good = explore(path).results.result["notes"]
@@ -224,6 +225,7 @@ def test_times_of_the_record_stay_under_a_verdict(run, tmp_path):
     assert found.tables["fit"].columns["time_min"][[0, -1]].tolist() == [1000.0, 1149.5]
 
 
+@pytest.mark.slow
 def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
     """Of two inputs the second steps once only: plants in s with more than one pole cannot be told."""
     rng = np.random.default_rng(0)
@@ -245,6 +247,7 @@ def test_structures_that_the_record_does_not_tell_are_named(tmp_path):
     assert "u2 changes in 1 of its samples only" in told[0]
 
 
+@pytest.mark.slow
 def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
     rng = np.random.default_rng(2)
     u = np.isin(np.arange(300) // 10, [2, 3, 4, 5, 6, 7, 8, 17, 18, 19, 20, 21, 22, 23]).astype(float)

@@ -114,6 +114,7 @@ def test_without_time_nothing_is_begun():
     assert "solver.time_limit left no time" in foreseen.notes[0]
 
 
+@pytest.mark.slow
 def test_runs_that_begin_at_the_truth_say_how_many_would_end_elsewhere(monkeypatch):
     monkeypatch.setattr(simulation, "_SEARCHED", 5)
     spec = load_spec(

@@ -58,6 +58,7 @@ def test_a_limit_on_the_density_counts_every_direction():
     assert codes(criterion, "limits={output_power: 9, spectrum: 4}") == []
 
 
+@pytest.mark.slow
 def test_a_limit_may_leave_combinations_that_the_cost_counts():
     """The cheapest design puts little into y; a limit on y that it keeps costs a little, without warnings."""
     free = {"cost": "{input_power: 1}", "spectrum": "{type: fir, order: 3}", "signal": "{candidates: 1}"}

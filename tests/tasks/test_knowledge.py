@@ -46,6 +46,7 @@ def test_a_rival_that_the_plant_cannot_be_leaves_nothing_open(known, tmp_path):
     assert "far outside of what uncertainty says of the plant" in said(found.results)
 
 
+@pytest.mark.slow
 def test_the_likeliest_of_all_is_not_taken_where_the_plant_cannot_be_that(tmp_path):
     astray = 0
     for seed in range(3):

@@ -61,7 +61,11 @@ def meets(text: str, samples: int, objective: str) -> bool:
 @pytest.mark.parametrize(
     ("texts", "objectives"),
     [
-        ([LAG.replace("seed: 0", f"seed: {seed}") for seed in range(3)], ["least_cost", "best_accuracy"]),
+        pytest.param(
+            [LAG.replace("seed: 0", f"seed: {seed}") for seed in range(3)],
+            ["least_cost", "best_accuracy"],
+            marks=pytest.mark.slow,
+        ),
         ([MOVES], ["best_accuracy"]),
         ([TWO], ["least_cost"]),
     ],

@@ -133,20 +133,13 @@ def test_data_of_the_error_reach_the_terminal(tmp_path):
     assert error["details"]["factor"] >= error["details"]["factor_bound"] > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limits", "keys"),
     [
         ("amplitude: {}", {"amplitude.input": 0.1}),
-        pytest.param(
-            "amplitude: {}, input_power: {}",
-            {"amplitude.input": 0.1, "input_power": 0.009},
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "amplitude: {}, output_power: {}",
-            {"amplitude.input": 0.1, "output_power": 0.02},
-            marks=pytest.mark.slow,
-        ),
+        ("amplitude: {}, input_power: {}", {"amplitude.input": 0.1, "input_power": 0.009}),
+        ("amplitude: {}, output_power: {}", {"amplitude.input": 0.1, "output_power": 0.02}),
     ],
 )
 def test_the_factor_of_an_amplitude_is_its_own(limits, keys):

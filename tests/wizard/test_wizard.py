@@ -194,6 +194,7 @@ def test_a_log_is_explored(tmp_path):
     assert abs(gain) == pytest.approx(2.5, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_drifting_log_of_a_lag_can_be_tuned_for(tmp_path):
     """A search over structures takes drift for a second lag and a zero, which no rule of tuning knows."""
     rng = np.random.default_rng(4)
@@ -295,7 +296,14 @@ def _log(folder, samples=1200, *, beside=0.0):
     )
 
 
-@pytest.mark.parametrize(("drift", "drifts"), [("yes", True), ("no", False), ("not known", False)])
+@pytest.mark.parametrize(
+    ("drift", "drifts"),
+    [
+        ("yes", True),
+        pytest.param("no", False, marks=pytest.mark.slow),
+        pytest.param("not known", False, marks=pytest.mark.slow),
+    ],
+)
 def test_the_noise_that_is_stated_holds_beside_a_log(tmp_path, drift, drifts):
     _log(tmp_path)
     answers = {**ENGINEER, "plant": "log log.csv", "noise": "standard deviation 0.2", "drift": drift}
@@ -314,6 +322,7 @@ def test_a_log_may_tell_more_noise_than_the_resolution_leaves(tmp_path):
     assert draft.spec().noise.variance == pytest.approx(0.09, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
     _log(tmp_path, 300, beside=4.0)
     wish = "prediction within 5 % up to 0.1"
