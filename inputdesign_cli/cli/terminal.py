@@ -64,12 +64,19 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
 def _told(error: IdesignError, *, as_data: bool) -> int:
     """Tell an error, on stdout too if that is to be data; its exit code."""
-    from inputdesign_cli.diagnostics import as_json, render
+    from inputdesign_cli.diagnostics import as_json
 
     if as_data:
         typer.echo(json.dumps({"errors": as_json(error)}, indent=1, ensure_ascii=False))
-    typer.echo(render(error, color=colourful(sys.stderr)).rstrip("\n"), err=True)
+    complain(error)
     return error.exit_code
+
+
+def complain(error: IdesignError) -> None:
+    """Tell an error on stderr; the command may go on."""
+    from inputdesign_cli.diagnostics import render
+
+    typer.echo(render(error, color=colourful(sys.stderr)).rstrip("\n"), err=True)
 
 
 def _refusal(error: OSError | MemoryError) -> Diagnostic:

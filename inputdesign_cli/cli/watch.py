@@ -14,6 +14,7 @@ import typer
 
 from inputdesign_cli.cli.options import Confine, Fast, Figures, Output, Overrides, Overwrite
 from inputdesign_cli.cli.run import Place, keep
+from inputdesign_cli.cli.terminal import complain
 from inputdesign_cli.errors import STANDARD_INPUT, IdesignError
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def watch(
     board.show(message_page(spec.name, "Computing .."))
     with serving(board, port) as address, painters() as drawing:
         typer.echo(address)
+        typer.echo(f"follows {spec}; open the address in a browser, Ctrl-C ends it", err=True)
         if spec.is_dir():
             _follow_directory(spec, board)
         told = [*(overrides or []), *(["solver.any_spectrum=false"] if fast else [])]
@@ -101,11 +103,13 @@ def _follow_spec(
                 board.show(solved(pictures=False).page)
                 followed = solved(painters=drawing.executor)
                 board.show(followed.page)
+                typer.echo(followed.told, err=True)
                 drawing.get_ready()
                 if figures and stamp(files) == before:
                     keep(results, place, figures=True, json_output=False, quiet=True)
         except IdesignError as error:
             followed = followed.failed(error, lines, str(spec))
+            complain(error)
         if stamp(files) == before:
             board.show(followed.page)
             wait_for_change(files, before)

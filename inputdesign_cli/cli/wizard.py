@@ -11,7 +11,7 @@ import typer
 from inputdesign_cli.cli.computing import computing
 from inputdesign_cli.cli.options import Overwrite, Quiet
 from inputdesign_cli.cli.run import Place, keep
-from inputdesign_cli.cli.terminal import colourful, status
+from inputdesign_cli.cli.terminal import complain, status
 from inputdesign_cli.errors import OutputError, SpecError
 
 if TYPE_CHECKING:
@@ -122,8 +122,6 @@ def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
     """The draft of somebody at the terminal, who is asked again where an answer cannot be used."""
     import questionary
 
-    from inputdesign_cli.diagnostics import render
-
     with status("thinking ...", quiet=quiet):
         from inputdesign_cli.wizard.conversation import Conversation
     talk = Conversation(known, output.stem, output.parent)
@@ -136,7 +134,7 @@ def _asked(known: dict[str, str], output: Path, quiet: bool) -> Draft:
         with status("thinking ...", quiet=quiet):
             wrong = talk.answer(text)
         if wrong is not None:
-            typer.echo(render(wrong, color=colourful(sys.stderr)).rstrip("\n"), err=True)
+            complain(wrong)
     assert talk.draft is not None
     return talk.draft
 

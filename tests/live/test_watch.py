@@ -20,10 +20,10 @@ PATIENCE = 120.0
 
 
 @contextmanager
-def watching(path, *more):
-    """The address of the page, and the process behind it."""
+def watching(path, *more, stderr=None):
+    """The address of the page; what else is told goes to the file `stderr`."""
     command = [sys.executable, "-m", "inputdesign_cli", "watch", str(path), *map(str, more)]
-    with running(command, stdout=subprocess.PIPE, text=True, cwd=path.parent) as process:
+    with running(command, stdout=subprocess.PIPE, stderr=stderr, text=True, cwd=path.parent) as process:
         yield process.stdout.readline().strip()
         process.terminate()
         process.wait(30)
@@ -100,6 +100,19 @@ def test_the_answer_is_shown_before_the_pictures_are_drawn(spec, tmp_path):
         assert min(waited) < 0.5
 
 
+def test_the_terminal_keeps_a_line_of_every_round(spec, tmp_path):
+    with (
+        open(tmp_path / "told.txt", "w") as told,
+        watching(spec, "-o", tmp_path / "run", "--no-figures", stderr=told) as address,
+    ):
+        page_with(address, "data:image/svg")
+        saved(spec, "relative: 0.1", "relativ: 0.1")
+        page_with(address, "What is wrong")
+    lines = (tmp_path / "told.txt").read_text()
+    assert lines.index("Ctrl-C ends it") < lines.index("Computed at") < lines.index("[unknown-key]")
+    assert "did you mean" in lines
+
+
 def test_what_the_user_writes_is_text_on_the_page():
     line = "a: '<script>alert(1)</script>'"
     wrong = SpecError.because("unknown-key", line, line, location=Location("s.yaml", 1, 1, line))
@@ -123,6 +136,10 @@ def test_a_browser_follows_by_itself(spec, tmp_path):
         saved(spec, "relative: 0.2", "relativ: 0.2")
         page.wait_for_selector("mark", timeout=1000 * PATIENCE)
         assert faults == []
+        tops = """() => [...document.querySelectorAll(".level > section")].map(
+            (each) => each.querySelector("figure").getBoundingClientRect().top)"""
+        before, after = page.evaluate(tops)
+        assert before == after
         # What judges a page is a script that the policy of the server would forbid.
         other = browser.new_page(viewport={"width": 400, "height": 900})
         other.set_content(page.content().replace('<script src="follow.js" defer=""></script>', ""))
