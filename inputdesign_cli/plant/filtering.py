@@ -27,9 +27,9 @@ def filtered(numerator: ArrayLike, denominator: ArrayLike, values: NDArray, axis
         return np.asarray(scipy.signal.lfilter(b, a, values, axis=axis))
     if values.ndim == 1:
         return _of_rows(b, a, values[None])[0]
-    turned = np.moveaxis(values, axis, -1)
+    turned = values.swapaxes(axis, -1)
     rows = _of_rows(b, a, turned.reshape(-1, values.shape[axis]))
-    return np.moveaxis(rows.reshape(turned.shape), -1, axis)
+    return rows.reshape(turned.shape).swapaxes(axis, -1)
 
 
 def _of_rows(b: NDArray, a: NDArray, rows: NDArray) -> NDArray:
@@ -44,6 +44,7 @@ def _recursion(a: NDArray, driven: NDArray) -> NDArray:
     """Rows y (m, n) with sum_i a_i y(t - i) = driven(t): a triangular system with few diagonals."""
     samples = driven.shape[1]
     order = min(a.size, samples) - 1
-    diagonals = np.repeat(a[: order + 1, None].astype(driven.dtype), samples, axis=1)
+    diagonals = np.empty((order + 1, samples), dtype=driven.dtype)
+    diagonals[:] = a[: order + 1, None]
     solve = scipy.linalg.blas.ztbsv if np.iscomplexobj(driven) else scipy.linalg.blas.dtbsv
     return np.array([solve(order, diagonals, row, lower=1, diag=1) for row in driven])
