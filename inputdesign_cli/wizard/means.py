@@ -105,6 +105,11 @@ def drifts(text: str, *, otherwise: bool = False) -> bool:
     return known[text.lower()]
 
 
+def at_rest(text: str) -> bool:
+    """Whether the answer `noise` names data at rest."""
+    return text.partition(" ")[0].lower() == "rest"
+
+
 def noise_level(text: str, folder: Path) -> tuple[float, float, str]:
     """The variance of white noise, or of what a pole (0 where there is none) colours, and how it is known.
 
@@ -112,8 +117,8 @@ def noise_level(text: str, folder: Path) -> tuple[float, float, str]:
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    word, _, name = text.partition(" ")
-    if word.lower() == "rest":
+    if at_rest(text):
+        name = text.partition(" ")[2]
         level, colour, comment = _at_rest(folder / name.strip())
         return level, colour, f"of {name.strip()}: {comment}"
     deviation, step = after(text, "standard deviation|deviation|std"), after(text, "resolution")

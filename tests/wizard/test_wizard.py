@@ -333,10 +333,40 @@ def test_what_speaks_against_the_model_of_a_log_is_told(tmp_path):
         assert f"# against this model: {one.partition(': ')[2]}\n" in draft.text
 
 
+@pytest.mark.parametrize("explored", ["plant: {A: [1, -0.7], B: [0, 1]}", "plant: {B: [0, 1], F: [1, -0.7]}"])
+@pytest.mark.parametrize(
+    ("text", "variance"),
+    [("standard deviation 0.2", 0.04), ("resolution 0.1", 0.02), ("resolution 1", 1 / 12)],
+)
+def test_noise_of_a_stated_size_is_correlated_as_the_log_tells(explored, text, variance):
+    """A pole at 0.7, whether A or D has it: the variance is that of e over 1 - 0.7^2; 0.02 by the log."""
+    D = "" if "A:" in explored else ", D: [1, -0.7]"
+    noise = f"noise: {{variance: {0.02 * (1 - 0.49):.6g}{D}}}"
+    spec = parse_spec(f"sample_time: 5\n{explored}\n{noise}\n", design=False)
+    lines = log_noise_lines(spec, "log.csv", text, "no", Path())
+    told = parse_spec("\n".join(["sample_time: 5", explored, *lines]), design=False)
+    A = getattr(told.plant, "A", None) or (1.0,)
+    assert np.convolve(A, told.noise.D).tolist() == [1.0, -0.7]
+    assert told.noise.C == (1.0,)
+    assert told.noise.variance == pytest.approx(variance * (1 - 0.49), rel=1e-5)
+
+
+def test_noise_of_two_outputs_is_that_of_each():
+    plant = "plant: {B: [[[0, 1]], [[0, 1]]], F: [[[1, -0.7]], [[1, -0.7]]]}"
+    noise = "noise: {variance: [[0.1, 0], [0, 0.1]], D: [[1, -0.6], [1]]}"
+    spec = parse_spec(f"sample_time: 5\n{plant}\n{noise}\n", design=False)
+    lines = log_noise_lines(spec, "log.csv", "standard deviation 0.2", "no", Path())
+    told = parse_spec("\n".join(["sample_time: 5", plant, *lines]), design=False)
+    np.testing.assert_allclose(told.noise.covariance(2), np.diag([0.04 * 0.64, 0.04]), rtol=1e-12)
+    assert told.noise.D == spec.noise.D
+
+
 def test_noise_is_that_of_the_output_also_where_the_log_has_it_behind_a_lag():
-    """Noise e C / A of A = 1 - 0.7 q^-1 is white where C is A, whatever the order in the log."""
+    """Noise e C / A that is to drift is that of the output alone where C has A as a factor."""
     explored = parse_spec(
         "sample_time: 5\nplant: {A: [1, -0.7], B: [0, 1]}\nnoise: {variance: 1}\n", design=False
     )
-    lines = log_noise_lines(explored, "log.csv", "standard deviation 0.2", "no", Path())
-    assert lines[-1] == "  C: [1.0, -0.7]"
+    lines = log_noise_lines(explored, "log.csv", "standard deviation 0.2", "yes", Path())
+    told = parse_spec("\n".join(["plant: {A: [1, -0.7], B: [0, 1]}", *lines]), design=False).noise
+    assert told.drift
+    np.testing.assert_allclose(np.polydiv(told.C, [1.0, -0.7])[1], 0.0, atol=1e-12)
