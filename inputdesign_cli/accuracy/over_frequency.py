@@ -61,9 +61,9 @@ class OverFrequency(Requirement):
 
     def plant_rows(self, w: ArrayLike) -> NDArray[np.float64]:
         """Real and imaginary parts of the gradient of the entry (n, 2, k), or of all (n, 2 p r, k)."""
-        gradient = self.experiment.plant_gradient(w)
         if self.entry is not None:
-            return real_rows(gradient[:, :, self.entry[0], self.entry[1]])
+            return real_rows(self.experiment.entry_gradient(w, *self.entry))
+        gradient = self.experiment.plant_gradient(w)
         flat = np.moveaxis(gradient.reshape(*gradient.shape[:2], -1), 1, 2)
         return np.concatenate([flat.real, flat.imag], axis=1)
 

@@ -220,6 +220,7 @@ class _Campaign(_Kept):
     last: dict[str, FiniteFloat] | None = None
     first_cost: PositiveFloat | None = Field(default=None, allow_inf_nan=False)
     digests: dict[str, str] = {}
+    regardless: bool = False
 
     def fits(self, files: Mapping[str, bytes]) -> bool:
         """Whether all files are there that it speaks of, plans as long as what was applied of them."""

@@ -46,13 +46,20 @@ def begun(decide: Decide, folder: Path, directory: Path) -> Results:
 
 
 def advanced(
-    decide: Decide, memory: Memory, given: Path | None, part: Part | None, *, unlike: bool = False
+    decide: Decide,
+    memory: Memory,
+    given: Path | None,
+    part: Part | None,
+    *,
+    unlike: bool = False,
+    regardless: bool = False,
 ) -> Results:
     """The next decision, with a new record or with those at hand.
 
     Args:
         given: the file of the user, and what was read of it.
         unlike: whether to take a record at another scale than its plan, like another plan, or like none.
+        regardless: whether to go on, from now on, where tests refute the structure.
 
     Raises:
         DataError: `campaign-over`; `data-repeated`, `record-too-long`, `record-other-part`,
@@ -68,7 +75,7 @@ def advanced(
         files[f"{name}_as_given{given.suffix.lower()}"] = read_regular(given)
         records.append({"file": f"{name}.csv", "given": given.name, **entry})
         notes = [*part.notes, *of_the_plan]
-    decided = _again(decide, memory, records, files, given=given)
+    decided = _again(decide, memory, records, files, given=given, regardless=regardless)
     if not notes:
         return decided
     told = dict.fromkeys([*notes, *decided.result.get("notes", [])])
@@ -100,9 +107,11 @@ def _again(
     files: dict[str, bytes],
     *,
     given: Path | None = None,
+    regardless: bool = False,
 ) -> Results:
     counting = [str(record["file"]) for record in records if not record["withdrawn"]]
     campaign = {**memory.campaign, "records": records}
+    campaign |= {"regardless": True} if regardless else {}
     last, seed = campaign.get("last"), len(campaign["rounds"]) + 1
     with _on_disc(files, counting, given) as paths:
         past = Past(
@@ -112,10 +121,27 @@ def _again(
             last=None if last is None else np.array(list(last.values()), dtype=float),
             first_cost=campaign.get("first_cost"),
             seed=seed,
+            regardless=bool(campaign.get("regardless", False)),
         )
         decision = decide(past)
+    if decision.refuted:
+        told = _refuted(memory.directory, records, past.done, decision.rules.end)
+        decision = replace(decision, notes=(told, *decision.notes))
     results = _decided(decision, campaign, files, seed=seed)
     return replace(results, result={**results.result, "made_from": list(memory.made_from)})
+
+
+def _refuted(directory: Path, records: Sequence[Mapping[str, Json]], done: int, end: int) -> str:
+    """That a campaign ends before its time, and what to do."""
+    every = all(not record["withdrawn"] for record in records)
+    names = ["record_??.csv"] if every else [r["file"] for r in records if not r["withdrawn"]]
+    listed = " ".join(str(directory / name) for name in names)
+    return (
+        f"the campaign ends after {done} of at most {end} samples: tests of the residuals refute the "
+        "structure of the model (see the other notes), and what it lacks it would lack however long it went "
+        f"on. Look for another one in what has been recorded, `idesign explore {listed}`, and begin another "
+        f"campaign with it. To go on as it is: `idesign next {directory} --regardless`"
+    )
 
 
 def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
@@ -162,7 +188,8 @@ def _check_going_on(memory: Memory) -> None:
         raise DataError.because(
             "campaign-over",
             f"the campaign in {memory.directory} has ended: {memory.state}",
-            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign",
+            hint="withdraw a record with --withdraw N to go on without it, or begin another campaign; where "
+            "tests refute the structure, --regardless without a record goes on as it is",
         )
 
 

@@ -79,6 +79,13 @@ def proceed(
             "or none.",
         ),
     ] = False,
+    regardless: Annotated[
+        bool,
+        typer.Option(
+            "--regardless",
+            help="Go on, from now on, where tests of the residuals refute the structure of the model.",
+        ),
+    ] = False,
     columns: Columns = "",
     operating_point: OperatingPoint = "",
     figures: Figures = True,
@@ -93,6 +100,8 @@ def proceed(
     """
     if data is not None and withdraw is not None:
         raise typer.BadParameter("give a record, or withdraw one", param_hint="--withdraw")
+    if regardless and withdraw is not None:
+        raise typer.BadParameter("withdraw first, then say it without a record", param_hint="--regardless")
     with computing(directory, quiet=quiet):
         from inputdesign_cli import tasks
         from inputdesign_cli.campaign.memory import held, read_memory
@@ -109,14 +118,14 @@ def proceed(
             if withdraw is not None:
                 results = withdrawn(decide, memory, withdraw)
             elif data is None:
-                results = advanced(decide, memory, None, None)
+                results = advanced(decide, memory, None, None, regardless=regardless)
             else:
                 point = levels(operating_point)
                 taken = Preparation(
                     columns=named(columns, "--columns", "u1=Heater 1,y1=4"), operating_point=point
                 )
                 part = tasks.recorded_part(stated, data, taken)
-                results = advanced(decide, memory, data, part, unlike=as_applied)
+                results = advanced(decide, memory, data, part, unlike=as_applied, regardless=regardless)
         renew(results, directory, figures=figures, json_output=json_output, quiet=quiet)
     code = _EXIT[results.result["status"]]
     if code:

@@ -234,9 +234,15 @@ def score_tests(
     return tuple(tests)
 
 
-def failed(tests: Sequence[ScoreTest], directed: Sequence[ScoreTest] = ()) -> tuple[ScoreTest, ...]:
-    """Those that refute the model, each at its share of the level of its group (Bonferroni)."""
-    groups = ((directed, DIRECTED_LEVEL), (tests, LEVEL))
+def failed(
+    tests: Sequence[ScoreTest], directed: Sequence[ScoreTest] = (), looks: int = 1
+) -> tuple[ScoreTest, ...]:
+    """Those that refute the model, each at its share of the level of its group (Bonferroni).
+
+    Args:
+        looks: how often they are asked as data come in; the looks share the level as well.
+    """
+    groups = ((directed, DIRECTED_LEVEL / looks), (tests, LEVEL / looks))
     return tuple(test for group, level in groups for test in group if test.probability * len(group) < level)
 
 

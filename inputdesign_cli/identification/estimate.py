@@ -96,7 +96,11 @@ class Estimate:
     @property
     def failed(self) -> tuple[ScoreTest, ...]:
         """The tests that refute the structure."""
-        return failed(self.tests, tuple(one.test for one in self.directed))
+        return self.failed_within(1)
+
+    def failed_within(self, looks: int) -> tuple[ScoreTest, ...]:
+        """Those where data come in and are looked at so often: a right model seldom fails at any look."""
+        return failed(self.tests, tuple(one.test for one in self.directed), looks)
 
 
 @dataclass(frozen=True)

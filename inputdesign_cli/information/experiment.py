@@ -95,6 +95,11 @@ class Experiment(Coordinates):
         """dG/dtheta (n, k, p, r), in these coordinates."""
         return self._whiten(self.model.plant_gradient(w))
 
+    def entry_gradient(self, w: ArrayLike, output: int, input: int) -> ComplexArray:
+        """(n, k): that of one entry of G."""
+        entry = self.model.plant_gradient(w)[:, :, output : output + 1, input : input + 1]
+        return self._whiten(entry)[:, :, 0, 0]
+
     def _whiten(self, gradient: ComplexArray) -> ComplexArray:
         if self.factor is None:
             return gradient

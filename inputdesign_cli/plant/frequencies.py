@@ -107,7 +107,9 @@ def local_maxima(
     ).ravel()
     places = np.repeat(around + 1, _REFINEMENT)
     finer, values = np.insert(grid, places, inside), np.insert(values, places, function(inside))
-    index = _peaks(values, above - SLACK * abs(above) if np.isfinite(above) else above)
+    index = _within_reach(values, around, above)
+    if index.size == 0:
+        return np.zeros(0), np.zeros(0)
     left, right = finer[np.maximum(index - 1, 0)], finer[np.minimum(index + 1, finer.size - 1)]
     best, best_value = finer[index], values[index]
     points, repeats = _ZOOM_FEW if index.size <= _FEW else _ZOOM_MANY
@@ -133,6 +135,25 @@ def local_maxima(
         best, best_value = np.where(flat, grid[end], best), np.where(flat, level, best_value)
     kept = best_value > above
     return best[kept], best_value[kept]
+
+
+def _within_reach(values: Array, around: NDArray[np.intp], above: float) -> NDArray[np.intp]:
+    """The peaks of a grid beside which the function may exceed `above`.
+
+    The cells `around` are refined: there it has less room to rise, in proportion to the steps at least.
+
+    Args:
+        around: cells of the grid before it was refined, ascending; cell i lies between points i and i + 1.
+    """
+    if not np.isfinite(above):
+        return _peaks(values, above)
+    index = _peaks(values, above - SLACK * abs(above))
+    first = around + _REFINEMENT * np.arange(around.size)
+    refined = np.zeros(values.size - 1, dtype=bool)
+    refined[first[:, None] + np.arange(_REFINEMENT + 1)] = True
+    beside = np.pad(refined, 1, constant_values=True)  # beyond the ends there is nothing
+    slack = np.where(beside[index] & beside[index + 1], SLACK / (_REFINEMENT + 1), SLACK)
+    return index[values[index] > above - slack * abs(above)]
 
 
 def _peaks(values: Array, above: float) -> NDArray[np.intp]:

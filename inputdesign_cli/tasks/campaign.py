@@ -15,6 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from inputdesign_cli.errors import IdesignError
+from inputdesign_cli.identification import Estimate
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -102,6 +103,13 @@ class Rules:
     def over(self, done: int, *, met: bool) -> bool:
         """Whether nothing more is applied after so many samples."""
         return done >= self.end or (met and self.stops)
+
+    def refuted(self, estimate: Estimate) -> bool:
+        """Whether it ends since tests refute the structure: what it lacks it would lack for ever.
+
+        They are asked after every part, and the parts share their level.
+        """
+        return self.stops and bool(estimate.failed_within(self.schedule.looks))
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from inputdesign_cli.tasks.assessment import Verdict, judge
 from inputdesign_cli.tasks.build.data import Data, read_data
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.campaign import Planned, Planner, Rules, Standing, standing
-from inputdesign_cli.tasks.identification import Identification, Identified, estimated, told
+from inputdesign_cli.tasks.identification import Identification, Identified, estimated, mismeasured, told
 from inputdesign_cli.tasks.result.refutations import contradictions, differences
 
 State = Literal["running", "stopped", "missed", "undecided"]
@@ -63,6 +63,7 @@ class Past:
         last: (k,) the estimate that was built on before; None before any.
         first_cost: of a sample of the first plan, None before it.
         seed: of the next record.
+        regardless: whether to go on where tests refute the structure.
     """
 
     records: Sequence[Path]
@@ -71,6 +72,7 @@ class Past:
     last: Array | None
     first_cost: float | None
     seed: int
+    regardless: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ class Decision:
         plan: the next part; None at the end.
         part: its samples as they are applied, with their times.
         offsets: (r,) what they vary about.
+        refuted: whether it ends before its time since tests refute the structure.
     """
 
     header: Header
@@ -94,6 +97,7 @@ class Decision:
     part: Table | None
     offsets: Array
     notes: tuple[str, ...]
+    refuted: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,7 @@ def decide(task: Rounds, past: Past) -> Decision:
     """
     header = task.identification.header
     notes: list[str] = []
-    assessed, stands, state = None, None, _running(task, past)
+    assessed, stands, state, refuted = None, None, _running(task, past), False
     if past.records:
         started = time.perf_counter()
         try:
@@ -151,16 +155,26 @@ def decide(task: Rounds, past: Past) -> Decision:
                 state = "undecided"
             elif task.rules.over(past.done, met=met):
                 state = _ENDED[assessment.verdict]
+            elif _refuted(task, found, past):
+                state, refuted = "undecided", True
             elif assessment.verdict == "undecided":
                 notes.append(_SPEAK_AGAINST)
     if state != "running":
-        return Decision(header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes))
+        return Decision(
+            header, task.rules, state, stands, assessed, None, None, task.offsets, tuple(notes), refuted
+        )
     plan = task.planner.plan(task.rules, stands, past.done, past.seed, past.first_cost)
     if past.ended is not None:
         plan = plan.following(past.ended - task.offsets, task.rules.rate)
     part = _part(task, plan, past.done)
     more = _of_the_plan(plan, task, past)
     return Decision(header, task.rules, state, stands, assessed, plan, part, task.offsets, (*notes, *more))
+
+
+def _refuted(task: Rounds, found: Identified, past: Past) -> bool:
+    """Whether tests refute the structure, and nobody wants to go on; faults of measurement can be mended."""
+    asked = not past.regardless and task.rules.refuted(found.estimate)
+    return asked and not mismeasured(task.identification, found)
 
 
 def read_part(task: Rounds, path: Path, preparation: Preparation) -> Part:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inputdesign_cli.accuracy import OnModelError, model_errors
 from inputdesign_cli.design.convex.cost import Weight, weighted_sum
 from inputdesign_cli.errors import IdesignError, InaccurateError, InfeasibleError, SpecError
-from inputdesign_cli.identification import fit_batch, identify, information_of_data
+from inputdesign_cli.identification import Estimate, fit_batch, identify, information_of_data
 from inputdesign_cli.information import POWER_KINDS, Experiment, FiniteRecord, PowerKind
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array
@@ -106,12 +106,16 @@ class _Run:
             u, y = self._measured()
             self._estimate(u, y)
             met = self.known is not None and self.known.met
-            if not rules.over(len(self.r), met=met):
+            over = rules.over(len(self.r), met=met)
+            if not over and not self._doubted(u, y):
                 continue
-            refuted = self._examined(u, y)
+            full = self._anew(u, y)
+            if full is not None and not over and rules.refuted(full):
+                return self._ended("undecided")
             met = self.known is not None and self.known.met
             if rules.over(len(self.r), met=met):
-                return self._ended("undecided" if refuted else "stopped" if met else "missed")
+                against = full is not None and self._speaks_against(full)
+                return self._ended("undecided" if against else "stopped" if met else "missed")
 
     def _measured(self) -> tuple[Array, Array]:
         true, n = self.job.true, len(self.r)
@@ -129,20 +133,31 @@ class _Run:
             if found.converged[0]:
                 self._stand(model.at(found.theta[0], found.noise[0]), u, y)
                 return
-        try:
-            full = identify(model, u, y, step, start=model.theta, feedback=self._feedback, rest=True)
-        except SpecError:  # too little is known yet
-            return
-        self._stand(model.at(full.theta, full.noise), u, y)
+        self._anew(u, y)
 
-    def _examined(self, u: Array, y: Array) -> bool:
-        """Estimate anew from several starts, and tell whether that speaks against the structure."""
-        model = self.last
-        try:
-            full = identify(model, u, y, self.job.step, start=model.theta, feedback=self._feedback, rest=True)
-        except SpecError:
+    def _doubted(self, u: Array, y: Array) -> bool:
+        """Whether tests at the estimate as it is refute the structure."""
+        if self.known is None or not self.job.rules.stops:
             return False
-        self._stand(model.at(full.theta, full.noise), u, y)
+        full = self._identified(u, y, near=True)
+        return full is not None and self.job.rules.refuted(full)
+
+    def _anew(self, u: Array, y: Array) -> Estimate | None:
+        """The estimate from several starts, which is then built on; None where there is none."""
+        full = self._identified(u, y)
+        if full is not None:
+            self._stand(self.last.at(full.theta, full.noise), u, y)
+        return full
+
+    def _identified(self, u: Array, y: Array, *, near: bool = False) -> Estimate | None:
+        model, step, feedback = self.last, self.job.step, self._feedback
+        try:
+            return identify(model, u, y, step, start=model.theta, feedback=feedback, rest=True, near=near)
+        except SpecError:  # too little is known yet
+            return None
+
+    def _speaks_against(self, full: Estimate) -> bool:
+        """Whether the estimate speaks against the structure at the end."""
         if full.failed or not full.converged:
             return True
         known = self.known

@@ -163,13 +163,18 @@ def speaking_against(task: Identification, found: Identified) -> list[str]:
     """What record and residuals say against the model; a fault of measurement alone: tests see it too."""
     data, estimate = found.data, found.estimate
     units = task.header.units
-    measured = [*faults(units, estimate, data), *loop_faults(task.controller, data)]
-    return measured or [
+    return mismeasured(task, found) or [
         *idle(units, task.nominal, found.model, estimate),
         *refutations(found.model, estimate),
         *answering(units, estimate, data),
         *(repetitions(estimate, data.files) or data.repeated),
     ]
+
+
+def mismeasured(task: Identification, found: Identified) -> list[str]:
+    """What a record says against itself: faults of measurement."""
+    data = found.data
+    return [*faults(task.header.units, found.estimate, data), *loop_faults(task.controller, data)]
 
 
 def identification_results(task: Identification, found: Identified, started: float) -> Results:

@@ -111,3 +111,38 @@ def test_a_steep_kink_is_found_as_exactly_as_a_smooth_maximum():
     grid = graded_grid([], 0.0, np.pi)
     _, values = local_maxima(function, grid, function(grid))
     assert np.max(values) == pytest.approx(1e4, rel=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_level_just_below_a_maximum_does_not_hide_it(seed):
+    """|B/A| with poles near the circle, on a coarse grid that rises to within 5 % of every maximum."""
+    rng = np.random.default_rng(seed)
+    poles = rng.uniform(0.7, 0.93, 3) * np.exp(1j * rng.uniform(0.1, 3.0, 3))
+    zeros = rng.normal(size=(1, 4))
+
+    def function(w):
+        q = np.exp(-1j * np.asarray(w))
+        below = np.prod((1 - np.outer(q, poles)) * (1 - np.outer(q, poles.conj())), axis=1)
+        return np.abs(q[:, None] ** np.arange(4) @ zeros[0]) / np.abs(below)
+
+    grid = np.linspace(0.0, np.pi, 120)
+    dense = np.linspace(0.0, np.pi, 400_001)
+    top = function(dense).max()
+    assert function(grid).max() > 0.95 * top
+    for share in (0.95, 0.99, 0.999, 0.99999):
+        _, values = local_maxima(function, grid, function(grid), above=share * top)
+        assert values.max() == pytest.approx(top, rel=1e-8)
+    assert local_maxima(function, grid, function(grid), above=1.0001 * top)[0].size == 0
+
+
+def test_a_peak_that_the_finer_grid_keeps_below_the_level_is_not_polished():
+    asked = []
+
+    def function(w):
+        asked.append(np.size(w))
+        return np.cos(w - 1.0)
+
+    grid = np.linspace(0.0, np.pi, 101)
+    values = np.cos(grid - 1.0)
+    assert local_maxima(function, grid, values, above=1.03)[0].size == 0
+    assert sum(asked) <= 4 * 6

@@ -18,6 +18,8 @@ from inputdesign_cli.plant.polynomial import Array
 RequirementFactory = Callable[[Experiment], Requirement]
 # So many scenarios are enough for a next step: what serves the worst few serves most of the others.
 FEW = 4
+# Maxima from this share of what is looked for on are noted, so that a small step needs no other search.
+_NEARLY = 0.99
 
 
 @dataclass(frozen=True)
@@ -141,8 +143,9 @@ class Demands:
             return list(self._violated(0, informations[0], above, side))
         found, bad = list[tuple[int, Violation]](), 0
         for number in self._by_most(informations, side, above):
-            own = list(self._violated(number, informations[number], above, side))
-            self._seen[int(side)].search(number, max([above, *(v.ratio for _, v in own)]))
+            nearly = list(self._violated(number, informations[number], _NEARLY * above, side))
+            self._seen[int(side)].search(number, max([_NEARLY * above, *(v.ratio for _, v in nearly)]))
+            own = [(index, v) for index, v in nearly if v.ratio > above]
             found += own
             bad += bool(own)
             if few is not None and bad >= few:

@@ -88,18 +88,22 @@ def campaigns_curves(
 
 
 def _table(ways: Mapping[str, Sequence[Ended]]) -> Table:
-    """A row for each run; the ways by their number in the order of the result."""
+    """A row for each run; the ways by their number in the order of the result.
+
+    Without the true ratios where some run has none, as where the true system has another structure.
+    """
     rows = [(way, run) for way, ended in enumerate(ways.values()) for run in ended]
 
     def column(values: Sequence[float]) -> np.ndarray:
         return np.array(values, dtype=float)
 
+    ratios = [run.ratio for _, run in rows if run.ratio is not None]
     return Table(
         {
             "way": column([way for way, _ in rows]),
             "samples": column([run.samples for _, run in rows]),
             "energy": column([run.energy for _, run in rows]),
-            "true_ratio": column([np.nan if run.ratio is None else run.ratio for _, run in rows]),
+            **({"true_ratio": column(ratios)} if len(ratios) == len(rows) else {}),
             "status": column([_ENDINGS.index(run.status) for _, run in rows]),
         }
     )
