@@ -93,6 +93,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
             Data(u, y, None, times, lengths, (), notes, recorded=log.recorded.at(found.samples)),
             preparation,
             None,
+            loop_told=bool(loops),
         ),
     )
     results = identification_results(task, identified, started)
@@ -112,18 +113,24 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         files=files,
     )
     against = tuple(refutations(found.model, found.estimate))
-    return Exploration(_without_model(complete, task.header.units, log, found), reasons, against)
+    return Exploration(
+        _without_model(complete, task.header.units, log, found, loop=bool(loops)), reasons, against
+    )
 
 
-def _without_model(explored: Results, units: Units, log: Log, found: Found) -> Results:
-    """The results with the frequency response of the data alone beside the model, where it can be had."""
+def _without_model(explored: Results, units: Units, log: Log, found: Found, *, loop: bool) -> Results:
+    """The results with the frequency response of the data alone beside the model, where it can be had.
+
+    Args:
+        loop: whether inputs answer the outputs.
+    """
     moving = log.u[:, found.moving]
     response = frequency_response(moving, log.y, lengths=log.lengths)
     if response is None:
         return explored
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
     table, curves, told = response_of_data(
-        units, found.model, response, by_reference=False, inputs=found.moving
+        units, found.model, response, by_reference=False, inputs=found.moving, loop=loop
     )
     result = explored.result
     return replace(
