@@ -36,6 +36,7 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_curves,
     validation_entry,
 )
+from inputdesign_cli.tasks.result.integrating import like_integrators
 from inputdesign_cli.tasks.result.refutations import refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
@@ -76,7 +77,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
                 raise
             raise bad_spec("no-structure", undriven[0], hint=_DRIVE, key="u") from error
     loose = (f"{told}: {_DRIVE}" for told in undriven)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *loose)
+    rising = like_integrators(found, log.step, log.time_unit)
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *loose)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))

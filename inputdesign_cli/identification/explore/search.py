@@ -143,9 +143,12 @@ class Chosen:
     def ranked(self) -> list[Candidate]:
         """Those that may be taken, then the others, the best first.
 
-        After them the biased ones, and those on the edge of stability last.
+        After them the biased ones, and those on the edge of stability last. A static gain that is no
+        finalist is none of them: it would hide what the plant does.
         """
-        others = [c for c in self.candidates if all(c is not one for one in self.finalists)]
+        others = [
+            c for c in self.candidates if c.orders.order and all(c is not one for one in self.finalists)
+        ]
         return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
 
     def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
