@@ -83,7 +83,11 @@ TimeUnit = Annotated[
 ]
 Resample = Annotated[
     bool,
-    typer.Option("--resample", help="Even out times that jitter by more than 10 % of the sample time, too."),
+    typer.Option(
+        "--resample",
+        help="Even out times that jitter by more than 10 % of the sample time, too; join columns that were "
+        "written at different times.",
+    ),
 ]
 DetrendWord = Annotated[
     str,

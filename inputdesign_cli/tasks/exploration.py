@@ -36,6 +36,7 @@ from inputdesign_cli.tasks.result.exploration import (
     validation_curves,
     validation_entry,
 )
+from inputdesign_cli.tasks.result.integrating import like_integrators
 from inputdesign_cli.tasks.result.refutations import refutations
 from inputdesign_cli.tasks.result.responses import response_note, response_of_data
 from inputdesign_cli.tasks.result.silent_lines import silent_entry, silent_notes
@@ -76,7 +77,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
                 raise
             raise bad_spec("no-structure", undriven[0], hint=_DRIVE, key="u") from error
     loose = (f"{told}: {_DRIVE}" for told in undriven)
-    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *loose)
+    rising = like_integrators(found, log.step, log.time_unit)
+    reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *loose)
     text = spec_text(log, found, paths)
     task = build_explored(text)
     u, y = (np.concatenate(signals) for signals in zip(*found.used, strict=True))
@@ -93,6 +95,7 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
             Data(u, y, None, times, lengths, (), notes, recorded=log.recorded.at(found.samples)),
             preparation,
             None,
+            loop_told=bool(loops),
         ),
     )
     results = identification_results(task, identified, started)
@@ -112,18 +115,24 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         files=files,
     )
     against = tuple(refutations(found.model, found.estimate))
-    return Exploration(_without_model(complete, task.header.units, log, found), reasons, against)
+    return Exploration(
+        _without_model(complete, task.header.units, log, found, loop=bool(loops)), reasons, against
+    )
 
 
-def _without_model(explored: Results, units: Units, log: Log, found: Found) -> Results:
-    """The results with the frequency response of the data alone beside the model, where it can be had."""
+def _without_model(explored: Results, units: Units, log: Log, found: Found, *, loop: bool) -> Results:
+    """The results with the frequency response of the data alone beside the model, where it can be had.
+
+    Args:
+        loop: whether inputs answer the outputs.
+    """
     moving = log.u[:, found.moving]
     response = frequency_response(moving, log.y, lengths=log.lengths)
     if response is None:
         return explored
     silent = silent_in(moving, log.y) if len(log.lengths) == 1 else {}
     table, curves, told = response_of_data(
-        units, found.model, response, by_reference=False, inputs=found.moving
+        units, found.model, response, by_reference=False, inputs=found.moving, loop=loop
     )
     result = explored.result
     return replace(

@@ -94,7 +94,8 @@ class Identification:
 class Identified:
     """An estimate, its data, and what is asked of it; or why that cannot be asked of this estimate.
 
-    `ruled_out` are other minima, which what is known of the plant rules out.
+    `ruled_out` are other minima, which what is known of the plant rules out; `loop_told` is whether a note
+    says already that inputs answer the outputs.
     """
 
     estimate: Estimate
@@ -104,6 +105,7 @@ class Identified:
     question: ModelQuestion | None
     unasked: str = ""
     ruled_out: tuple[Rival, ...] = ()
+    loop_told: bool = False
 
 
 def identified(task: Identification, paths: Sequence[Path], preparation: Preparation) -> Identified:
@@ -166,7 +168,7 @@ def speaking_against(task: Identification, found: Identified) -> list[str]:
     return mismeasured(task, found) or [
         *idle(units, task.nominal, found.model, estimate),
         *refutations(found.model, estimate),
-        *answering(units, estimate, data),
+        *([] if found.loop_told else answering(units, estimate, data)),
         *(repetitions(estimate, data.files) or data.repeated),
     ]
 

@@ -1,6 +1,7 @@
 """From a raw log to a model and a spec that solves, and a verdict on other data."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,27 @@ def test_an_input_without_effect_earns_no_trust(tmp_path):
     told = CliRunner().invoke(app, ["explore", str(path), "--no-output"])
     assert told.exit_code == 1, told.output
     assert "no trust" in told.stdout
+
+
+def test_an_integrator_earns_no_trust_and_is_offered(tmp_path):
+    """y(t) - y(t-1) = 0.02 u(t-1): the slope is told, time constant and static gain are not."""
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.choice([-1.0, 1.0], 125), 8)
+    y = np.cumsum(np.concatenate([[0.0], 0.02 * u[:-1]])) + 0.05 * rng.standard_normal(1000)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+    found = explore(log, Preparation(sample_time=1.0))
+    (reason,) = found.reasons
+    assert "integrator" in reason
+    assert float(re.search(r"only the slope, ([\d.]+) per s", reason)[1]) == pytest.approx(0.02, rel=0.05)
+    spec = re.search(r"in SPEC (sample_time: \S+) and (plant: .*)$", reason)
+    identified = identify(parse_spec(f"{spec[1]}\n{spec[2]}\n", design=False), log).result["identification"]
+    assert identified["theta"]["K"] == pytest.approx(0.02, rel=0.02)
+
+
+def test_a_time_constant_that_the_record_tells_is_trusted(tmp_path):
+    found = explore(record(tmp_path / "log.csv", samples=300))
+    assert not found.reasons
 
 
 def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):

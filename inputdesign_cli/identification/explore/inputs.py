@@ -14,6 +14,8 @@ _CERTAIN = 1e-4
 _FAINT = 1e-9
 # How far back a controller looks; what rounding of its output may leave of the power of an input.
 _CONTROLLER, _NOTHING = 6, 1e-6
+# A correlation of white signals beyond this, times the root of their number, is none by chance.
+_TOGETHER = 4.0
 
 
 def order_of_excitation(parts: Sequence[tuple[Array, Array]], most: int = 50) -> int:
@@ -41,9 +43,13 @@ def answers_output(
     """Inputs that past noise of the outputs helps to predict, with the probability of that by chance.
 
     That hints of a loop. Each input is regressed on its own past and the other inputs', then on past
-    innovations of the outputs as well ([ljung-1999], Section 13.4); the test is that of the likelihood ratio.
-    Not outputs but what is new in them: outputs remember inputs longer than the regression does, and so they
-    would help to predict one that is held.
+    innovations of the outputs as well ([ljung-1999], Section 13.4). Not outputs but what is new in them:
+    outputs remember inputs longer than the regression does, and so they would help to predict one that is
+    held.
+
+    Both the test of the likelihood ratio and a score test whose covariance allows for errors of any size at
+    any time ([white-1980]) must say so. An input that is held moves at few samples only; where the output
+    follows at once, what is new there is large at the same samples, and the first test errs.
 
     Args:
         innovations: of the outputs of every part, (n, p), where a model tells them; else those of a
@@ -70,10 +76,44 @@ def answers_output(
         if left[0] <= 1e-12 * float(np.sum(target**2)):
             continue  # the input follows from its own past: a deterministic signal
         statistic = (len(target) - both.shape[1]) * np.log(left[0] / max(left[1], 1e-300))
+        statistic = min(statistic, _score(own, both[:, own.shape[1] :], target))
         probability = float(scipy.special.chdtrc(p * lags, statistic))
         if probability < _CERTAIN:
             found.append((j, probability))
     return found
+
+
+def _score(own: Array, more: Array, target: Array) -> float:
+    """Of columns beside those of a regression, chi-squared where they tell nothing of its errors."""
+    errors = target - own @ np.linalg.lstsq(own, target, rcond=1e-10)[0]
+    beside = more - own @ np.linalg.lstsq(own, more, rcond=1e-10)[0]
+    weighted = beside * errors[:, None]
+    total = weighted.sum(axis=0)
+    return float(total @ np.linalg.lstsq(weighted.T @ weighted, total, rcond=1e-10)[0])
+
+
+def acts_late(parts: Sequence[tuple[Array, Array]], gains: Array) -> list[bool]:
+    """Of each input in a loop, whether a delay of the plant is to be taken for granted.
+
+    Where a controller answers y(t) by u(t), what is new in the two goes together, and a model with a delay of
+    zero takes the controller for the plant ([ljung-1999], Section 13.4). A controller that holds a plant
+    opposes it: what goes together with the sign of the plant's gain is not of its making.
+
+    Args:
+        parts: u (n, r), y (n, 1).
+        gains: (r,), of the plant, estimated with delays.
+    """
+    r = parts[0][0].shape[1]
+    lags = max(min(_LAGS, sum(len(y) for _, y in parts) // (8 * (r + 1))), 1)
+    long = [(u - u.mean(axis=0), y - y.mean(axis=0)) for u, y in parts if len(y) > 3 * lags]
+    if not long:
+        return [True] * r
+    past = np.concatenate([np.column_stack([_past(u, lags), _past(y, lags)]) for u, y in long])
+    now = np.concatenate([np.column_stack([u, y])[lags:] for u, y in long])
+    new = now - past @ np.linalg.lstsq(past, now, rcond=1e-10)[0]
+    sizes = np.maximum(np.linalg.norm(new, axis=0), 1e-300)
+    together = new[:, :r].T @ new[:, r] / (sizes[:r] * sizes[r])
+    return [bool(x <= _TOGETHER / np.sqrt(len(new))) for x in together * np.sign(gains)]
 
 
 def _innovations(parts: Sequence[tuple[Array, Array]], lags: int) -> list[Array]:

@@ -95,5 +95,10 @@ def plant_order(n: int, delays: tuple[int, ...]) -> list[Orders]:
     return [Orders("ARX", delays, b, a=n), Orders("ARMAX", delays, b, a=n, c=n), Orders("OE", delays, b, f=n)]
 
 
+def static_gain(delays: tuple[int, ...]) -> Orders:
+    """A gain and a delay: one coefficient for each input, no pole."""
+    return Orders("FIR", delays, 1)
+
+
 def _monic(order: int) -> Array:
     return np.concatenate([[1.0], np.zeros(order)])

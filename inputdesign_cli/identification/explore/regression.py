@@ -19,6 +19,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 _ITERATIONS = 8
 _RIDGE = 1e-12
+_CHI2 = 3.84  # 95 % for one degree of freedom
+_WIDTH = 6
 _COARSE = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150)
 
 
@@ -132,16 +134,22 @@ def normal_solution(gram: Array, moment: Array) -> Array:
     return np.asarray(np.linalg.solve(scaled, moment / scale) / scale)
 
 
-def best_delays(parts: Parts, n: int, b: int, most: int, begin: Sequence[int]) -> SharedDenominator:
+def best_delays(
+    parts: Parts, n: int, b: int, most: int, begin: Sequence[int], least: Sequence[int] | None = None
+) -> SharedDenominator:
     """The delays of all inputs with the least output error, one input after the other, twice round.
 
     The loss is looked at on a coarse set of delays first, and then near the best of them.
+
+    Args:
+        least, most: delays to look at, of each input from the one (none: zero) to the other.
     """
+    lowest = tuple(least) if least is not None else (0,) * len(begin)
     best = output_error(parts, n, b, begin)
     for _ in range(2 if len(begin) > 1 else 1):
         for j in range(len(begin)):
             tried = {best.delays[j]}
-            steps = [delay for delay in _COARSE if delay <= most]
+            steps = [delay for delay in _COARSE if lowest[j] <= delay <= most]
             while steps:
                 for delay in steps:
                     tried.add(delay)
@@ -150,11 +158,30 @@ def best_delays(parts: Parts, n: int, b: int, most: int, begin: Sequence[int]) -
                     if found.loss < best.loss:
                         best = found
                 at = best.delays[j]
-                below = max((d for d in tried if d < at), default=-1)
+                below = max((d for d in tried if d < at), default=lowest[j] - 1)
                 above = min((d for d in tried if d > at), default=most + 1)
                 steps = sorted({(below + at) // 2, (at + above + 1) // 2, at - 1, at + 1})
-                steps = [d for d in steps if below < d < above and d != at and 0 <= d <= most]
+                steps = [d for d in steps if below < d < above and d != at and lowest[j] <= d <= most]
     return best
+
+
+def delay_ranges(
+    parts: Parts, n: int, delays: tuple[int, ...], least: tuple[int, ...], most: int
+) -> tuple[tuple[int, int], ...]:
+    """The delays that 95 % of confidence leaves at an order n.
+
+    By the likelihood ratio, one input after the other, within a few samples of what was chosen.
+    """
+    samples = sum(len(y) for _, y in parts)
+    found = []
+    for j, chosen in enumerate(delays):
+        near = [d for d in range(chosen - _WIDTH, chosen + _WIDTH + 1) if least[j] <= d <= most]
+        losses = {d: output_error(parts, n, max(n, 2), (*delays[:j], d, *delays[j + 1 :])).loss for d in near}
+        smallest = min(losses.values(), default=0.0)
+        kept = [d for d, loss in losses.items() if samples * np.log(loss / max(smallest, 1e-300)) <= _CHI2]
+        # Another structure than that of the quick estimate may have settled elsewhere.
+        found.append((min(*kept, chosen), max(*kept, chosen)) if kept else (chosen, chosen))
+    return tuple(found)
 
 
 def arx_grid(

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification.adequacy import failed, score_tests
 from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
 from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.explore.busiest import busiest
 from inputdesign_cli.identification.explore.fits import (
     Parts,
     fits,
@@ -26,14 +26,16 @@ from inputdesign_cli.identification.explore.fits import (
     output_error_form,
     simulation_fit,
 )
-from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order
+from inputdesign_cli.identification.explore.inputs import acts_late
+from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
 from inputdesign_cli.identification.explore.processes import Process, processes
 from inputdesign_cli.identification.explore.regression import (
     SharedDenominator,
     arx_grid,
     best_delays,
+    delay_ranges,
     from_rest,
-    output_error,
+    numerators,
 )
 from inputdesign_cli.identification.records import Records, centred
 from inputdesign_cli.identification.search import search
@@ -54,8 +56,6 @@ _AS_GOOD, _POINTS = 1.2, 2.0
 # as many for a finalist.
 _PER_PARAMETER = 5
 _STEPS, _AGAIN = {False: 100, True: 30}, 4
-_CHI2 = 3.84  # 95 % for one degree of freedom
-_WIDTH = 6
 
 Shape = Orders | Process
 """A structure for one output."""
@@ -73,6 +73,7 @@ class Candidate:
         failed: tests of the residuals that refute it.
         steady: whether its plant is stable, as far as the record tells.
         ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
+        feedback: whether the record is from a loop.
     """
 
     orders: Shape
@@ -85,6 +86,7 @@ class Candidate:
     converged: bool
     steady: bool
     ranges: tuple[tuple[int, int], ...]
+    feedback: bool
 
     @property
     def theta(self) -> Array:
@@ -101,9 +103,9 @@ class Candidate:
         """Whether failed tests speak against its plant.
 
         A wrong noise model biases an A that plant and noise share, not the plant of OE and BJ
-        ([ljung-1999], Section 8.4).
+        ([ljung-1999], Section 8.4); in a loop it biases them all (Section 13.4).
         """
-        return self.orders.shared and bool(self.failed)
+        return (self.orders.shared or self.feedback) and bool(self.failed)
 
     @property
     def unknowns(self) -> int:
@@ -119,7 +121,8 @@ class Chosen:
         candidates: the best first.
         by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
         finalists: those that may be taken, the best first.
-        estimated: the records of the first part, and `most` the longest delay that was looked for.
+        estimated: the records of the first part.
+        least, most: the delays that were looked for, of each input from the one to the other.
         dropped: families of which no structure could be estimated.
     """
 
@@ -127,6 +130,7 @@ class Chosen:
     by_order: dict[int, float]
     finalists: tuple[Candidate, ...]
     estimated: Parts
+    least: tuple[int, ...]
     most: int
     dropped: tuple[str, ...]
 
@@ -139,15 +143,19 @@ class Chosen:
     def ranked(self) -> list[Candidate]:
         """Those that may be taken, then the others, the best first.
 
-        After them the biased ones, and those on the edge of stability last.
+        After them the biased ones, and those on the edge of stability last. A static gain that is no
+        finalist is none of them: it would hide what the plant does.
         """
-        others = [c for c in self.candidates if all(c is not one for one in self.finalists)]
+        others = [
+            c for c in self.candidates if c.orders.order and all(c is not one for one in self.finalists)
+        ]
         return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
 
     def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
         """Of each input, the delays that 95 % of confidence leaves a candidate."""
         order = min(max(candidate.orders.order, 1), max(self.by_order))
-        return candidate.ranges or _ranges(self.estimated, order, candidate.orders.delays, self.most)
+        delays = candidate.orders.delays
+        return candidate.ranges or delay_ranges(self.estimated, order, delays, self.least, self.most)
 
     def best_of(self, *, physical: bool) -> Candidate | None:
         """The best with parameters of that kind among those that are about as good as any."""
@@ -219,6 +227,7 @@ class _Parts:
             found.converged,
             is_steady(fitted, self.samples),
             orders.ranges(found.point.theta, deviations),
+            self.feedback,
         )
 
 
@@ -238,10 +247,11 @@ def explore_structure(
     r = first[0][0].shape[1]
     most = max(min(_MOST_DELAY, max(len(y) for _, y in first) // 6), 1)
     highest = max(min(_HIGHEST, samples // (6 * (r + 1))), 1)
-    delays: tuple[int, ...] = (int(feedback),) * r
+    least = _least_delays(first, most) if feedback else (0,) * r
+    delays = least
     quick = dict[int, SharedDenominator]()
     for n in range(1, highest + 1):
-        quick[n] = best_delays(first, n, max(n, 2), most, delays)
+        quick[n] = best_delays(first, n, max(n, 2), most, delays, least)
         delays = quick[n].delays
     by_order = {n: float(np.sqrt(found.loss)) for n, found in quick.items()}
     penalty = np.log(samples) / samples
@@ -257,10 +267,11 @@ def explore_structure(
         families.update(dict.fromkeys(shape.family for shape in small))
         return [candidate for candidate in map(parts.candidate, small) if candidate is not None]
 
-    tried: list[Shape] = []
+    tried: list[Shape] = [static_gain(best_delays(first, 0, 1, most, quick[1].delays, least).delays)]
     for n in sorted({*range(1, min(highest, _ALWAYS) + 1), near}):
         tried += plant_order(n, quick[n].delays)
-    tried += _best_arx(first, second, quick[near].delays, r, samples, late)
+    begun = [quick[near].delays, *((d,) * r for d in (0, 1) if d >= max(least))]
+    tried += _best_arx(first, second, begun, samples, late)
     if physical:
         tried += [process for n, found in quick.items() for process in processes(n, found.delays, step)]
     found = judged(tried)
@@ -273,8 +284,8 @@ def explore_structure(
     usable = [c for c in again.values() if c is not None and np.isfinite(c.validation)]
     if not usable:
         return None
-    least = min(100.0 - c.validation for c in usable)
-    good = [c for c in usable if 100.0 - c.validation <= min(_AS_GOOD * least, least + _POINTS)]
+    error = min(100.0 - c.validation for c in usable)
+    good = [c for c in usable if 100.0 - c.validation <= min(_AS_GOOD * error, error + _POINTS)]
     good.sort(
         key=lambda c: (
             not c.settled,
@@ -289,7 +300,14 @@ def explore_structure(
     rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
     estimated = {c.orders.family for c in found}
     dropped = tuple(family for family in families if family not in estimated)
-    return Chosen((best, *rest), by_order, tuple(good), first, most, dropped)
+    return Chosen((best, *rest), by_order, tuple(good), first, least, most, dropped)
+
+
+def _least_delays(parts: Parts, most: int) -> tuple[int, ...]:
+    """Of each input in a loop the shortest delay to look for."""
+    one = (1,) * parts[0][0].shape[1]
+    found = best_delays(parts, 1, 2, most, one, one)
+    return tuple(int(late) for late in acts_late(parts, numerators(parts, found, 2).sum(axis=1)))
 
 
 def _leading(found: Sequence[Candidate]) -> list[Candidate]:
@@ -306,12 +324,13 @@ def _leading(found: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _best_arx(
-    first: Parts, second: Parts, delays: tuple[int, ...], r: int, samples: int, late: int
+    first: Parts, second: Parts, begun: Sequence[tuple[int, ...]], samples: int, late: int
 ) -> Iterator[Orders]:
-    """The ARX models that simulate the second part best."""
+    """The ARX models that simulate the second part best, of sets of delays."""
+    r = len(begun[0])
     highest = max(min(_HIGHEST_ARX, samples // (6 * (r + 1))), 1)
     ranked = []
-    for a, b, lags, theta in arx_grid(first, highest, list(dict.fromkeys([delays, (0,) * r, (1,) * r]))):
+    for a, b, lags, theta in arx_grid(first, highest, list(dict.fromkeys(begun))):
         orders = arx(lags, a, b)
         if np.all(np.isfinite(theta)) and orders.size == theta.size:
             model = orders.model().at(theta)
@@ -319,32 +338,3 @@ def _best_arx(
                 ranked.append((simulation_fit(model, second, late)[0], orders))
     ranked.sort(key=lambda pair: -pair[0])
     return (orders for _, orders in ranked[:_ARX_KEPT])
-
-
-def _ranges(parts: Parts, n: int, delays: tuple[int, ...], most: int) -> tuple[tuple[int, int], ...]:
-    """By the likelihood ratio, one input after the other, within a few samples of what was chosen."""
-    samples = sum(len(y) for _, y in parts)
-    found = []
-    for j, chosen in enumerate(delays):
-        near = [d for d in range(chosen - _WIDTH, chosen + _WIDTH + 1) if 0 <= d <= most]
-        losses = {d: output_error(parts, n, max(n, 2), (*delays[:j], d, *delays[j + 1 :])).loss for d in near}
-        least = min(losses.values())
-        kept = [d for d, loss in losses.items() if samples * np.log(loss / max(least, 1e-300)) <= _CHI2]
-        # Another structure than that of the quick estimate may have settled elsewhere.
-        found.append((min(*kept, chosen), max(*kept, chosen)))
-    return tuple(found)
-
-
-def busiest(parts: Parts, most: int) -> list[tuple[Array, Array]]:
-    """At most so many samples: of long records the stretch in which the inputs move most."""
-    share = most // len(parts)
-    return [(u[at], y[at]) for u, y in parts for at in [_window(u, share if len(parts) > 1 else most)]]
-
-
-def _window(u: NDArray[np.float64], length: int) -> slice:
-    if len(u) <= length:
-        return slice(0, len(u))
-    moves = np.sum((np.diff(u, axis=0) / np.maximum(u.std(axis=0), 1e-300)) ** 2, axis=1)
-    total = np.concatenate([[0.0], np.cumsum(moves)])
-    begin = int(np.argmax(total[length - 1 :] - total[: len(total) - length + 1]))
-    return slice(begin, begin + length)

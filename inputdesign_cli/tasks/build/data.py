@@ -40,6 +40,7 @@ from inputdesign_cli.tasks.build.preparation import (
     whole_segments,
 )
 from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
+from inputdesign_cli.tasks.build.written_apart import joined_rows
 
 
 @dataclass(frozen=True)
@@ -218,13 +219,15 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
     sheet = read_sheet(path, key="")
     references = reference_columns(units, sheet.header)
     preparation = with_names(sheet, units, with_headers(sheet, preparation))
-    signals = signals_of(sheet, units.inputs, units.outputs, preparation, references)
+    signals, joined = joined_rows(
+        signals_of(sheet, units.inputs, units.outputs, preparation, references), resample=preparation.resample
+    )
     unit = "s" if signals.dated else preparation.time_unit
     if unit is not None and signals.name:
         signals = replace(signals, time=signals.time * (SECONDS[unit] / SECONDS[units.time_unit]))
     _check_steps(signals, units, preparation)
     segments, told = prepared(signals, units.sample_time, units.time_unit, preparation)
-    told += [*unused_columns(sheet, units, preparation), *other_units(sheet, units, preparation)]
+    told += [*joined, *unused_columns(sheet, units, preparation), *other_units(sheet, units, preparation)]
     inputs = np.concatenate([part.u for part in segments])
     return Data(
         inputs[:, : units.inputs],

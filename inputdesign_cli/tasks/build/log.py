@@ -18,6 +18,7 @@ from inputdesign_cli.tasks.build.files import Sheet, read_sheet
 from inputdesign_cli.tasks.build.preparation import Preparation
 from inputdesign_cli.tasks.build.signals import Signals, signals_of, stated_step
 from inputdesign_cli.tasks.build.tables import evenly_rising, no_column
+from inputdesign_cli.tasks.build.written_apart import joined_rows
 
 _CHANNELS = {
     "u": re.compile(r"(u|input)[ _]?(\d*)(?![a-z0-9]).*"),
@@ -66,9 +67,8 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     columns = with_channels(sheet, preparation.columns)
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = with_headers(sheet, replace(preparation, columns=columns))
-    signals = signals_of(sheet, counts["u"], counts["y"], given)
+    signals, told = joined_rows(signals_of(sheet, counts["u"], counts["y"], given), resample=given.resample)
     unit = "s" if signals.dated else preparation.time_unit or time_unit_in(sheet, signals.name) or "s"
-    told = []
     stated = stated_step(sheet, preparation)
     if signals.name and not preparation.sample_time:
         step = _typical(signals.time)

@@ -20,7 +20,7 @@ EVEN = 1e-3
 MOST_JITTER = 0.1
 # A longer step is a gap; with `resample` it may be longer before it is one.
 _GAP, _LONG_GAP = 1.5, 3.0
-_SHORTEST = 10
+SHORTEST = 10
 _FEW_LEVELS = 10
 _CLIPPED, _RUN = 0.02, 3
 _COARSE = 0.1
@@ -115,7 +115,7 @@ def whole_segments(
     if gaps.size:
         told.append(f"the time has {gaps.size} gap{'s' * (gaps.size > 1)} (before {rows.told(gaps)})")
     if len(parts) > 1:
-        longer = [part for part in parts if len(part) >= _SHORTEST] or [max(parts, key=len)]
+        longer = [part for part in parts if len(part) >= SHORTEST] or [max(parts, key=len)]
         left = [line for part in parts if not any(part is one for one in longer) for line in lines[part]]
         told.append(
             f"the record is {len(longer)} segment{'s' * (len(longer) > 1)}, each with a start of its own"

@@ -98,8 +98,8 @@ def exploration_notes(
     notes += [
         f"{'y' if single else f'y{i + 1}'}: no {' or '.join(chosen.dropped)} model could be estimated: the "
         f"record does not tell all its parameters{_least_moved(log, found)}"
-        for i, chosen in enumerate(found.outputs)
-        if chosen.dropped
+        for i, (chosen, taken) in enumerate(zip(found.outputs, found.taken, strict=True))
+        if chosen.dropped and taken.orders.order
     ]
     notes += [
         f"u{j + 1} never moves in this record: the model has no part of it, and an experiment must move it"
@@ -109,7 +109,7 @@ def exploration_notes(
         f"past outputs help to predict {'u' if alone else f'u{j + 1}'} (probability {chance(p)} by chance): "
         "the data may come from a loop. The direct method is used; the noise model must then be right, and "
         "without a reference that moves the plant may not be identifiable: add a reference or dither, and "
-        "write experiment.controller"
+        "write experiment.controller. An input that answers at once is taken to act with a delay"
         for j, p in loops
     ]
     needed = max(candidate.orders.unknowns for candidate in found.taken)

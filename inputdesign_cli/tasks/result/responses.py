@@ -25,6 +25,7 @@ def response_of_data(
     *,
     by_reference: bool,
     inputs: Sequence[int] | None = None,
+    loop: bool = False,
 ) -> tuple[Table, ResponseCurves, dict[str, Json]]:
     """The table, its figure, and what `frequency_response` of the result says of it.
 
@@ -32,6 +33,7 @@ def response_of_data(
         model: the estimate that it stands beside.
         by_reference: whether a reference from outside was used.
         inputs: those (from zero) that `found` has; None: all.
+        loop: whether the data come from one, of which the spec need not tell.
     """
     w = found.frequency / units.sample_time
     G = model.plant_at(w * units.frequency)
@@ -54,7 +56,7 @@ def response_of_data(
         "frequencies": int(w.size),
         "model_outside": float(np.mean(outside)),
     }
-    if units.closed_loop and not by_reference:
+    if (units.closed_loop or loop) and not by_reference:
         told["caveat"] = _BY_U
     return Table(columns), ResponseCurves(tuple(panels)), told
 
@@ -62,8 +64,9 @@ def response_of_data(
 def response_note(told: dict[str, Json]) -> list[str]:
     """What a user should know of it, in sentences."""
     share = told["model_outside"]
+    usual = "" if "caveat" in told else " (a right model: at about 5 %)"
     sentence = (
         "frequency_response.csv has what the data say of G without a model, with discs of 95 %: the model is "
-        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies (a right model: at about 5 %)"
+        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies{usual}"
     )
     return [sentence, *([told["caveat"]] if "caveat" in told else [])]

@@ -124,6 +124,58 @@ def test_a_loop_is_noticed_and_an_open_one_is_not():
     assert answers_output([(free[:, None], driven[:, None])]) == []
 
 
+def looped(rng, samples, pattern, noise):
+    """u = r - y without delay, about 0.3 q^-1 / (1 - 0.8 q^-1): u (n, 1), y (n, 1)."""
+    e = 0.2 * rng.standard_normal(samples)
+    v = scipy.signal.lfilter([1.0], [1.0, -0.8], e) if noise == "arx" else e
+    r = held(rng, samples, 5) if pattern == "prbs" else np.repeat([0.0, 1, 0, 1, -1], samples // 5)
+    u, y, x = np.zeros(samples), np.zeros(samples), np.zeros(samples)
+    for k in range(samples):
+        x[k] = 0.8 * x[k - 1] + 0.3 * u[k - 1] if k else 0.0
+        y[k] = x[k] + v[k]
+        u[k] = r[k] - y[k]
+    return u[:, None], y[:, None]
+
+
+@pytest.mark.parametrize(("pattern", "noise"), [("prbs", "arx"), ("prbs", "oe"), ("steps", "oe")])
+def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(pattern, noise):
+    found = explore_records([looped(np.random.default_rng(1), 1000, pattern, noise)], feedback=True)
+    (taken,) = found.taken
+    assert taken.orders.delays == (1,)
+    assert not taken.failed
+    w = np.array([1e-4, 0.2])
+    expected = 0.3 * np.exp(-1j * w) / (1.0 - 0.8 * np.exp(-1j * w))
+    np.testing.assert_allclose(found.model.plant_at(w)[:, 0, 0], expected, rtol=0.15)
+
+
+def test_a_plant_that_acts_at_once_in_a_loop_that_answers_late():
+    """Rows that hold what was applied and what it led to: u answers the row before."""
+    rng = np.random.default_rng(3)
+    e, r = 0.2 * rng.standard_normal(1000), held(rng, 1000, 5)
+    u, y, x = np.zeros(1000), np.zeros(1000), 0.0
+    for k in range(1000):
+        u[k] = r[k] - y[k - 1]
+        x = 0.8 * x + 0.3 * u[k]
+        y[k] = x + e[k]
+    found = explore_records([(u[:, None], y[:, None])], feedback=True)
+    assert found.taken[0].orders.delays == (0,)
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+@pytest.mark.parametrize("hold", [1, 8])
+def test_a_static_gain_has_no_pole(delay, hold):
+    rng = np.random.default_rng(1)
+    u = held(rng, 1000, hold)
+    y = 3.0 * np.concatenate([np.zeros(delay), u[: 1000 - delay]]) + 0.2 * rng.standard_normal(1000)
+    record = (u[:, None], y[:, None])
+    assert answers_output([record]) == []
+    found = explore_records([record])
+    assert found.taken[0].orders.order == 0
+    assert found.taken[0].orders.delays == (delay,)
+    assert found.model.names == (f"b{delay}",)
+    assert found.model.theta == pytest.approx([3.0], abs=4.0 * 0.2 / np.sqrt(1000))
+
+
 @pytest.mark.parametrize("hold", [5, 20, 60])
 @pytest.mark.parametrize("pole", [0.7, 0.99])
 def test_an_input_that_is_held_is_no_answer(hold, pole):

@@ -222,6 +222,28 @@ def test_rows_of_which_none_is_whole_are_refused(header, tmp_path):
         assert "join the rows" in caught.value.diagnostics[0].hint
 
 
+def test_columns_that_were_written_at_different_times_are_joined_when_asked(tmp_path):
+    """u when it changes, y every 5 s and y2 every 10 s: u is held, y2 lies between its neighbours."""
+    path = tmp_path / "log.csv"
+    rows = ["time,u,y1,y2", "0,7,0,0"]
+    for k in range(1, 60):
+        if k % 6 == 0:
+            rows.append(f"{5 * k - 1},{k},,")
+        rows.append(f"{5 * k},,{k * k},{'' if k % 2 else 3 * k}")
+    path.write_text("\n".join([*rows, ""]))
+    with pytest.raises(
+        DataError, match=r"1 of 69 rows of log\.csv has .* written at different times"
+    ) as caught:
+        read_log(path, Preparation())
+    assert "--resample" in caught.value.diagnostics[0].hint
+    log = read_log(path, Preparation(resample=True))
+    k = np.arange(59)  # at the last y2 is no longer known
+    assert log.step == 5.0
+    np.testing.assert_allclose(log.u[:, 0], np.where(k < 6, 7, k - k % 6))
+    np.testing.assert_allclose(log.y, np.column_stack([k**2, 3 * k]))
+    assert any("written at different times" in note for note in log.steps)
+
+
 def _said_to_be_rounded(x):
     return any("rounded" in one for one in limits_of_sensor("y", x))
 

@@ -294,6 +294,11 @@ def between_thousands(cells: Sequence[str]) -> int | None:
     return next((i for i, cell in enumerate(cells) if "." in cell), None) if hundreds else None
 
 
+def is_comma(cell: str) -> bool:
+    """Whether a cell is a number with a comma for its decimal mark, or for one between thousands."""
+    return "," in cell and _COMMA.fullmatch(cell) is not None
+
+
 def is_plain(cell: str, *, comma: bool) -> bool:
     """Whether a cell is a number, with a decimal comma where that may be, or a date."""
     text = cell.strip()

@@ -22,6 +22,7 @@ from inputdesign_cli.tasks.build.files.layout import (
     between_thousands,
     decimal_commas,
     headed,
+    is_comma,
     is_missing,
     is_number,
     rows_of,
@@ -110,6 +111,12 @@ def _column(cells: list[str]) -> Column:
     unclear = np.flatnonzero(~np.isfinite(numbers))
     numbers[unclear] = np.nan
     fault = next(((int(i), cells[i].strip()) for i in unclear if not is_missing(cells[i])), None)
+    if fault is not None and is_comma(fault[1]):
+        wrong = "has a comma, and other cells have decimal points"
+        hint = (
+            f"if it is a decimal mark, write {fault[1].replace(',', '.')}; between thousands nothing stands"
+        )
+        return Column(numbers, fault, wrong=wrong, hint=hint)
     thousand = between_thousands(cells) if fault is None else None
     if thousand is not None:
         wrong = "may have a mark between thousands, or three decimals: other cells have none"

@@ -86,3 +86,17 @@ def test_a_point_that_may_stand_between_thousands_is_asked_about(tmp_path):
     with pytest.raises(DataError, match=r"'1\.250' in column u may have a mark between thousands") as caught:
         read_columns(path, {"u": "u"}, key="")
     assert caught.value.diagnostics[0].location.line == 3
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_lone_comma_among_decimal_points_is_told_as_such(separator, tmp_path):
+    """It may be a decimal mark or stand between thousands: nobody guesses."""
+    path = tmp_path / "log.csv"
+    rows = [[f"{k}.0", f"{k % 5}.25"] for k in range(60)]
+    rows[40][1] = '"13,899"'
+    path.write_text("\n".join(separator.join(row) for row in [["time", "u"], *rows]))
+    with pytest.raises(DataError, match="has a comma, and other cells have decimal points") as caught:
+        read_columns(path, {"u": "u"}, key="")
+    (one,) = caught.value.diagnostics
+    assert one.location.line == 42
+    assert "13.899" in one.hint

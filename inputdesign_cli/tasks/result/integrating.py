@@ -1,0 +1,78 @@
+"""Entries of G that a record cannot tell from integrators."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.identification.explore import Found
+from inputdesign_cli.plant.polynomial import Array, ComplexArray
+
+# The static gain is within so many deviations of none, that at some frequency of the record is not; and the
+# first is larger by this factor: G still rises there towards low frequencies.
+_UNTOLD, _TOLD, _RISING = 2.0, 4.0, 2.0
+_FREQUENCIES, _HIGHEST = 40, 1.0
+_STATIC = 1e-6  # of the lowest frequency of a record: as good as zero
+_LATE = 0.1
+
+
+def like_integrators(found: Found, step: float, unit: str) -> tuple[str, ...]:
+    """A sentence for every entry whose static gain, hence whose slowest time constant, nothing tells.
+
+    Args:
+        step, unit: the sample time.
+    """
+    model, told = found.model, []
+    single = model.outputs == model.inputs == 1
+    w = _frequencies(found)
+    with np.errstate(all="ignore"):
+        change, G = model.plant_gradient(w), model.plant_at(w)
+        for i in range(model.outputs):
+            for j in found.moving:
+                size, deviations = np.abs(G[:, i, j]), _deviations(found, change[:, :, i, j].T)
+                if _rises(size, deviations):
+                    at = 1 + int(np.argmin(deviations[1:] / size[1:]))
+                    where = "" if single else f" from u{j + 1} to y{i + 1}"
+                    gain = f"{size[0]:.3g} +- {deviations[0]:.1g}"
+                    told.append(_sentence(where, gain, _slope(G[at, i, j], w[at], step), step, unit))
+    return tuple(told)
+
+
+def _frequencies(found: Found) -> Array:
+    """(n,), rad per sample: as good as zero, then from the lowest of the longest record on."""
+    lowest = 2.0 * np.pi / max(len(y) for _, y in found.used)
+    return np.concatenate([[_STATIC * lowest], np.geomspace(lowest, max(_HIGHEST, lowest), _FREQUENCIES)])
+
+
+def _rises(size: Array, deviations: Array) -> bool:
+    """Whether |G| (n,), the first of them static, is told where it still rises, and its end is not."""
+    if not (np.all(np.isfinite(size)) and np.all(np.isfinite(deviations))):
+        return False
+    told = (size > _TOLD * deviations) & (_RISING * size < size[0])
+    return bool(size[0] < _UNTOLD * deviations[0] and np.any(told))
+
+
+def _slope(G: complex, w: float, step: float) -> float:
+    """What an integrator that goes through G at w gains in a unit of time from an input of one."""
+    through = 1j * w * G / step
+    return float(np.copysign(abs(through), through.real))
+
+
+def _deviations(found: Found, change: ComplexArray) -> Array:
+    """(n,): standard deviations of values whose real and imaginary parts have gradients `change` (k, n)."""
+    if not np.all(np.isfinite(change)):
+        return np.full(change.shape[1], np.nan)
+    factor = found.estimate.factor
+    parts = [scipy.linalg.solve_triangular(factor, x, lower=True) for x in (change.real, change.imag)]
+    return np.asarray(np.sqrt(np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)))
+
+
+def _sentence(where: str, gain: str, slope: float, step: float, unit: str) -> str:
+    sort = "an integrator" if not where else "a matrix with an integrator there"
+    return (
+        f"the plant{where} cannot be told from an integrator (its static gain is {gain}): no time constant "
+        f"follows from this record, only the slope, {slope:.4g} per {unit} for an input of one. Record until "
+        f"the output settles; or, if it never does, identify {sort}: idesign identify DATA --spec SPEC, in "
+        f"SPEC sample_time: {step:.6g} and plant: {{parameters: {{K: {slope:.4g}, L: {_LATE * step:.4g}}}, "
+        "continuous: {numerator: [K], denominator: [1, 0], delay: L}, sample: zoh}"
+    )
