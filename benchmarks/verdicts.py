@@ -30,7 +30,7 @@ import scipy.special
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.errors import SpecError
-from inputdesign_cli.identification import Estimate, identify, that_matter
+from inputdesign_cli.identification import Estimate, Moves, identify, that_matter
 from inputdesign_cli.identification.explore import answers_output
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
@@ -267,7 +267,14 @@ def judged(made: Trial, rng: np.random.Generator) -> Judged:
     else:
         admissible = made.relative * size
     _, true = scipy.signal.freqz(*made.true, w)
-    moves = [np.max(np.abs(one.moves(model, w[asked])[..., 0, 0]) / admissible) for one in found.directed]
+    known = np.minimum(np.sqrt(spread[asked]) / admissible, 1.0 / alpha)
+    moves = []
+    for one in found.directed:
+        move, slope = (
+            np.max(np.abs(G[..., 0, 0]), axis=0) / admissible
+            for G in (one.moves(model, w[asked]), one.slope(model, w[asked]))
+        )
+        moves.append(Moves(move, one.deviation * slope, known))
     return Judged(
         found,
         bool(np.all(alpha * np.sqrt(spread[asked]) <= admissible * (1.0 + 1e-9))),

@@ -2,11 +2,7 @@
 
 from inputdesign_cli.identification.adequacy import ScoreTest as ScoreTest
 from inputdesign_cli.identification.control_law import Shift as Shift, shifted as shifted
-from inputdesign_cli.identification.directed import (
-    Alternative as Alternative,
-    Directed as Directed,
-    that_matter as that_matter,
-)
+from inputdesign_cli.identification.directed import Alternative as Alternative, Directed as Directed
 from inputdesign_cli.identification.earlier import Earlier as Earlier
 from inputdesign_cli.identification.estimate import BatchEstimate as BatchEstimate, Estimate as Estimate
 from inputdesign_cli.identification.estimators import (
@@ -24,6 +20,7 @@ from inputdesign_cli.identification.frozen import (
     frozen as frozen,
     resolution_of as resolution_of,
 )
+from inputdesign_cli.identification.mattering import Moves as Moves, that_matter as that_matter
 from inputdesign_cli.identification.polynomials import identify_polynomials as identify_polynomials
 from inputdesign_cli.identification.residual_tests import (
     ResidualTest as ResidualTest,

@@ -7,7 +7,6 @@ narrow band of excitation hardly contradicts a model that is wrong at its edge.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -21,9 +20,6 @@ from inputdesign_cli.identification.records import Records
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import Array, ComplexArray
 
-# What would move G by more than is admitted counts as missing with a probability below this, shared among all
-# that would (Bonferroni). A change of gain often has a large effect that the record hardly shows.
-_BEYOND = {"plant": 0.05, "noise": 0.05, "change": 0.005, "nonlinear": 0.005}
 # A score of a larger probability is the last word.
 _OPEN = 0.3
 # A parameter of whose effect the estimate explains all but this share is not tried.
@@ -48,6 +44,10 @@ class Alternative(Protocol):
     @property
     def fault(self) -> Fault:
         """What is wrong where it is missing."""
+
+    @property
+    def lag(self) -> bool:
+        """Whether it is a pole or a dead time of the plant."""
 
     def column(self, records: Records) -> NDArray[np.float64]:
         """(N, p): minus the derivative of the prediction errors with respect to it."""
@@ -81,6 +81,16 @@ class Directed:
     size: float
     larger: Model | None
 
+    @property
+    def of_structure(self) -> bool:
+        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
+        return self.test.fault in ("plant", "noise")
+
+    @property
+    def lag(self) -> bool:
+        """Whether one of the parameters that act alike is a pole or a dead time of the plant."""
+        return any(alternative.lag for alternative in self.alternatives)
+
     def moves(self, model: Model, w: ArrayLike) -> ComplexArray:
         """(states, n, p, r): how G of the estimated `model` changes if the parameter is estimated along."""
         if self.larger is not None:
@@ -91,14 +101,6 @@ class Directed:
         """(states, n, p, r): the derivative of G with respect to the parameter, the others following."""
         others = np.tensordot(self.following, model.plant_gradient(w), axes=(0, 1))
         return np.asarray(others + self.alternatives[0].slopes(model, w))
-
-
-def that_matter(tried: Sequence[Directed], moves: Sequence[float]) -> list[int]:
-    """The numbers of those that speak against a verdict; each moves G by so many times what is admitted."""
-    beyond = [i for i, move in enumerate(moves) if move > 1.0]
-    levels = {i: _BEYOND[tried[i].test.fault] for i in beyond}
-    among = Counter(levels.values())
-    return [i for i, level in levels.items() if tried[i].test.probability * among[level] < level]
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,10 @@ from inputdesign_cli.identification.record_problem import RecordProblem, evaluat
 from inputdesign_cli.identification.records import Record, Records, shifted
 from inputdesign_cli.plant import ContinuousModel, Model, PolynomialModel
 from inputdesign_cli.plant.filtering import filtered
-from inputdesign_cli.plant.model import Listed
+from inputdesign_cli.plant.model import DELAY, Listed
 from inputdesign_cli.plant.polynomial import Array, ComplexArray, Rows
+
+_LAGS = ("a", "f", DELAY)
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,11 @@ class Extension:
     def fault(self) -> Fault:
         """What is wrong where it is missing."""
         return "plant" if self.model.in_plant[self.index] else "noise"
+
+    @property
+    def lag(self) -> bool:
+        """Whether it is a pole or a dead time of the plant."""
+        return self.model.parameters[self.index].letter in _LAGS
 
     def slopes(self, model: Model, w: ArrayLike) -> ComplexArray:
         """(1, n, p, r): the derivative of G with respect to the new parameter."""

@@ -49,6 +49,11 @@ class Variation:
     record: Callable[[Array, Array], Record]
     theta: Array
 
+    @property
+    def lag(self) -> bool:
+        """No."""
+        return False
+
     def column(self, records: Records) -> NDArray[np.float64]:
         """(N, p): minus the derivative of the prediction errors with respect to x."""
         only = np.zeros_like(records.u)

@@ -118,7 +118,8 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
         listed = [requirement_entry(units, r, information) for r in found.question.requirements]
     without: list[Neglected] = []
     if found.question is not None:
-        without = neglected(found.model, found.estimate, model_errors(found.question.requirements))
+        errors = model_errors(found.question.requirements)
+        without = neglected(found.model, found.estimate, errors, information)
     met = all(entry["worst_ratio"] <= 1.0 + _ROUNDING for entry in listed)
     broken = bool(faults(task.header.units, found.estimate, found.data))
     notes = [] if broken else objections(task.header.units, without)
@@ -140,7 +141,7 @@ def judge(task: Identification, found: Identified, started: float) -> Assessment
         assessment["undecided"] = reasons
         assessment["causes"] = [cause for cause, told_of in causes.items() if told_of]
     if without:
-        entries = [(one.of_structure, one.entry(task.header.units)) for one in without]
+        entries = [(one.directed.of_structure, one.entry(task.header.units)) for one in without]
         assessment["neglected"] = [entry for of_structure, entry in entries if of_structure]
         assessment["variations"] = [entry for of_structure, entry in entries if not of_structure]
     if found.question is not None:

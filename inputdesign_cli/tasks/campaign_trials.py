@@ -164,7 +164,8 @@ class _Run:
         if known is None or not known.met:  # more parameters miss it all the more
             return False
         question = self.job.planner.question(known.model, known.information)
-        return bool(mattering(neglected(known.model, full, model_errors(question.requirements))))
+        errors = model_errors(question.requirements)
+        return bool(mattering(neglected(known.model, full, errors, question.information)))
 
     @property
     def _feedback(self) -> bool:

@@ -5,7 +5,7 @@ import pytest
 import scipy.signal
 import scipy.stats
 
-from inputdesign_cli.identification import identify, that_matter
+from inputdesign_cli.identification import Moves, identify, that_matter
 from tests.support.identification_systems import SYSTEMS, data, one_channel
 from tests.support.plants import arx
 from tests.support.records import shifted, simulated
@@ -135,9 +135,9 @@ def test_what_matters_shares_a_level_among_its_like():
     u = np.random.default_rng(5).standard_normal(800)
     found = estimated(u, through(np.clip(u, -1.0, 1.0)))
     tried = list(found.directed)
-    far = [2.0] * len(tried)
+    far, near = ([Moves(*np.full((3, 1), size))] * len(tried) for size in (2.0, 0.9))
     changes = [i for i in that_matter(tried, far) if tried[i].test.fault in ("change", "nonlinear")]
     among = sum(one.test.fault in ("change", "nonlinear") for one in tried)
     assert [tried[i].test.probability * among < 0.005 for i in changes] == [True] * len(changes)
     assert changes
-    assert that_matter(tried, [0.9] * len(tried)) == []
+    assert not set(that_matter(tried, near)) & set(changes)

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inputdesign_cli.accuracy import OnModelError
-from inputdesign_cli.identification import Directed, Estimate, that_matter
+from inputdesign_cli.identification import Directed, Estimate, Moves, that_matter
 from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.refutations import REMEDY, chance
@@ -27,51 +28,55 @@ class Neglected:
     """A parameter that the model does without.
 
     Attributes:
-        moves: how far G would move if it were estimated along, over what is admitted there.
-        may_move: how far it may at most, with 95 %.
+        moves: what it does to G, at the frequencies of the requirement.
+        may_move: how far it may move G at most, with 95 %, over what is admitted.
         frequency: where, in the unit of the experiment.
     """
 
     directed: Directed
-    moves: float
+    moves: Moves
     may_move: float
     frequency: float
-
-    @property
-    def of_structure(self) -> bool:
-        """Whether it is a parameter of a larger structure, not a gain that is not always the same."""
-        return self.directed.test.fault in ("plant", "noise")
 
     def entry(self, units: Units) -> dict[str, Json]:
         """One of `assessment.neglected` or `assessment.variations`."""
         return {
             "parameter": self.directed.test.name,
             "probability": self.directed.test.probability,
-            "moves": self.moves,
+            "moves": self.moves.largest,
             "may_move": self.may_move,
             "frequency": self.frequency / units.frequency,
         }
 
 
-def neglected(model: Model, estimate: Estimate, errors: Sequence[OnModelError]) -> list[Neglected]:
-    """What was tried and did not refute the estimated `model`; nothing where no error of G is admitted."""
+def neglected(
+    model: Model, estimate: Estimate, errors: Sequence[OnModelError], information: Array
+) -> list[Neglected]:
+    """What was tried and did not refute the estimated `model`; nothing where no error of G is admitted.
+
+    Args:
+        information: (k, k), by which r_u is judged.
+    """
     refuted = {test.name for test in estimate.failed}
     tried = [directed for directed in estimate.directed if directed.test.name not in refuted]
     return [
-        max((_largest(model, directed, error) for error in errors), key=lambda one: one.may_move)
+        max((_largest(model, directed, error, information) for error in errors), key=lambda one: one.may_move)
         for directed in (tried if errors else [])
     ]
 
 
-def _largest(model: Model, directed: Directed, error: OnModelError) -> Neglected:
+def _largest(model: Model, directed: Directed, error: OnModelError, information: Array) -> Neglected:
     w = error.grid
     moves, slope = (
         np.max([np.linalg.norm(error.concerned(G), axis=1) for G in states], axis=0) / error.admissible.at(w)
         for states in (directed.moves(model, w), directed.slope(model, w))
     )
-    at = int(np.argmax(moves + _ALLOWED * directed.deviation * slope))
-    may_move = moves[at] + _ALLOWED * directed.deviation * slope[at]
-    return Neglected(directed, float(np.max(moves)), float(may_move), float(w[at]))
+    deviation = directed.deviation * slope
+    # A record that misses what is asked is judged as one that would just meet it.
+    known = np.minimum(error.error_bound(information, w) / error.admissible.at(w), 1.0) / error.alpha
+    may_move = moves + _ALLOWED * deviation
+    at = int(np.argmax(may_move))
+    return Neglected(directed, Moves(moves, deviation, known), float(may_move[at]), float(w[at]))
 
 
 def mattering(found: Sequence[Neglected]) -> list[Neglected]:
@@ -83,7 +88,8 @@ def objections(units: Units, found: Sequence[Neglected]) -> list[str]:
     """What to say of those that matter."""
     return [
         f"{one.directed.alternatives[0].phrase} would move G by "
-        f"{one.moves:.3g} times the admissible error about {units.named(one.frequency)} (probability "
+        f"{one.moves.largest:.3g} times the admissible error about {units.named(one.frequency)}"
+        f"{'' if one.moves.largest > 1.0 else ', beyond it with the error of the estimate,'} (probability "
         f"{chance(one.directed.test.probability)} without it): {REMEDY[one.directed.test.fault]}"
         for one in mattering(found)
     ]
@@ -91,7 +97,9 @@ def objections(units: Units, found: Sequence[Neglected]) -> list[str]:
 
 def unseen(units: Units, found: Sequence[Neglected]) -> list[str]:
     """What the record leaves open of the structure, where that is more than is admitted."""
-    worst = max((one for one in found if one.of_structure), key=lambda one: one.may_move, default=None)
+    worst = max(
+        (one for one in found if one.directed.of_structure), key=lambda one: one.may_move, default=None
+    )
     if worst is None or worst.may_move <= 1.0:
         return []
     return [

@@ -1,0 +1,81 @@
+"""Which of the parameters that a model lacks speak against what is promised of it: |error of G| <= r_adm.
+
+Of a larger structure it is not enough that the parameter is beyond chance, nor needed: the odds count that it
+is there and that G, which then moves by what is estimated and is known no better than it is, is beyond r_adm.
+The evidence for the parameter is the Bayes factor of a normal estimate ([kass-raftery-1995]); beforehand the
+parameter is normal about zero, of such a size that it moves G by about r_adm.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from inputdesign_cli.identification.directed import Directed
+from inputdesign_cli.plant.polynomial import Array
+
+# A gain that is not always the same often has a large effect that the record hardly shows. It matters where
+# it moves G by more than is admitted with a probability below this, shared among all that would (Bonferroni).
+_VARIES = 0.005
+# The odds from which nothing is promised any more.
+_ODDS = 0.7
+# Odds beforehand that something is missing, shared among the parameters that stand for it: what plants mostly
+# have beyond their model is a lag or a longer dead time.
+_OF_LAGS, _OF_OTHERS = 1.0, 0.2
+_LEAST = 1e-300
+
+
+@dataclass(frozen=True)
+class Moves:
+    """What a parameter more does to G at n frequencies, in units of the admissible error.
+
+    Attributes:
+        estimated: (n,), how far G moves if the parameter is estimated along.
+        deviation: (n,), the standard deviation of that.
+        known: (n,), the largest standard deviation of G of the model itself.
+    """
+
+    estimated: Array
+    deviation: Array
+    known: Array
+
+    @property
+    def largest(self) -> float:
+        """The largest estimated one."""
+        return float(np.max(self.estimated))
+
+    def odds(self, probability: float) -> float:
+        """That the parameter is there and G is beyond what is admitted, if it is as likely there as not.
+
+        Args:
+            probability: of an estimate as far from zero, if the parameter is not there.
+        """
+        reach = float(np.max(self.deviation))
+        if not reach > 0.0:
+            return 0.0
+        left = 1.0 / (1.0 + reach**2)  # of the estimate, once the prior draws it to zero
+        statistic = float(scipy.special.chdtri(1.0, max(probability, _LEAST)))
+        evidence = np.exp(0.5 * (np.log1p(-left) + left * statistic))
+        spread = np.sqrt(self.known**2 + left * self.deviation**2)
+        beyond = sum(
+            scipy.special.ndtr((sign * left * self.estimated - 1.0) / np.maximum(spread, _LEAST))
+            for sign in (1.0, -1.0)
+        )
+        return float(evidence * np.max(beyond))
+
+
+def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
+    """The numbers of those that speak against a verdict."""
+    varying = [i for i, one in enumerate(tried) if not one.of_structure and moves[i].largest > 1.0]
+    found = [i for i in varying if tried[i].test.probability * len(varying) < _VARIES]
+    structure = [i for i, one in enumerate(tried) if one.of_structure]
+    among = Counter(tried[i].lag for i in structure)
+    for i in structure:
+        beforehand = (_OF_LAGS if tried[i].lag else _OF_OTHERS) / among[tried[i].lag]
+        if beforehand * moves[i].odds(tried[i].test.probability) > _ODDS:
+            found.append(i)
+    return sorted(found)
