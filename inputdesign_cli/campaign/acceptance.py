@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.campaign.applied import LIKE, UNLIKE, Match, matched
+from inputdesign_cli.campaign.applied import LIKE, UNLIKE, Match, copied, matched, standing_in
 from inputdesign_cli.campaign.memory import Memory
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
@@ -15,15 +15,20 @@ from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.text_formats import read_csv
 from inputdesign_cli.tasks.campaign_rounds import Part
 
+# So few samples are alike by chance.
+_FEW = 3
+
 
 def accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[dict[str, Json], list[str]]:
     """What is kept of a record, compared with its plan, and what is to be said of it.
 
     Raises:
-        DataError: `record-too-long`, `record-other-part`, `record-other-scale`, `record-unlike`.
+        DataError: `record-copied`, `record-too-long`, `record-other-part`, `record-other-scale`,
+            `record-unlike`.
     """
     plan = memory.plan
     assert plan is not None
+    _check_answers(given, part)
     if part.samples > plan["samples"]:
         raise DataError.because(
             "record-too-long",
@@ -40,6 +45,7 @@ def accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[
     samples = match.begins + part.samples
     other = _of_another(memory, plan, part, part.excitation, match.likeness)
     if not unlike:
+        _check_columns(given, memory, plan, part, part.excitation)
         _check_applied(given, plan, match, other, loop=part.of_loop)
     energy = float(np.sum(applied**2)) * samples / len(part.rows)
     entry |= {"samples": samples, "scale": match.scale} if match.likeness > LIKE else {"samples": samples}
@@ -55,6 +61,57 @@ def _shorter(given: Path, plan: Mapping[str, Json], samples: int) -> list[str]:
         f"{given.name} ends after {samples} of the {plan['samples']} samples of {plan['file']}: the rest is "
         "planned anew"
     ]
+
+
+def _check_answers(given: Path, part: Part) -> None:
+    """Raise `DataError` (`record-copied`) where an output is what was applied.
+
+    In a loop that is the reference: without one, a controller without dynamics makes a copy of y of u.
+    """
+    columns, own = _signals(part), "r" if part.of_loop else "u"
+    for output in (name for name in columns if name.startswith("y")):
+        for name in (name for name in columns if name.startswith(own)):
+            if len(part.rows) > _FEW and copied(columns[output], columns[name]):
+                raise DataError.because(
+                    "record-copied",
+                    f"{output} of {given.name} is a copy of {name}, at some scale and level: what the plant "
+                    "answered is not in it",
+                    hint=f"{_renamed(name, output)}; is a sensor wired to the actuator, or does the logger "
+                    "write the same signal twice?",
+                )
+
+
+def _check_columns(
+    given: Path, memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array
+) -> None:
+    """Raise `DataError` (`record-unlike`) where another column than its own is what was planned."""
+    whole, offset = _whole(memory, plan), np.array(plan["offset"], dtype=float)
+    own = "r" if part.of_loop else "u"
+    others = {name: column for name, column in _signals(part).items() if not name.startswith(own)}
+    found = standing_in(whole[part.rows], excitation - offset, others)
+    if found is None:
+        return
+    channel, name, likeness = found
+    raise DataError.because(
+        "record-unlike",
+        f"the columns of {given.name} look swapped: {name} follows {plan['file']} as {own}{channel} should "
+        f"(correlation {likeness:.2f}), and {own}{channel} does not",
+        hint=f"{_renamed(f'{own}{channel}', name)}; if it was really applied so, say --as-applied: the "
+        "estimate goes by what was recorded",
+    )
+
+
+def _renamed(applied: str, other: str) -> str:
+    """How to say which column is which; a reference goes by the header alone."""
+    if applied.startswith("r"):
+        return "give the columns their right names in the first line of the file"
+    return f"say which column is which, --columns {applied}=NAME,{other}=NAME,.."
+
+
+def _signals(part: Part) -> dict[str, Array]:
+    """The columns (m,) of a record without its times."""
+    _, *signals = part.table.columns.items()
+    return dict(signals)
 
 
 def _check_applied(
@@ -117,10 +174,15 @@ def _noted(plan: Mapping[str, Json], match: Match, other: str | None) -> list[st
 
 def _matched(memory: Memory, plan: Mapping[str, Json], part: Part, excitation: Array) -> Match:
     """How what was applied (m, r) follows a plan, about its levels."""
-    offset = np.array(plan["offset"], dtype=float)
-    whole = np.stack(list(read_csv(memory.directory / plan["file"]).values())[1:], axis=1) - offset
+    offset, whole = np.array(plan["offset"], dtype=float), _whole(memory, plan)
     strongest = max(float(each["power"]) for each in _plans(memory)) ** 0.5
     return matched(whole, excitation - offset, part.rows, strongest)
+
+
+def _whole(memory: Memory, plan: Mapping[str, Json]) -> Array:
+    """(n, r): the samples of a plan about its level."""
+    columns = list(read_csv(memory.directory / plan["file"]).values())[1:]
+    return np.asarray(np.stack(columns, axis=1) - np.array(plan["offset"], dtype=float), dtype=float)
 
 
 def _plans(memory: Memory) -> list[dict[str, Json]]:

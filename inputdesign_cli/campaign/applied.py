@@ -6,6 +6,7 @@ and sensors round. All of that leaves most of a record in step with its plan; an
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -34,6 +35,8 @@ _OFF, _SURE = 0.02, 3.0
 _CLIPPED, _FEW = 0.95, 2
 # A channel is at rest in plans smaller than this share of the strongest; moved by half of that it is not.
 _AT_REST, _MOVED = 0.02, 0.5
+# What rounding to five digits leaves of a copy.
+_COPY = 1e-10
 # Orders of more channels are not tried.
 _MOST = 6
 
@@ -85,6 +88,29 @@ def matched(plan: Array, applied: Array, rows: NDArray[np.int64], strongest: flo
         off = False  # rows out of their places look like a smaller scale
     exchanged = _exchanged(due, applied, strongest, shares[least])
     return Match(begins, shares[least], spliced, least + 1, scale, off, exchanged, follows)
+
+
+def standing_in(plan: Array, applied: Array, others: Mapping[str, Array]) -> tuple[int, str, float] | None:
+    """A channel of a plan, from 1, that another column follows, as planned, and its own does not.
+
+    With the name of that column and its likeness; None where there is none.
+
+    Args:
+        plan, applied: (m, r) both at the samples of the record.
+        others: further columns (m,) of it.
+    """
+    for j in range(plan.shape[1]):
+        least = max(LIKE, abs(likeness(plan[:, j], applied[:, j])) + _BETTER)
+        for name, column in others.items():
+            found = likeness(plan[:, j], column)
+            if found > least and not _scale(plan[:, j], column)[1]:
+                return j + 1, name, found
+    return None
+
+
+def copied(column: Array, other: Array) -> bool:
+    """Whether a column (m,) is another one, at any scale and about any level."""
+    return abs(_correlation(_centred(column), _centred(other))) > 1.0 - _COPY
 
 
 def _far(found: tuple[float, bool]) -> tuple[bool, float]:

@@ -62,7 +62,7 @@ def advanced(
         regardless: whether to go on, from now on, where tests refute the structure.
 
     Raises:
-        DataError: `campaign-over`; `data-repeated`, `record-too-long`, `record-other-part`,
+        DataError: `campaign-over`; `data-repeated`, `record-copied`, `record-too-long`, `record-other-part`,
             `record-other-scale`, `record-unlike`; what is wrong with a record.
     """
     records, files, notes = memory.records, dict(memory.files), list[str]()

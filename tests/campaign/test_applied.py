@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from inputdesign_cli.campaign.applied import matched
+from inputdesign_cli.campaign.applied import copied, matched, standing_in
 
 PLANS = {"white": ([1.0], [1.0]), "slow": ([1.0], [1.0, -0.8]), "resonant": ([1.0], [1.0, -1.6, 0.94])}
 LENGTHS = (30, 120)
@@ -113,3 +113,28 @@ def test_rows_without_values_are_left_out():
     late = rows[20:]
     match = compared(plan, plan[late], late - late[0])
     assert match.begins == late[0]
+
+
+@pytest.mark.parametrize("name", RECORDED)
+@pytest.mark.parametrize("kind", PLANS)
+def test_columns_of_a_static_plant_are_not_taken_for_swapped(kind, name):
+    """Its output follows the plan too, but hardly better than the input that it answers."""
+    swapped = 0
+    for seed in range(20):
+        plan = planned(kind, 120, seed)
+        u = RECORDED[name](plan)
+        y = u + 0.05 * np.random.default_rng(50 + seed).standard_normal(len(u))
+        plan = plan[: len(u)]
+        assert standing_in(plan[:, None], u[:, None], {"y1": y}) is None
+        found = standing_in(plan[:, None], 3.0 * lfilter([0.0, 1.0], [1.0, -0.5], u)[:, None], {"y1": u})
+        swapped += found is not None and found[:2] == (1, "y1")
+    assert swapped >= 19 or name not in ("as planned", "rounded", "with an offset")
+
+
+def test_a_copy_is_told_from_a_response():
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(60)
+    assert copied(u, u)
+    assert copied(np.round(-3.0 * u + 40.0, 5), u)
+    assert not copied(u + 1e-3 * rng.standard_normal(60), u)
+    assert not copied(np.zeros(60), u)

@@ -125,6 +125,40 @@ def test_exchanged_channels_are_named(run, tmp_path):
     assert run("next", "c", record, "--columns", columns, "--no-figures")[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("name", "order", "told", "right"),
+    [
+        ("two", [0, 1, 4, 3, 2], "y2 follows plan_01.csv as u2 should", "u1=u1,u2=y2,y1=y1,y2=u2"),
+        ("loop", [0, 1, 3, 2], "y1 follows plan_01.csv as r1 should", "time_s,u,r,y"),
+        ("loop", [0, 3, 2, 1], "u1 follows plan_01.csv as r1 should", "time_s,r,y,u"),
+    ],
+)
+def test_swapped_columns_are_named(run, tmp_path, name, order, told, right):
+    assert run("campaign", f"{name}.yaml", "-o", "c", "--no-figures")[0] == 0
+    header, table = recorded(tmp_path / "c", name)
+    record = saved(tmp_path / "s.csv", header, table[:, order])
+    code, _, err = run("next", "c", record)
+    assert (code, "record-unlike" in err, "the columns of s.csv look swapped" in err) == (2, True, True)
+    assert told in err
+    if name == "loop":  # a reference goes by the header
+        assert "first line" in err
+        record, options = saved(record, right, table[:, order]), ()
+    else:
+        options = ("--columns", right)
+    assert run("next", "c", record, *options, "--no-figures")[0] == 0
+
+
+@pytest.mark.parametrize(("name", "into", "other"), [("two", 4, "y2"), ("loop", 2, "y1")])
+def test_an_output_that_is_what_was_applied_is_refused(run, tmp_path, name, into, other):
+    assert run("campaign", f"{name}.yaml", "-o", "c", "--no-figures")[0] == 0
+    header, table = recorded(tmp_path / "c", name)
+    copied = 3 if name == "loop" else 1
+    table[:, into] = np.round(2.0 * table[:, copied] + 5.0, 6)
+    code, _, err = run("next", "c", saved(tmp_path / "w.csv", header, table), "--as-applied")
+    assert (code, "record-copied" in err) == (2, True)
+    assert f"{other} of w.csv is a copy of {'r1' if name == 'loop' else 'u1'}" in err
+
+
 def test_a_record_that_ends_early_says_so(run, tmp_path):
     assert run("campaign", "two.yaml", "-o", "c", "--no-figures")[0] == 0
     header, table = recorded(tmp_path / "c", "two")
