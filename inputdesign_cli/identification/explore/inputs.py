@@ -68,7 +68,8 @@ def answers_output(
         new = _innovations(centred, lags)
     else:
         new = [e[lags:] for e, kept in zip(innovations, long, strict=True) if kept]
-    own = np.concatenate([_past(u, lags)[lags:] for u, _ in centred])
+    # As far back as what is new in the outputs remembers inputs.
+    own = np.concatenate([_past(u, 2 * lags) for u, _ in centred])
     both = np.column_stack([own, np.concatenate([_past(e, lags) for e in new])])
     for j in range(r):
         target = np.concatenate([u[2 * lags :, j] for u, _ in centred])

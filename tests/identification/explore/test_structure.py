@@ -187,6 +187,14 @@ def test_an_input_that_is_held_is_no_answer(hold, pole):
     assert answers_output([(u[:, None], y[:, None])]) == []
 
 
+def test_a_long_record_of_a_held_input_is_no_loop():
+    """What is new in y has u of a sample before those that u is regressed on, and a static gain shows it."""
+    rng = np.random.default_rng(0)
+    u = held(rng, 20000, 10)
+    y = 0.5 * u + rng.standard_normal(20000)
+    assert answers_output([(u[:, None], y[:, None])]) == []
+
+
 def test_sinusoids_excite_twice_their_number():
     t = np.arange(400.0)
     u = sum(np.sin(2.0 * np.pi * k / 400.0 * t + k) for k in (25, 70, 130))
