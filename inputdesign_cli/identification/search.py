@@ -29,6 +29,9 @@ _MOST_HELD_STEPS = 60
 _IDLE = 0.1
 # Samples by which a dead time may grow while a search begun freely goes on.
 _SPARE = 2
+# How often they are counted anew; more than one unknown start for so many samples are many.
+_MOST_COUNTS = 4
+_MANY = 10
 
 
 @dataclass(frozen=True)
@@ -169,11 +172,14 @@ def from_rest_or_free(
     """
 
     def begun_free(known: Array | None, late: int) -> Search:
-        found = searched(deviations.begun_freely(late), known)
-        now = later(found.point.theta)
+        tried = {late: (found := searched(deviations.begun_freely(late), known))}
         # The dead time may come out another than was thought when the unknown inputs were counted.
-        if abs(now - late) > _SPARE:
-            found = searched(deviations.begun_freely(now), found.point.theta)
+        while abs((now := later(found.point.theta)) - late) > _SPARE:
+            if now in tried or len(tried) > _MOST_COUNTS:
+                found = tried[min(tried)]  # the fewest unknown inputs explain the least by chance
+                break
+            late = now
+            tried[late] = found = searched(deviations.begun_freely(late), found.point.theta)
         return replace(found, first=_first(records, found.point.theta))
 
     def later(theta: Array) -> int:
@@ -188,20 +194,31 @@ def from_rest_or_free(
     late = later(at_rest.point.theta)
     free = deviations.begun_freely(late)
     near = evaluate(free, at_rest.point.theta)
-    unknowns = near.near.unknowns - at_rest.point.near.unknowns
-    if records.y.size <= records.size + 2 * near.near.unknowns or unknowns <= 0:
-        return at_rest
     from_rest = _deviance(records, at_rest.point)
 
-    def probability(point: Point, gain: float = 0.0) -> float:
-        return float(scipy.special.chdtrc(unknowns, max(from_rest - _deviance(free, point) + gain, 0.0)))
+    def more(point: Point) -> int:
+        """Unknowns, beyond those from rest; none where too few errors are left to compare."""
+        few = records.y.size <= records.size + 2 * point.near.unknowns
+        return 0 if few else point.near.unknowns - at_rest.point.near.unknowns
 
+    def probability(start: Records, point: Point, gain: float = 0.0) -> float:
+        statistic = max(from_rest - _deviance(start, point) + gain, 0.0)
+        return float(scipy.special.chdtrc(max(more(point), 1), statistic))
+
+    def unless_by_chance(begun: Search) -> Search:
+        refuted = more(begun.point) > 0 and probability(begun.records, begun.point) < _MISTAKEN
+        return replace(begun, rest_refuted=True) if refuted else at_rest
+
+    if records.dead_times.size and near.near.unknowns * _MANY > records.y.size:
+        # A wrong level or a spike may feign a dead time, and the inputs before it explain whatever they like.
+        return unless_by_chance(begun_free(None, 0 if about is None else later(about)))
+    if more(near) <= 0:
+        return at_rest
     # What errors promise of one step is about what the search would find. Near the edge of stability the
     # determinant allows short steps only.
     errors = near.of_errors
     step = np.linalg.lstsq(errors.hessian, errors.slope, rcond=1e-12)[0]
     share = min(float(errors.slope @ step) / near.cost, _MOST_PROMISED)
-    if probability(near, -near.near.freedom * np.log1p(-share)) > _UNLIKELY:
+    if probability(free, near, -near.near.freedom * np.log1p(-share)) > _UNLIKELY:
         return at_rest
-    begun = begun_free(at_rest.point.theta, late)
-    return replace(begun, rest_refuted=True) if probability(begun.point) < _MISTAKEN else at_rest
+    return unless_by_chance(begun_free(at_rest.point.theta, late))

@@ -183,3 +183,21 @@ def test_a_dead_time_that_comes_out_as_none_holds_no_other_parameter(seed):
             [2.0, 10.0], abs=5.0 * np.sqrt(np.diag(one.covariance)[:2]).max()
         )
         assert 0.0 <= one.theta[2] < 5.0 * np.sqrt(one.covariance[2, 2])
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
+    """From rest the spike and the level of 20 come out as a dead time, of 26 to 89 samples.
+
+    So many unknown inputs before each of five stretches would fit whatever the outputs do.
+    """
+    model, rng = model_of(IN_STATES, 3.0), np.random.default_rng(seed)
+    u, pole = np.repeat(rng.choice([-1.0, 1.0], 40), 15), np.exp(-1.0 / LAG)
+    y = scipy.signal.lfilter([0, 0, 0, 0, GAIN * (1.0 - pole)], [1.0, -pole], u)
+    y += 20.0 + 0.1 * rng.standard_normal(600)
+    y[int(rng.integers(50, 550))] += 100.0
+    found = identify(model, u[:, None], y[:, None], start=model.theta, lengths=(100, 150, 90, 140, 120))
+    assert found.free
+    assert found.repeated is None
+    # One spike in 600 samples is noise of 4.1, forty times that of the plant.
+    assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))
