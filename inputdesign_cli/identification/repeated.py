@@ -2,7 +2,8 @@
 
 Errors of different times are independent if the model is right, and so is every other copy of the noise: only
 the same noise, also where it was rounded, shifted or scaled, comes again. Where the model is wrong errors are
-coloured, and slow ones follow each other by chance: they are made white first, by an autoregression.
+coloured, and slow ones follow each other by chance; and inputs that come again bring the same errors. So what
+past errors and the inputs explain is taken off first, by an autoregression with inputs.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from inputdesign_cli.identification.records import shifted
 from inputdesign_cli.plant.polynomial import Array
 
 # So many samples in a row have a correlation beyond this at another time by chance in one of 1e10 cases.
@@ -21,6 +23,8 @@ _LAGS = 8
 # Larger errors, in standard deviations, count as much: single spikes say nothing.
 _SPIKE = 3.0
 _ORDER = 20
+# Lags are fewer in a short record; in a long one so many samples tell their coefficients.
+_SAMPLES_A_LAG, _MOST_FITTED = 10, 20_000
 NORMAL = 0.6745  # the median of the absolute value of a normal variable, in standard deviations
 
 
@@ -33,13 +37,19 @@ class Repetition:
     length: int
 
 
-def repetition(errors: Array) -> Repetition | None:
-    """The longest stretch of errors (samples, p) that comes again; None where none does."""
+def repetition(errors: Array, inputs: Array | None = None) -> Repetition | None:
+    """The longest stretch of errors (samples, p) that comes again; None where none does.
+
+    Args:
+        inputs: (samples, r), of the same times.
+    """
     spread = np.median(np.abs(errors), axis=0) / NORMAL
     samples = len(errors)
     if samples < 2 * _IN_A_ROW or not np.all(spread > 0.0):
         return None
-    e = np.column_stack([whitened(x) for x in np.clip(errors / spread, -_SPIKE, _SPIKE).T])
+    columns = np.clip(errors / spread, -_SPIKE, _SPIKE).T
+    u = np.zeros((samples, 0)) if inputs is None else inputs
+    e = np.column_stack([_unexplained(x, u) for x in columns])
     around = scipy.fft.rfft(e, 2 * samples, axis=0)
     products = scipy.fft.irfft(np.sum(np.abs(around) ** 2, axis=1), 2 * samples)
     lags = np.arange(_IN_A_ROW, samples - _IN_A_ROW + 1)
@@ -57,6 +67,23 @@ def whitened(x: Array) -> Array:
     products[0] *= 1.0 + 1e-9
     ahead = scipy.linalg.solve_toeplitz(products[:-1], products[1:])
     return np.asarray(np.convolve(x, np.concatenate([[1.0], -ahead]))[: x.size])
+
+
+def _unexplained(x: Array, u: Array) -> Array:
+    """What an autoregression with inputs u (N, r) leaves of a signal (N,)."""
+    order = min(_ORDER, x.size // (_SAMPLES_A_LAG * (1 + u.shape[1])))
+    moving = u[:, np.ptp(u, axis=0) > 0.0]
+    if not order or not moving.shape[1]:
+        return whitened(x)
+    own, by = x - x.mean(), (moving - moving.mean(axis=0)) / moving.std(axis=0)
+    head = len(own[:_MOST_FITTED])
+    signals = [own, *by.T]
+    past = [shifted(one[:head], lag, (head,)) for lag in range(order + 1) for one in signals]
+    weights = np.linalg.lstsq(np.column_stack(past[1:]), own[:head], rcond=None)[0]
+    left = own.copy()
+    for one, ahead in zip(signals, np.insert(weights, 0, 0.0).reshape(order + 1, -1).T, strict=True):
+        left -= np.convolve(one, ahead)[: own.size]
+    return left
 
 
 def _at(e: Array, lag: int) -> Repetition | None:

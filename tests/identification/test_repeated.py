@@ -60,3 +60,15 @@ def test_spikes_at_the_start_of_every_record_are_no_copies():
 def test_errors_that_are_mostly_zero_say_nothing():
     assert repetition(np.zeros((400, 1))) is None
     assert repetition(white(40)) is None
+
+
+def test_what_inputs_bring_again_is_not_given_twice():
+    """The same input twice through a response that the model lacks, with noise of its own or the same."""
+    u = np.tile(white(300, seed=3), (2, 1))
+    missing = 2.0 * scipy.signal.lfilter([0.0, 1.0], [1.0, -0.5], u, axis=0)
+    errors = missing + 0.2 * white(600, seed=4)
+    assert repetition(errors) is not None
+    assert repetition(errors, u) is None
+    once = missing[:300] + 0.2 * white(300, seed=5)
+    assert repetition(np.concatenate([once, once]), u).length >= 200
+    assert repetition(errors, np.ones((600, 1))) is not None
