@@ -55,7 +55,7 @@ class Moves:
             probability: of an estimate as far from zero, if the parameter is not there.
         """
         reach = float(np.max(self.deviation))
-        if not reach > 0.0:
+        if reach == 0.0:
             return 0.0
         left = 1.0 / (1.0 + reach**2)  # of the estimate, once the prior draws it to zero
         statistic = float(scipy.special.chdtri(1.0, max(probability, _LEAST)))
@@ -70,12 +70,13 @@ class Moves:
 
 def that_matter(tried: Sequence[Directed], moves: Sequence[Moves]) -> list[int]:
     """The numbers of those that speak against a verdict."""
-    varying = [i for i, one in enumerate(tried) if not one.of_structure and moves[i].largest > 1.0]
-    found = [i for i in varying if tried[i].test.probability * len(varying) < _VARIES]
+    # What is not a number is no promise: it is compared so that it speaks against one.
+    varying = [i for i, one in enumerate(tried) if not (one.of_structure or moves[i].largest <= 1.0)]
+    found = [i for i in varying if not tried[i].test.probability * len(varying) >= _VARIES]
     structure = [i for i, one in enumerate(tried) if one.of_structure]
     among = Counter(tried[i].lag for i in structure)
     for i in structure:
         beforehand = (_OF_LAGS if tried[i].lag else _OF_OTHERS) / among[tried[i].lag]
-        if beforehand * moves[i].odds(tried[i].test.probability) > _ODDS:
+        if not beforehand * moves[i].odds(tried[i].test.probability) <= _ODDS:
             found.append(i)
     return sorted(found)

@@ -2,12 +2,13 @@
 
 import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.stats
 
-from inputdesign_cli.identification import Moves
+from inputdesign_cli.identification import Moves, that_matter
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "verdicts.py"
 
@@ -34,6 +35,17 @@ def test_what_moves_nothing_or_is_not_told_by_the_data_does_not_matter():
     assert Moves(none, none, none + 0.2).odds(1e-9) == 0.0
     assert Moves(none + 500.0, none + 1000.0, none + 0.4).odds(0.617) < 0.7
     assert Moves(none + 1e6, none + 1.0, none).odds(0.0) > 1e6
+
+
+@pytest.mark.parametrize("of_structure", [True, False])
+@pytest.mark.parametrize("place", range(3))
+def test_what_is_not_a_number_is_no_promise(of_structure, place):
+    parts = [np.full(2, 1e-3), np.full(2, 1e-3), np.full(2, 0.1)]
+    tried = [SimpleNamespace(of_structure=of_structure, lag=False, test=SimpleNamespace(probability=1e-4))]
+    assert that_matter(tried, [Moves(*parts)]) == []
+    parts[place][0] = np.nan
+    # A gain that varies is judged by its move alone.
+    assert that_matter(tried, [Moves(*parts)]) == ([0] if of_structure or place == 0 else [])
 
 
 def test_a_lag_that_moves_g_almost_out_of_what_is_admitted_is_not_promised_away():
