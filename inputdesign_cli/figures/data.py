@@ -15,6 +15,7 @@ from inputdesign_cli.runs.results import Array
 
 SHOWN = 400
 _AS_LIVELY = 0.5
+_LINE = 2e-3  # the width of a curve, as a share of what is drawn
 
 
 def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
@@ -68,11 +69,21 @@ def _plot(
 ) -> list[Artist]:
     handles: list[Artist] = []
     handles += axes.plot(time, panel.y[shown], color=BLACK, linewidth=1.0, label=recorded)
-    label = "predicted one step ahead"
+    same = _coincide(panel, shown)
+    label = f"predicted one step ahead, and {simulated}" if same else "predicted one step ahead"
     handles += axes.plot(time, panel.predicted[shown], color=BLUE, linewidth=1.0, label=label)
-    if panel.simulated is not None:
+    if panel.simulated is not None and not same:
         handles += axes.plot(time, panel.simulated[shown], color=ORANGE, linewidth=1.0, label=simulated)
     return handles
+
+
+def _coincide(panel: FitPanel, shown: slice) -> bool:
+    """Whether prediction and simulation are one curve to the eye, as where the noise is white."""
+    if panel.simulated is None:
+        return False
+    y, predicted, simulated = panel.y[shown], panel.predicted[shown], panel.simulated[shown]
+    width = _LINE * float(np.nanmax(y) - np.nanmin(y))
+    return np.allclose(predicted, simulated, rtol=0.0, atol=width, equal_nan=True)
 
 
 def draw_residuals(page: Figure, curves: ResidualCurves, time_unit: str) -> None:

@@ -59,6 +59,23 @@ def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(pa
     assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
 
 
+@pytest.mark.parametrize("apart", [0.0, 0.1])
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_a_prediction_that_is_the_simulation_is_one_curve_and_is_said_to_be(page, apart, outputs):
+    """A model with white noise predicts what it simulates, and one curve would hide the other."""
+    y, predicted = np.sin(np.arange(100.0)), np.sin(np.arange(100.0)) + 0.1
+    predicted[40:50] = np.nan  # a gap
+    panels = (
+        FitPanel(y, predicted, predicted + apart, 90.0),
+        FitPanel(y, predicted, predicted + apart, 90.0),
+    )
+    figure = page(FitCurves(np.arange(100.0), panels[:outputs]))
+    (legend,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert len(figure.axes[0].lines) == len(labels) == (3 if apart else 2)
+    assert any("ahead, and simulated from u" in label for label in labels) == (not apart)
+
+
 def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
     assert [axes.get_title() for axes in page(CURVES["residuals"]).axes] == ["with residual 1", "with u1"]
     titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
