@@ -65,11 +65,8 @@ def test_a_prediction_that_is_the_simulation_is_one_curve_and_is_said_to_be(page
     """A model with white noise predicts what it simulates, and one curve would hide the other."""
     y, predicted = np.sin(np.arange(100.0)), np.sin(np.arange(100.0)) + 0.1
     predicted[40:50] = np.nan  # a gap
-    panels = (
-        FitPanel(y, predicted, predicted + apart, 90.0),
-        FitPanel(y, predicted, predicted + apart, 90.0),
-    )
-    figure = page(FitCurves(np.arange(100.0), panels[:outputs]))
+    panel = FitPanel(y, predicted, predicted + apart, 90.0)
+    figure = page(FitCurves(np.arange(100.0), (panel,) * outputs))
     (legend,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
     labels = [text.get_text() for text in legend.get_texts()]
     assert len(figure.axes[0].lines) == len(labels) == (3 if apart else 2)
