@@ -31,10 +31,11 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         unit = f"{time_unit}; {part} of {curves.time.size}{'' if shown.start else ' samples'}"
     axes[-1].set_xlabel(f"time ({unit})")
     axes[-1].set_xlim(time[0], time[-1])
+    same = all(_coincide(panel, shown) for panel in curves.panels)
     if single:
         (panel,) = curves.panels
         explained = "" if panel.fit is None else f" (fit {panel.fit:.1f} %)"
-        handles = _plot(axes[0], time, panel, shown, "y", f"simulated from u{explained}")
+        handles = _plot(axes[0], time, panel, shown, "y", f"simulated from u{explained}", same=same)
         axes[0].set_ylabel(panel.label or "output")
         axes[1].plot(time, (panel.y - panel.predicted)[shown], color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
@@ -42,7 +43,8 @@ def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
         return
     longest: list[Artist] = []
     for panel, place in zip(curves.panels, axes, strict=True):
-        longest = max(longest, _plot(place, time, panel, shown, "recorded", "simulated from u"), key=len)
+        handles = _plot(place, time, panel, shown, "recorded", "simulated from u", same=same)
+        longest = max(longest, handles, key=len)
         explained = "" if panel.fit is None else f", fit {panel.fit:.1f} %"
         name = panel.label or f"y{panel.output + 1}"
         place.set_title(f"{name}{explained}", loc="left", color=GREY)
@@ -65,11 +67,11 @@ def stretch(outputs: Sequence[Array]) -> slice:
 
 
 def _plot(
-    axes: Axes, time: Array, panel: FitPanel, shown: slice, recorded: str, simulated: str
+    axes: Axes, time: Array, panel: FitPanel, shown: slice, recorded: str, simulated: str, *, same: bool
 ) -> list[Artist]:
+    """Curves of an output; one for prediction and simulation where these are the `same` in all panels."""
     handles: list[Artist] = []
     handles += axes.plot(time, panel.y[shown], color=BLACK, linewidth=1.0, label=recorded)
-    same = _coincide(panel, shown)
     label = f"predicted one step ahead, and {simulated}" if same else "predicted one step ahead"
     handles += axes.plot(time, panel.predicted[shown], color=BLUE, linewidth=1.0, label=label)
     if panel.simulated is not None and not same:

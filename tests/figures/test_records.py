@@ -73,6 +73,12 @@ def test_a_prediction_that_is_the_simulation_is_one_curve_and_is_said_to_be(page
     assert any("ahead, and simulated from u" in label for label in labels) == (not apart)
 
 
+def test_a_colour_means_the_same_in_all_panels(page):
+    y = np.sin(np.arange(100.0))
+    one, other = FitPanel(y, y + 0.1, y + 0.1, 90.0), FitPanel(y, y + 0.1, y, 90.0, output=1)
+    assert [len(axes.lines) for axes in page(FitCurves(np.arange(100.0), (one, other))).axes] == [3, 3]
+
+
 def test_residuals_have_a_column_for_everything_that_they_are_compared_with(page):
     assert [axes.get_title() for axes in page(CURVES["residuals"]).axes] == ["with residual 1", "with u1"]
     titles = [axes.get_title() for axes in page(CURVES["residuals of two outputs"]).axes]
