@@ -200,7 +200,7 @@ def identification_results(task: Identification, found: Identified, started: flo
         result["identification"]["ruled_out"] = rival_entries(estimate, found.ruled_out)
         notes += ruled_out_notes(estimate, found.ruled_out)
     if question is None:
-        notes.append(f"what is asked cannot be asked of this estimate: {found.unasked}")
+        notes.append(f"there is no r_u for this estimate: {found.unasked}")
     else:
         errors = model_errors(question.requirements) or question.entries
         apart = beyond_errors(found.model, estimate, errors, question.information)
