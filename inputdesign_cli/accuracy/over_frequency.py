@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,24 @@ _BESIDE_ZERO, _ROUNDING = 1e-6, 1e-12
 # Shares of the band: a pole is on the circle, only rounding is seen beside it, it lies at an end of the band.
 _ON_THE_CIRCLE, _HIDDEN, _EDGE = 1e-7, 1e-5, 1e-9
 _GROWS = 5.0
+_KEPT = 8
+
+
+class _LastLook:
+    """What the last look at a requirement has computed, since the next ones often ask for the same."""
+
+    def __init__(self) -> None:
+        self.looked: tuple[Array, Array, Array] | None = None  # an information matrix, and what it gives
+        self._rows: dict[bytes, NDArray[np.float64]] = {}
+
+    def rows_at(self, w: Array, rows: Callable[[Array], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """`rows` (w): while a peak stays in its cell of the grid, the search begins at the same points."""
+        key = w.tobytes()
+        if key not in self._rows:
+            if len(self._rows) >= _KEPT:
+                self._rows.clear()
+            self._rows[key] = rows(w)
+        return self._rows[key]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +130,10 @@ class OverFrequency(Requirement):
     def _grid_rows(self) -> NDArray[np.float64]:
         return self.rows(self.grid)
 
+    @cached_property
+    def _last(self) -> _LastLook:
+        return _LastLook()
+
     def ratios(self, information: Array, frequencies: Array) -> Array:
         """The ratio (n,) at given frequencies."""
         return self.measure(turned(self.rows(frequencies), inverse_factor(information).T), frequencies)
@@ -126,8 +149,7 @@ class OverFrequency(Requirement):
         Raises:
             InaccurateError: `ratio-not-finite`.
         """
-        turn = inverse_factor(information).T
-        on_grid = self.measure(turned(self._grid_rows, turn), self.grid)
+        turn, on_grid = self._looked(information)
         if not np.all(np.isfinite(on_grid)):
             raise InaccurateError.because(
                 "ratio-not-finite",
@@ -140,7 +162,10 @@ class OverFrequency(Requirement):
 
     def _polished(self, turn: Array, on_grid: Array, above: float) -> list[Violation]:
         w, ratio = local_maxima(
-            lambda w: self.measure(turned(self.rows(w), turn), w), self.grid, on_grid, above=above
+            lambda w: self.measure(turned(self._last.rows_at(w, self.rows), turn), w),
+            self.grid,
+            on_grid,
+            above=above,
         )
         return [Violation(float(r), float(at)) for at, r in zip(w, ratio, strict=True)]
 
@@ -151,8 +176,16 @@ class OverFrequency(Requirement):
 
     def least(self, information: Array) -> float:
         """The largest ratio at the points of the grid; NaN where one is not finite."""
-        on_grid = self.measure(turned(self._grid_rows, inverse_factor(information).T), self.grid)
-        return float(on_grid.max())
+        return float(self._looked(information)[1].max())
+
+    def _looked(self, information: Array) -> tuple[Array, Array]:
+        """K^T with K^T K = M^-1, and the ratio on the grid, finite or not."""
+        seen = self._last.looked
+        if seen is None or not np.array_equal(seen[0], information):
+            turn = inverse_factor(information).T
+            seen = information.copy(), turn, self.measure(turned(self._grid_rows, turn), self.grid)
+            self._last.looked = seen
+        return seen[1:]
 
     def worst(self, information: Array) -> Violation:
         """The largest of the violations; one beside frequency zero is told to be there."""
