@@ -13,9 +13,10 @@ from inputdesign_cli.identification.checks import check_varying, signal_name
 from inputdesign_cli.identification.estimate import Estimate
 from inputdesign_cli.identification.estimators import identify
 from inputdesign_cli.identification.explore.busiest import busiest
+from inputdesign_cli.identification.explore.candidates import Candidate, Chosen
 from inputdesign_cli.identification.explore.fits import Fits, Parts, beside, fits, is_steady
 from inputdesign_cli.identification.explore.processes import process_models
-from inputdesign_cli.identification.explore.search import Candidate, Chosen, explore_structure
+from inputdesign_cli.identification.explore.search import explore_structure
 from inputdesign_cli.plant import Model, PolynomialModel
 from inputdesign_cli.plant.polynomial import Array
 

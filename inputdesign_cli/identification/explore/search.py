@@ -1,8 +1,8 @@
 """Which structure explains an output: estimated on one part of the record, judged by simulation on another.
 
 Delays and the order come from quick output-error estimates; ARX models of all orders up to eight are
-judged beside them. The best few of every family are then estimated by prediction errors. Of models that are
-about equally good the one with the fewest parameters is chosen.
+judged beside them. The best few of every family are then estimated by prediction errors, and `candidates`
+says which one to take.
 """
 
 from __future__ import annotations
@@ -19,6 +19,13 @@ from inputdesign_cli.identification.checks import check_length
 from inputdesign_cli.identification.estimate import factor_at, noise_of
 from inputdesign_cli.identification.estimators import estimator
 from inputdesign_cli.identification.explore.busiest import busiest
+from inputdesign_cli.identification.explore.candidates import (
+    Candidate,
+    Chosen,
+    Shape,
+    about_as_good,
+    noise_first,
+)
 from inputdesign_cli.identification.explore.fits import (
     Parts,
     fits,
@@ -28,12 +35,11 @@ from inputdesign_cli.identification.explore.fits import (
 )
 from inputdesign_cli.identification.explore.inputs import acts_late
 from inputdesign_cli.identification.explore.orders import Orders, arx, plant_order, static_gain
-from inputdesign_cli.identification.explore.processes import Process, processes
+from inputdesign_cli.identification.explore.processes import processes
 from inputdesign_cli.identification.explore.regression import (
     SharedDenominator,
     arx_grid,
     best_delays,
-    delay_ranges,
     from_rest,
     numerators,
 )
@@ -50,116 +56,10 @@ _ALWAYS = 3
 _ARX_KEPT = 2
 # Of each family so many are estimated once more, levels and starts along with them.
 _FINALISTS = 2
-# An error of simulation that is larger by less than this share, and by no more points, is as good.
-_AS_GOOD, _POINTS = 1.2, 2.0
 # Samples to a parameter, at least; steps of the search for a candidate, by whether it is physical, and times
 # as many for a finalist.
 _PER_PARAMETER = 5
 _STEPS, _AGAIN = {False: 100, True: 30}, 4
-
-Shape = Orders | Process
-"""A structure for one output."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One structure for one output.
-
-    Attributes:
-        orders: the structure; `model` is it, estimated on the first part.
-        estimation, validation: per cent that the simulation explains of the two parts.
-        prediction: per cent one step ahead, on the second part.
-        criterion: log of the variance + k log(N) / N (BIC), on the first part.
-        failed: tests of the residuals that refute it.
-        steady: whether its plant is stable, as far as the record tells.
-        ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
-        feedback: whether the record is from a loop.
-    """
-
-    orders: Shape
-    model: Model
-    estimation: float
-    validation: float
-    prediction: float
-    criterion: float
-    failed: tuple[str, ...]
-    converged: bool
-    steady: bool
-    ranges: tuple[tuple[int, int], ...]
-    feedback: bool
-
-    @property
-    def theta(self) -> Array:
-        """(k,)."""
-        return self.model.theta
-
-    @property
-    def settled(self) -> bool:
-        """Whether the search ended, as far as a quick one tells: kinks at dead times stop it early."""
-        return self.converged or self.orders.physical
-
-    @property
-    def biased(self) -> bool:
-        """Whether failed tests speak against its plant.
-
-        A wrong noise model biases an A that plant and noise share, not the plant of OE and BJ
-        ([ljung-1999], Section 8.4); in a loop it biases them all (Section 13.4).
-        """
-        return (self.orders.shared or self.feedback) and bool(self.failed)
-
-    @property
-    def unknowns(self) -> int:
-        """Parameters, delays that were searched for included."""
-        return self.orders.size + (0 if self.orders.physical else len(self.orders.delays))
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """What was found for one output.
-
-    Attributes:
-        candidates: the best first.
-        by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
-        finalists: those that may be taken, the best first.
-        estimated: the records of the first part.
-        least, most: the delays that were looked for, of each input from the one to the other.
-        dropped: families of which no structure could be estimated.
-    """
-
-    candidates: tuple[Candidate, ...]
-    by_order: dict[int, float]
-    finalists: tuple[Candidate, ...]
-    estimated: Parts
-    least: tuple[int, ...]
-    most: int
-    dropped: tuple[str, ...]
-
-    @property
-    def best(self) -> Candidate:
-        """The one to take."""
-        return self.candidates[0]
-
-    @property
-    def ranked(self) -> list[Candidate]:
-        """Those that may be taken, then the others, the best first.
-
-        After them the biased ones, and those on the edge of stability last. A static gain that is no
-        finalist is none of them: it would hide what the plant does.
-        """
-        others = [
-            c for c in self.candidates if c.orders.order and all(c is not one for one in self.finalists)
-        ]
-        return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
-
-    def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
-        """Of each input, the delays that 95 % of confidence leaves a candidate."""
-        order = min(max(candidate.orders.order, 1), max(self.by_order))
-        delays = candidate.orders.delays
-        return candidate.ranges or delay_ranges(self.estimated, order, delays, self.least, self.most)
-
-    def best_of(self, *, physical: bool) -> Candidate | None:
-        """The best with parameters of that kind among those that are about as good as any."""
-        return next((c for c in self.finalists if c.orders.physical == physical), None)
 
 
 @dataclass(frozen=True)
@@ -284,20 +184,13 @@ def explore_structure(
     usable = [c for c in again.values() if c is not None and np.isfinite(c.validation)]
     if not usable:
         return None
-    error = min(100.0 - c.validation for c in usable)
-    good = [c for c in usable if 100.0 - c.validation <= min(_AS_GOOD * error, error + _POINTS)]
-    good.sort(
-        key=lambda c: (
-            not c.settled,
-            c.biased,
-            not c.steady,
-            c.unknowns,
-            not c.orders.physical,
-            -c.validation,
-        )
-    )
+    good = about_as_good(usable)
+    if good[0].failed and not good[0].orders.coloured:
+        filtered = map(parts.refined, judged(good[0].orders.with_coloured_noise()))
+        good = noise_first(good, [c for c in filtered if c is not None])
     best = good[0]
-    rest = sorted((c for c in found if c.orders != best.orders), key=lambda c: -c.validation)
+    known = {c.orders: c for c in (*found, *good)}
+    rest = sorted((c for c in known.values() if c.orders != best.orders), key=lambda c: -c.validation)
     estimated = {c.orders.family for c in found}
     dropped = tuple(family for family in families if family not in estimated)
     return Chosen((best, *rest), by_order, tuple(good), first, least, most, dropped)

@@ -1,0 +1,165 @@
+"""Structures that were estimated for one output, and which of them to take.
+
+Of models that simulate about equally well, one is taken that the tests of its residuals do not refute, with as
+few parameters as can be; where they refute all, the noise of the simplest is filtered if that predicts better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from inputdesign_cli.identification.explore.fits import Parts
+from inputdesign_cli.identification.explore.orders import Orders
+from inputdesign_cli.identification.explore.processes import Process
+from inputdesign_cli.identification.explore.regression import delay_ranges
+from inputdesign_cli.plant import Model
+from inputdesign_cli.plant.polynomial import Array
+
+# An error of simulation that is larger by less than this share, and by no more points, is as good.
+_AS_GOOD, _POINTS = 1.2, 2.0
+# Of a preference, what comes before the number of parameters.
+_CONDITIONS = 4
+
+Shape = Orders | Process
+"""A structure for one output."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One structure for one output.
+
+    Attributes:
+        orders: the structure; `model` is it, estimated on the first part.
+        estimation, validation: per cent that the simulation explains of the two parts.
+        prediction: per cent one step ahead, on the second part.
+        criterion: log of the variance + k log(N) / N (BIC), on the first part.
+        failed: tests of the residuals that refute it.
+        steady: whether its plant is stable, as far as the record tells.
+        ranges: of each input, the delays that 95 % of confidence leaves, where dead times are parameters.
+        feedback: whether the record is from a loop.
+    """
+
+    orders: Shape
+    model: Model
+    estimation: float
+    validation: float
+    prediction: float
+    criterion: float
+    failed: tuple[str, ...]
+    converged: bool
+    steady: bool
+    ranges: tuple[tuple[int, int], ...]
+    feedback: bool
+
+    @property
+    def theta(self) -> Array:
+        """(k,)."""
+        return self.model.theta
+
+    @property
+    def settled(self) -> bool:
+        """Whether the search ended, as far as a quick one tells: kinks at dead times stop it early."""
+        return self.converged or self.orders.physical
+
+    @property
+    def biased(self) -> bool:
+        """Whether failed tests speak against its plant.
+
+        A wrong noise model biases an A that plant and noise share, not the plant of OE and BJ
+        ([ljung-1999], Section 8.4); in a loop it biases them all (Section 13.4).
+        """
+        return (self.orders.shared or self.feedback) and bool(self.failed)
+
+    @property
+    def unknowns(self) -> int:
+        """Parameters, delays that were searched for included."""
+        return self.orders.size + (0 if self.orders.physical else len(self.orders.delays))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was found for one output.
+
+    Attributes:
+        candidates: the best first.
+        by_order: order of the plant -> least output error (rms) on the first part, quickly estimated.
+        finalists: those that may be taken, the best first.
+        estimated: the records of the first part.
+        least, most: the delays that were looked for, of each input from the one to the other.
+        dropped: families of which no structure could be estimated.
+    """
+
+    candidates: tuple[Candidate, ...]
+    by_order: dict[int, float]
+    finalists: tuple[Candidate, ...]
+    estimated: Parts
+    least: tuple[int, ...]
+    most: int
+    dropped: tuple[str, ...]
+
+    @property
+    def best(self) -> Candidate:
+        """The one to take."""
+        return self.candidates[0]
+
+    @property
+    def ranked(self) -> list[Candidate]:
+        """Those that may be taken, then the others, the best first.
+
+        After them the biased ones, and those on the edge of stability last. A static gain that is no
+        finalist is none of them: it would hide what the plant does.
+        """
+        others = [
+            c for c in self.candidates if c.orders.order and all(c is not one for one in self.finalists)
+        ]
+        return sorted((*self.finalists, *others), key=lambda c: (not c.steady, c.biased))
+
+    def ranges(self, candidate: Candidate) -> tuple[tuple[int, int], ...]:
+        """Of each input, the delays that 95 % of confidence leaves a candidate."""
+        order = min(max(candidate.orders.order, 1), max(self.by_order))
+        delays = candidate.orders.delays
+        return candidate.ranges or delay_ranges(self.estimated, order, delays, self.least, self.most)
+
+    def best_of(self, *, physical: bool) -> Candidate | None:
+        """The best with parameters of that kind among those that are about as good as any."""
+        return next((c for c in self.finalists if c.orders.physical == physical), None)
+
+
+def about_as_good(usable: Sequence[Candidate]) -> list[Candidate]:
+    """Those that simulate about as well as any, the one to take first."""
+    most = _most_error(usable)
+    return sorted((c for c in usable if 100.0 - c.validation <= most), key=_preference)
+
+
+def noise_first(good: Sequence[Candidate], filtered: Sequence[Candidate]) -> list[Candidate]:
+    """Those that are as good, before them the first one's plant with filtered noise where that is better.
+
+    A wrong noise model leaves the plant of OE and of processes as it is, but not its covariance, nor what an
+    experiment must do for it ([ljung-1999], Section 8.4).
+
+    Args:
+        filtered: the plant of the first with filtered noise.
+    """
+    most, plain = _most_error(good), good[0]
+    better = [
+        c
+        for c in filtered
+        if 100.0 - c.validation <= most
+        and c.criterion < plain.criterion
+        and c.prediction > plain.prediction
+        and _preference(c)[:_CONDITIONS] <= _preference(plain)[:_CONDITIONS]
+    ]
+    shapes = {c.orders for c in better}
+    first = sorted(better, key=lambda c: (len(c.failed), c.criterion))
+    return [*first, *(c for c in good if c.orders not in shapes)]
+
+
+def _most_error(usable: Sequence[Candidate]) -> float:
+    error = min(100.0 - c.validation for c in usable)
+    return min(_AS_GOOD * error, error + _POINTS)
+
+
+def _preference(c: Candidate) -> tuple[float, ...]:
+    conditions = (not c.settled, c.biased, not c.steady, bool(c.failed))
+    return (*conditions, c.unknowns, not c.orders.physical, -c.validation)
