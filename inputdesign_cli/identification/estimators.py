@@ -124,6 +124,7 @@ def identify(
     earlier: Earlier | None = None,
     experiments: Lengths = None,
     near: bool = False,
+    ramp: bool = False,
 ) -> Estimate:
     """The structure of `model` estimated from one record, or jointly from several.
 
@@ -140,6 +141,7 @@ def identify(
         earlier: an estimate from other data, which counts along.
         experiments: the samples of each experiment, of one or several records; None: all are of one.
         near: whether `start` is an estimate of such data already, so that no others are made.
+        ramp: whether outputs may drift along a line in every record, whose slope is estimated along.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -156,6 +158,7 @@ def identify(
         earlier=earlier,
         experiments=experiments,
         near=near,
+        ramp=ramp,
     )
 
 

@@ -91,7 +91,7 @@ class Extension:
     def records(self, records: Records) -> Records:
         """The same samples against the larger structure."""
         parts = tuple(self.record(part.u, part.y) for part in records.parts)
-        larger = Records(parts, weights=records.weights)
+        larger = Records(parts, weights=records.weights, ramp=records.ramp)
         return larger.begun_freely(records.late) if records.free else larger
 
 

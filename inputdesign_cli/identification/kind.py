@@ -103,6 +103,7 @@ def identify_records(
     experiments: Sequence[int] | None = None,
     weights: Array | None = None,
     near: bool = False,
+    ramp: bool = False,
 ) -> Estimate:
     """The maximum-likelihood estimate of a structure from one record, or jointly from several.
 
@@ -117,6 +118,8 @@ def identify_records(
         experiments: the samples of each experiment, of one or several records; None: all are of one.
         weights: W (p, p) of the errors if the covariance of the noise is known.
         near: whether `start` is an estimate of such data already, so that no others are made.
+        ramp: whether outputs may drift along a line in every record, whose slope is estimated along; no
+            record then begins at rest.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output`, `noise-free-data` or
@@ -128,7 +131,7 @@ def identify_records(
 
     def records_of(signals: Sequence[Part]) -> Records:
         made = tuple(kind.record(*part) for part in signals)
-        return Records(made, weights=weights, earlier=earlier)
+        return Records(made, weights=weights, earlier=earlier, ramp=ramp)
 
     def searched(records: Records, known: Array | None) -> Search:
         chosen = longest(parts)
@@ -142,7 +145,8 @@ def identify_records(
         tell(Counted("starting points followed to a minimum", 0, len(points)))
         return search(records, points, starts=begin.tried + (earlier is not None), before=steps)
 
-    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), rest, searched, start)
+    known_rest = False if ramp else rest
+    best = from_rest_or_free(records_of(parts), records_of(centred(parts)), known_rest, searched, start)
     simulated, stable = kind.simulated(best, y, lengths)
     return concluded(
         kind.names,

@@ -21,6 +21,8 @@ from inputdesign_cli.identification.start import Start
 from inputdesign_cli.plant.polynomial import Array
 
 _MOST_STARTED = 3
+# Of a coefficient of the noise, or of one: central differences of a filtered line lose about half the digits.
+_STEP = 1e-6
 
 
 class Record(Protocol):
@@ -138,6 +140,7 @@ class Records:
         late: samples in which unknown inputs before each act, if it is free.
         weights: W (p, p) of the errors; None to weigh by their own covariance.
         earlier: what is known besides.
+        ramp: whether outputs of free records may drift along a line besides, of an unknown slope.
     """
 
     parts: tuple[Record, ...]
@@ -145,6 +148,7 @@ class Records:
     late: int = 0
     weights: Array | None = None
     earlier: Earlier | None = None
+    ramp: bool = False
 
     def begun_freely(self, late: int) -> Records:
         """The same, each begun in an unknown state, after unknown inputs that act for `late` samples."""
@@ -238,10 +242,31 @@ class Records:
         return max(self.parts, key=lambda part: len(part.y))
 
     def _starts(self, theta: Array) -> FreeStarts:
-        return FreeStarts(self.lengths, self._longest.starts(theta, free=self.free))
+        starts = self._longest.starts(theta, free=self.free)
+        if self.ramp and self.free:
+            line = self._line
+            through = self._longest.whitened(theta, line)
+            starts = tuple(start.and_free(own.T, line.T) for start, own in zip(starts, through, strict=True))
+        return FreeStarts(self.lengths, starts)
 
     def _start_slopes(self, theta: Array, indices: Sequence[int]) -> list[tuple[Start, ...]]:
-        return self._longest.start_slopes(theta, indices, free=self.free)
+        slopes = self._longest.start_slopes(theta, indices, free=self.free)
+        if not (self.ramp and self.free):
+            return slopes
+        still, found = np.zeros_like(self._line).T, []
+        for index, starts in zip(indices, slopes, strict=True):
+            step = _STEP * max(abs(float(theta[index])), 1.0) * np.eye(theta.size)[index]
+            above, below = (self._longest.whitened(end, self._line) for end in (theta + step, theta - step))
+            change = (above - below) / (2.0 * step[index])
+            found.append(
+                tuple(start.and_free(own.T, still) for start, own in zip(starts, change, strict=True))
+            )
+        return found
+
+    @property
+    def _line(self) -> Array:
+        """(N, 1) of the longest record: what drifts evenly."""
+        return np.linspace(-1.0, 1.0, len(self._longest.y))[:, None]
 
     def noise_in_regressors(self, theta: Array, errors: Array) -> NDArray[np.float64]:
         """(k, N, p), see `Record`."""

@@ -41,6 +41,13 @@ class Start(NamedTuple):
         """Where the noise is white: it has no past."""
         return cls(free, free, np.zeros((0, free.shape[1])), np.zeros(()))
 
+    def and_free(self, free: NDArray[np.float64], disturbance: NDArray[np.float64]) -> Start:
+        """With further unknowns of which nothing is known, (m, N) each."""
+        return self._replace(
+            free=np.concatenate([self.free, free]),
+            disturbance=np.concatenate([self.disturbance, disturbance]),
+        )
+
     def cropped(self, samples: int) -> Start:
         """What it is of a shorter record."""
         free, disturbance, noise = (block[:, :samples] for block in self[:3])

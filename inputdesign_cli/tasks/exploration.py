@@ -35,6 +35,7 @@ from inputdesign_cli.tasks.result.exploration import (
     structure_curves,
     validation_curves,
     validation_entry,
+    without_drift,
 )
 from inputdesign_cli.tasks.result.integrating import like_integrators
 from inputdesign_cli.tasks.result.refutations import refutations
@@ -71,11 +72,12 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
     undriven = _undriven(log)
     with blaming_columns(paths[0]):
         try:
-            found = explore_records(log.parts, feedback=bool(loops), step=log.step)
+            found = explore_records(log.parts, feedback=bool(loops), step=log.step, ramp=log.lined)
         except SpecError as error:
             if not undriven:
                 raise
             raise bad_spec("no-structure", undriven[0], hint=_DRIVE, key="u") from error
+    log = without_drift(log, found)
     loose = (f"{told}: {_DRIVE}" for told in undriven)
     rising = like_integrators(found, log.step, log.time_unit)
     reasons = (*_reasons(found), *_idle(found), *_refuted(found), *rising, *loose)

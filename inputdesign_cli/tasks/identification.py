@@ -143,6 +143,7 @@ def estimated(task: Identification, data: Data, first: Path, taken: Preparation)
             earlier=task.earlier,
             experiments=[samples for _, samples in data.files],
             near=near,
+            ramp=data.lined,
         )
 
     with blaming_columns(first):

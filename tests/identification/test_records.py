@@ -1,5 +1,7 @@
 """Several records, and records that do not begin at rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -37,9 +39,11 @@ def record_of(name):
     return Records(parts, free=True), model.theta * (1 + 0.03 * rng.standard_normal(model.theta.size))
 
 
+@pytest.mark.parametrize("ramp", [False, True])
 @pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
-def test_the_slope_with_unknown_starts_is_a_difference_quotient(name):
+def test_the_slope_with_unknown_starts_is_a_difference_quotient(name, ramp):
     records, theta = record_of(name)
+    records = replace(records, ramp=ramp)
     point = evaluate(records, theta)
     for k, size in enumerate(np.maximum(np.abs(theta), 1e-2) * 1e-5):
         step = size * np.eye(theta.size)[k]
@@ -65,6 +69,21 @@ def test_an_unknown_start_explains_what_was_cut_off(name):
     left = Records((record,), free=True).at(model.theta).errors
     np.testing.assert_allclose(left, 0.0, atol=1e-6 * np.abs(y).max())
     assert np.abs(Records((record,)).at(model.theta).errors).max() > 1e-2
+
+
+@pytest.mark.parametrize("name", [*SYSTEMS, "two outputs", "in s"])
+def test_lines_in_the_outputs_leave_nothing_where_they_may_drift(name):
+    """Errors and their gradient are the same whatever line every record has, and another without the ramp."""
+    records, theta = record_of(name)
+    records = replace(records, ramp=True)
+    lined = tuple(
+        replace(part, y=part.y + np.outer(np.arange(len(part.y)), slope * np.arange(1, part.y.shape[1] + 1)))
+        for slope, part in zip((0.03, -0.02), records.parts, strict=True)
+    )
+    plain, drifting = records.at(theta), replace(records, parts=lined).at(theta)
+    np.testing.assert_allclose(drifting.errors, plain.errors, atol=1e-6 * np.abs(plain.errors).max())
+    np.testing.assert_allclose(drifting.psi, plain.psi, atol=1e-5 * np.abs(plain.psi).max())
+    assert np.abs(replace(records, parts=lined, ramp=False).at(theta).errors - plain.errors).max() > 0.1
 
 
 @pytest.mark.parametrize("name", ["arx", pytest.param("bj", marks=pytest.mark.slow)])

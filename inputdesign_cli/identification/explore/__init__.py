@@ -1,5 +1,10 @@
 """From a record alone to a model: delays, orders and families, judged on data that they have not seen."""
 
+from inputdesign_cli.identification.explore.candidates import Candidate as Candidate, Chosen as Chosen
+from inputdesign_cli.identification.explore.drifting import (
+    explore_records as explore_records,
+    levelled as levelled,
+)
 from inputdesign_cli.identification.explore.fits import (
     Fits as Fits,
     by_chance as by_chance,
@@ -11,9 +16,5 @@ from inputdesign_cli.identification.explore.inputs import (
     only_answers as only_answers,
     order_of_excitation as order_of_excitation,
 )
-from inputdesign_cli.identification.explore.joint import Found as Found, explore_records as explore_records
-from inputdesign_cli.identification.explore.search import (
-    Candidate as Candidate,
-    Chosen as Chosen,
-    explore_structure as explore_structure,
-)
+from inputdesign_cli.identification.explore.joint import Found as Found
+from inputdesign_cli.identification.explore.search import explore_structure as explore_structure

@@ -1,7 +1,7 @@
 """Structures that were estimated for one output, and which of them to take.
 
-Of models that simulate about equally well, one is taken that the tests of its residuals do not refute, with as
-few parameters as can be; where they refute all, the noise of the simplest is filtered if that predicts better.
+Of models that simulate about equally well, one is taken that the tests of its residuals do not refute, with
+few parameters. Where they refute all, the noise of the simplest is filtered if that predicts better.
 """
 
 from __future__ import annotations
@@ -124,6 +124,13 @@ class Chosen:
     def best_of(self, *, physical: bool) -> Candidate | None:
         """The best with parameters of that kind among those that are about as good as any."""
         return next((c for c in self.finalists if c.orders.physical == physical), None)
+
+
+def with_noise(plain: Sequence[Candidate]) -> list[Shape]:
+    """The plant that simulates best with filtered noise, and simpler ones that do so about as well."""
+    best, most = max(plain, key=lambda c: c.validation), _most_error(plain)
+    near = [c for c in plain if 100.0 - c.validation <= most and c.unknowns < best.unknowns]
+    return [*best.orders.with_coloured_noise(), *(c.orders.with_coloured_noise()[0] for c in near)]
 
 
 def about_as_good(usable: Sequence[Candidate]) -> list[Candidate]:

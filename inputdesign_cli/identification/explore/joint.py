@@ -45,6 +45,7 @@ class Found:
         validation: the fits of the same structures, estimated on one part, to the other.
         interleaved: whether the parts are blocks that take turns, instead of beginning and end.
         still: inputs (from zero) that never move.
+        slopes: (p,), of the lines that were taken away from the outputs, a sample; None: of none.
     """
 
     outputs: tuple[Chosen, ...]
@@ -57,6 +58,7 @@ class Found:
     validation: Fits
     interleaved: bool
     still: tuple[int, ...]
+    slopes: Array | None = None
 
     @property
     def moving(self) -> list[int]:
@@ -64,11 +66,59 @@ class Found:
         return [j for j in range(self.model.inputs) if j not in self.still]
 
 
-def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) -> Found:
+def explored(parts: Parts, *, feedback: bool, step: float, ramp: bool) -> Found:
     """The model that records u (n, r), y (n, p) speak for, samples `step` apart.
+
+    Args:
+        feedback: whether u(t) may answer y(t).
+        ramp: whether a line of each output is estimated along, in every record, from the whole of it.
 
     Raises:
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
+    """
+    still, moved = moving_in(parts)
+    moving = [j for j in range(parts[0][0].shape[1]) if j not in still]
+    first, second, interleaved = divided(moved)
+    found, outputs = [], parts[0][1].shape[1]
+    for i in range(outputs):
+        own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
+        chosen = explore_structure(own[0], own[1], feedback=feedback, step=step, physical=not still)
+        if chosen is None:
+            name = signal_name("y", i, outputs)
+            raise bad_spec(
+                "no-structure",
+                f"no model of {name} could be estimated: the record does not tell its parameters",
+                hint=_too_little(
+                    [signal_name("u", j, len(moving) + len(still)) for j in moving], first, second
+                ),
+                key=name,
+            )
+        found.append(chosen)
+    used = busiest(moved, _MOST_SAMPLES)
+    taken, estimate, model = _estimated(found, used, feedback, ramp)
+    validation = beside(
+        [fits(c.model, [(u, y[:, i : i + 1]) for u, y in second]) for i, c in enumerate(taken)]
+    )
+    whole = joined(taken, parts[0][0].shape[1], moving).at(model.theta, model.covariance)
+    return Found(
+        tuple(found),
+        taken,
+        tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
+        whole,
+        replace(estimate, names=whole.names),
+        busiest(parts, _MOST_SAMPLES),
+        _busiest_samples(moved),
+        validation,
+        interleaved,
+        still,
+    )
+
+
+def moving_in(parts: Parts) -> tuple[tuple[int, ...], list[tuple[Array, Array]]]:
+    """The inputs that never move, and the records without them.
+
+    Raises:
+        SpecError: `too-few-samples`, `constant-input` or `constant-output`.
     """
     u, y = (np.concatenate(signals) for signals in zip(*parts, strict=True))
     still = tuple(int(j) for j in np.flatnonzero(np.ptp(u, axis=0) <= 1e-12 * np.abs(u).max(axis=0)))
@@ -84,39 +134,7 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0) 
             hint="record more; or identify a structure that you know: idesign identify DATA --spec SPEC",
             key="u",
         )
-    moved = [(part_u[:, moving], part_y) for part_u, part_y in parts]
-    first, second, interleaved = divided(moved)
-    found = []
-    for i in range(y.shape[1]):
-        own = [[(part_u, part_y[:, i : i + 1]) for part_u, part_y in some] for some in (first, second)]
-        chosen = explore_structure(own[0], own[1], feedback=feedback, step=step, physical=not still)
-        if chosen is None:
-            name = signal_name("y", i, y.shape[1])
-            raise bad_spec(
-                "no-structure",
-                f"no model of {name} could be estimated: the record does not tell its parameters",
-                hint=_too_little([signal_name("u", j, u.shape[1]) for j in moving], first, second),
-                key=name,
-            )
-        found.append(chosen)
-    used = busiest(moved, _MOST_SAMPLES)
-    taken, estimate, model = _estimated(found, used, feedback)
-    validation = beside(
-        [fits(c.model, [(u, y[:, i : i + 1]) for u, y in second]) for i, c in enumerate(taken)]
-    )
-    whole = joined(taken, u.shape[1], moving).at(model.theta, model.covariance)
-    return Found(
-        tuple(found),
-        taken,
-        tuple(chosen.ranges(own) for chosen, own in zip(found, taken, strict=True)),
-        whole,
-        replace(estimate, names=whole.names),
-        busiest(parts, _MOST_SAMPLES),
-        _busiest_samples(moved),
-        validation,
-        interleaved,
-        still,
-    )
+    return still, [(part_u[:, moving], part_y) for part_u, part_y in parts]
 
 
 def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
@@ -127,7 +145,7 @@ def _busiest_samples(parts: Parts) -> NDArray[np.int64]:
 
 
 def _estimated(
-    found: Sequence[Chosen], used: Parts, feedback: bool
+    found: Sequence[Chosen], used: Parts, feedback: bool, ramp: bool
 ) -> tuple[tuple[Candidate, ...], Estimate, Model]:
     """The best structures on the whole record; simpler ones where these cannot be estimated there."""
     inputs = used[0][0].shape[1]
@@ -137,11 +155,11 @@ def _estimated(
             begun = taken
             if len(taken) > 1:
                 # Where one output has several minima, a search for all of them seldom leaves a wrong one.
-                begun = tuple(_alone(own, used, i, feedback) for i, own in enumerate(taken))
+                begun = tuple(_alone(own, used, i, feedback, ramp) for i, own in enumerate(taken))
             structure = joined(begun, inputs, range(inputs))
             # Of plants in s other starts cost more than the search.
             near = len(taken) > 1 or taken[0].orders.physical
-            estimate = _identified(structure, used, feedback, near=near)
+            estimate = _identified(structure, used, feedback, near=near, ramp=ramp)
         except SpecError as error:
             reason = error
             continue
@@ -156,14 +174,14 @@ def _estimated(
     )
 
 
-def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool) -> Candidate:
+def _alone(candidate: Candidate, used: Parts, output: int, feedback: bool, ramp: bool) -> Candidate:
     """The structure of one output, estimated from the whole record without the others."""
     own = [(u, y[:, output : output + 1]) for u, y in used]
-    estimate = _identified(candidate.model, own, feedback, near=candidate.orders.physical)
+    estimate = _identified(candidate.model, own, feedback, near=candidate.orders.physical, ramp=ramp)
     return replace(candidate, model=candidate.model.at(estimate.theta, estimate.noise))
 
 
-def _identified(structure: Model, used: Parts, feedback: bool, *, near: bool) -> Estimate:
+def _identified(structure: Model, used: Parts, feedback: bool, *, near: bool, ramp: bool) -> Estimate:
     u, y = (np.concatenate(signals) for signals in zip(*used, strict=True))
     return identify(
         structure,
@@ -174,6 +192,7 @@ def _identified(structure: Model, used: Parts, feedback: bool, *, near: bool) ->
         lengths=[len(part) for _, part in used],
         rest=False,
         near=near,
+        ramp=ramp,
     )
 
 

@@ -26,33 +26,45 @@ _COARSE = (0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 27, 36, 48, 64, 85, 113, 150)
 
 @dataclass(frozen=True)
 class SharedDenominator:
-    """y = sum_j (B_j / F) u_j + level + start: F (n + 1,), the loss (mean square of the output error)."""
+    """y = sum_j (B_j / F) u_j + level + start: F (n + 1,), the loss (mean square of the output error).
+
+    `slope` is that of a line beside these, a sample, where one was asked for.
+    """
 
     F: Array
     delays: tuple[int, ...]
     loss: float
+    slope: float = 0.0
 
 
-def output_error(parts: Parts, n: int, b: int, delays: Sequence[int]) -> SharedDenominator:
-    """The estimate of one output, y (N, 1), with one denominator of order n for all inputs."""
+def output_error(
+    parts: Parts, n: int, b: int, delays: Sequence[int], *, line: bool = False
+) -> SharedDenominator:
+    """The estimate of one output, y (N, 1), with one denominator of order n for all inputs.
+
+    Args:
+        line: whether the output drifts along one, of the same slope in all records.
+    """
     begun = _begun(parts)
-    F, best, least = np.array([1.0]), np.array([1.0]), np.inf
+    F, best, least, slope = np.array([1.0]), np.array([1.0]), np.inf, 0.0
     for _ in range(_ITERATIONS):
         blocks = []
         for u, y in begun:
             smooth = filtered([1.0], F, y)
             past = [-_lagged(smooth, lag) for lag in range(1, n + 1)]
+            if line:
+                past.append(filtered([1.0], F, _line(len(y))))
             blocks.append((np.stack([*past, *_caused(u, len(y), F, n, b, delays)], axis=1), smooth))
-        solution = _solve(blocks, own=n + len(delays) * b)
+        solution = _solve(blocks, own=n + line + len(delays) * b)
         if not np.all(np.isfinite(solution)):
             break
         F = reflected(np.concatenate([[1.0], solution[:n]]))
-        loss = _loss(begun, F, n, b, delays)
+        loss, rises = _loss(begun, F, n, b, delays, line)
         if loss < least * (1.0 - 1e-6):
-            best, least = F, loss
+            best, least, slope = F, loss, rises
         elif loss > 1.5 * least:
             break
-    return SharedDenominator(best, tuple(delays), least)
+    return SharedDenominator(best, tuple(delays), least, slope)
 
 
 def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[int]) -> Iterator[Array]:
@@ -64,21 +76,36 @@ def _caused(u: Array, samples: int, F: Array, n: int, b: int, delays: Sequence[i
     yield from (_lagged(impulse, lag) for lag in range(n))
 
 
-def _loss(parts: Sequence[tuple[Array, Array]], F: Array, n: int, b: int, delays: Sequence[int]) -> float:
-    """Mean square of the output error at F."""
+def _loss(
+    parts: Sequence[tuple[Array, Array]], F: Array, n: int, b: int, delays: Sequence[int], line: bool
+) -> tuple[float, float]:
+    """Mean square of the output error at F, and the slope of the line."""
     left, samples = 0.0, 0
-    for (_, y), (caused, begun) in zip(parts, _explained(parts, F, n, b, delays), strict=True):
+    explained, slope = _explained(parts, F, n, b, delays, line=line)
+    for (_, y), (caused, begun) in zip(parts, explained, strict=True):
         left += float(np.sum((y - caused - begun) ** 2))
         samples += len(y)
-    return left / samples if np.isfinite(left) else np.inf
+    return left / samples if np.isfinite(left) else np.inf, slope
 
 
 def _explained(
-    parts: Sequence[tuple[Array, Array]], F: Array, n: int, b: int, delays: Sequence[int]
-) -> list[tuple[Array, Array]]:
-    """Of each record (n,), by least squares at F: what the inputs cause, and what level and start do."""
-    blocks = [(np.stack([*_caused(u, len(y), F, n, b, delays)], axis=1), y) for u, y in parts]
-    own = len(delays) * b
+    parts: Sequence[tuple[Array, Array]],
+    F: Array,
+    n: int,
+    b: int,
+    delays: Sequence[int],
+    *,
+    line: bool = False,
+) -> tuple[list[tuple[Array, Array]], float]:
+    """Of each record (n,), by least squares at F: what inputs and line cause, and what level and start do.
+
+    With it the slope of the line.
+    """
+    blocks = list[tuple[Array, Array]]()
+    for u, y in parts:
+        lined = [_line(len(y))] if line else []
+        blocks.append((np.stack([*lined, *_caused(u, len(y), F, n, b, delays)], axis=1), y))
+    own = line + len(delays) * b
     solution = _solve(blocks, own=own)
     found, offset = [], own
     for columns, _ in blocks:
@@ -86,7 +113,7 @@ def _explained(
         begun = columns[:, own:] @ solution[offset : offset + extra]
         found.append((columns[:, :own] @ solution[:own], begun))
         offset += extra
-    return found
+    return found, float(solution[0]) if line else 0.0
 
 
 def numerators(parts: Parts, shared: SharedDenominator, b: int) -> Array:
@@ -102,8 +129,12 @@ def numerators(parts: Parts, shared: SharedDenominator, b: int) -> Array:
 def from_rest(parts: Parts, shared: SharedDenominator, b: int) -> list[tuple[Array, Array]]:
     """Records with inputs counted from their first values, and outputs (n, 1) without level and start."""
     begun = _begun(parts)
-    found = _explained(begun, shared.F, shared.F.size - 1, b, shared.delays)
+    found, _ = _explained(begun, shared.F, shared.F.size - 1, b, shared.delays)
     return [(u, (y - start)[:, None]) for (u, y), (_, start) in zip(begun, found, strict=True)]
+
+
+def _line(samples: int) -> Array:
+    return np.asarray(np.arange(samples) - 0.5 * (samples - 1))
 
 
 def _begun(parts: Parts) -> list[tuple[Array, Array]]:

@@ -25,6 +25,7 @@ from inputdesign_cli.identification.explore.candidates import (
     Shape,
     about_as_good,
     noise_first,
+    with_noise,
 )
 from inputdesign_cli.identification.explore.fits import (
     Parts,
@@ -178,7 +179,7 @@ def explore_structure(
     for family in ({"OE"}, {"FOPDT", "SOPDT", "TOPDT"}):
         plain = [c for c in found if c.orders.family in family]
         if plain:
-            found += judged(max(plain, key=lambda c: c.validation).orders.with_coloured_noise())
+            found += judged(with_noise(plain))
     again = {c.orders: parts.refined(c) for c in _leading(found)}
     found = [again.get(c.orders) or c for c in found]
     usable = [c for c in again.values() if c is not None and np.isfinite(c.validation)]

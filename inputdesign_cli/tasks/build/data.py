@@ -87,6 +87,8 @@ class Data:
         means: (r,), of the inputs as they were recorded, before anything was taken away; None: not known.
         recorded: of the outputs; None: not known.
         repeated: what is said of files that have samples in common.
+        lined: whether lines were taken away from outputs: what of them the plant did not make is estimated
+            along, since a line through the output is not that of the drift alone.
     """
 
     u: Array
@@ -99,6 +101,7 @@ class Data:
     means: Array | None = None
     recorded: Recorded | None = None
     repeated: tuple[str, ...] = ()
+    lined: bool = False
 
 
 def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> Data:
@@ -137,6 +140,7 @@ def read_data(paths: Sequence[Path], units: Units, preparation: Preparation) -> 
         np.average([part.means for part in parts], axis=0, weights=[len(part.u) for part in parts]),
         Recorded.together(recorded),
         tuple(check_different(paths, [one.values for one in recorded])),
+        any(part.lined for part in parts),
     )
 
 
@@ -194,7 +198,7 @@ def prepared(
 
 
 def _detrended(part: Segment, signals: Signals, preparation: Preparation) -> tuple[Segment, list[str]]:
-    told = []
+    told, lined = [], False
     found = {}
     for letter, names, values in (("u", signals.inputs, part.u), ("y", signals.outputs, part.y)):
         columns = []
@@ -203,11 +207,12 @@ def _detrended(part: Segment, signals: Signals, preparation: Preparation) -> tup
             if preparation.detrend == "none":
                 columns.append(x - level)
                 continue
-            away, what = trend(x, preparation.detrend)
+            away, what, line = trend(x, preparation.detrend)
+            lined |= line and letter == "y"
             told.append(f"{what} was taken away from {name}")
             columns.append(x - away)
         found[letter] = np.column_stack(columns)
-    return Segment(part.time, found["u"], found["y"], part.held), told
+    return Segment(part.time, found["u"], found["y"], part.held, lined), told
 
 
 def _worst_step(time: Array, step: float) -> int:
@@ -239,6 +244,7 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
         tuple(f"{path.name}: {note}" if named else note for note in told),
         np.nanmean(signals.u[:, : units.inputs], axis=0),
         recorded_in(signals, units.sample_time, segments, units.inputs),
+        lined=any(part.lined for part in segments),
     )
 
 

@@ -39,6 +39,7 @@ class Log:
         step, time_unit: the sample time.
         steps: what was done to the record, and what was seen in it.
         recorded: of the outputs.
+        lined: whether lines were taken away from outputs.
     """
 
     u: Array
@@ -49,6 +50,7 @@ class Log:
     time_unit: str
     steps: tuple[str, ...]
     recorded: Recorded
+    lined: bool = False
 
     @property
     def parts(self) -> list[tuple[Array, Array]]:
@@ -101,6 +103,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         unit,
         (*told, *notes),
         recorded_in(signals, step, segments, signals.u.shape[1]),
+        any(part.lined for part in segments),
     )
 
 
@@ -213,4 +216,5 @@ def read_logs(paths: Sequence[Path], preparation: Preparation) -> Log:
             ),
         ),
         Recorded.together([log.recorded for log in logs]),
+        any(log.lined for log in logs),
     )

@@ -66,12 +66,14 @@ class Segment:
 
     Attributes:
         held: (n, p), whether an output is what it was a sample before, as it was recorded.
+        lined: whether a line was taken away from an output.
     """
 
     time: Array
     u: Array
     y: Array
     held: NDArray[np.bool_]
+    lined: bool = False
 
     @classmethod
     def recorded(cls, time: Array, u: Array, y: Array) -> Segment:
@@ -140,8 +142,8 @@ def resampled(part: Segment, step: float) -> Segment:
     return Segment.recorded(even, part.u[nearest], y)
 
 
-def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
-    """What is taken away from a signal x (n,), and what that is in words.
+def trend(x: Array, kind: Detrend) -> tuple[Array, str, bool]:
+    """What is taken away from a signal x (n,), what that is in words, and whether it is a line.
 
     `auto` takes a line where it leaves less than half the power that the mean leaves, else the mean.
     """
@@ -149,8 +151,8 @@ def trend(x: Array, kind: Detrend) -> tuple[Array, str]:
     if kind in ("linear", "auto"):
         line = np.polynomial.Polynomial.fit(np.arange(len(x)), x, 1)(np.arange(len(x)))
         if kind == "linear" or np.sum((x - line) ** 2) < 0.5 * np.sum((x - level) ** 2):
-            return line, f"a line from {line[0]:.6g} to {line[-1]:.6g}"
-    return level, f"the mean {level[0]:.6g}"
+            return line, f"a line from {line[0]:.6g} to {line[-1]:.6g}", True
+    return level, f"the mean {level[0]:.6g}", False
 
 
 def limits_of_sensor(name: str, x: Array) -> list[str]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Candidate, Fits, Found
+from inputdesign_cli.identification.explore import Candidate, Fits, Found, levelled
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.runs.curves import Curves, FitCurves, FitPanel, OrderCurves
 from inputdesign_cli.runs.results import Json, Table
@@ -29,6 +30,22 @@ def validation_entry(found: Fits) -> dict[str, Json]:
 def _finite(values: Sequence[float]) -> Json:
     listed = [value if np.isfinite(value) else None for value in values]
     return listed[0] if len(listed) == 1 else listed
+
+
+def without_drift(log: Log, found: Found) -> Log:
+    """The log without the lines that were found to be no work of the inputs, which its steps tell."""
+    if found.slopes is None:
+        return log
+    single = len(found.slopes) == 1
+    told = [
+        f"{'y' if single else f'y{i + 1}'} drifts, whatever the inputs do: a line that rises by "
+        f"{slope / log.step:.4g} per {log.time_unit}, found beside the plant, was taken away (what is "
+        "left of it was estimated along)"
+        for i, slope in enumerate(found.slopes)
+        if slope
+    ]
+    outputs = [y for _, y in levelled(log.parts, found.slopes)]
+    return replace(log, y=np.concatenate(outputs), steps=(*log.steps, *told))
 
 
 def exploration_entry(

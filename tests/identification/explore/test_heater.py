@@ -1,0 +1,58 @@
+"""A heater with noise that has a memory, and with a drift: its own lags come back, and no others."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from inputdesign_cli.identification.explore import explore_records
+from inputdesign_cli.identification.explore.drifting import slopes_of
+
+GAIN, LAG, SECOND, LATE, STEP, FINER = 2.35, 205.0, 8.0, 28.0, 5.0, 20
+
+
+def heater(seed, samples=1440):
+    """Two lags and a dead time, simulated on a finer grid; noise with a memory, and white."""
+    rng = np.random.default_rng(seed)
+    u = 5.0 * np.repeat(rng.choice([-1.0, 1.0], samples // 24), 24)
+    fine = np.concatenate([np.zeros(int(LATE / STEP * FINER)), np.repeat(u, FINER)])[: samples * FINER]
+    for lag in (LAG, SECOND):
+        pole = np.exp(-STEP / FINER / lag)
+        fine = lfilter([0.0, 1.0 - pole], [1.0, -pole], fine)
+    noise = lfilter([1.0], [1.0, -0.9], 0.05 * rng.standard_normal(samples))
+    y = GAIN * fine[::FINER] + noise + 0.03 * rng.standard_normal(samples)
+    return u[:, None], y[:, None]
+
+
+def is_the_heater(found):
+    assert not found.estimate.failed
+    names = dict(zip(found.estimate.names, found.estimate.theta, strict=True))
+    spread = dict(zip(found.estimate.names, np.sqrt(np.diag(found.estimate.covariance)), strict=True))
+    assert abs(names["K"] - GAIN) < 4.0 * spread["K"]
+    assert abs(names["L"] - LATE) < 4.0 * spread["L"]
+    lags = np.array([2.0 * names["zeta"] * names["T"], names["T"] ** 2])
+    np.testing.assert_allclose(lags, [LAG + SECOND, LAG * SECOND], rtol=0.1)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_correlated_noise_is_not_taken_for_white(seed):
+    found = explore_records([heater(seed)], step=STEP)
+    is_the_heater(found)
+    assert found.slopes is None
+
+
+@pytest.mark.parametrize("a_degree_an_hour", [1.0, -0.3])
+def test_a_drift_is_no_slow_pole(a_degree_an_hour):
+    u, y = heater(1)
+    drift = a_degree_an_hour * STEP / 3600.0
+    found = explore_records([(u, y + drift * np.arange(len(y))[:, None])], step=STEP)
+    is_the_heater(found)
+    assert found.slopes == pytest.approx([drift], abs=0.05 / 720.0)
+
+
+@pytest.mark.parametrize("seed", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_the_slope_of_a_line_does_not_depend_on_another(seed):
+    """By least squares: a line that is added to the data is added to what is found."""
+    u, y = heater(seed)
+    line = 0.002 * np.arange(len(y))[:, None]
+    with_line, without = slopes_of([(u, y + line)]), slopes_of([(u, y)])
+    assert with_line - without == pytest.approx([0.002], abs=1e-6)
