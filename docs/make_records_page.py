@@ -88,9 +88,9 @@ Berry published ([specs/wood_berry.yaml](../specs/wood_berry.yaml)):
 
 {column_table}
 
-The noise drifts, and both outputs have the same. Filtered noise makes up for the drift; that one noise drives both
-outputs no structure here says, so a test of whiteness still fails. Gains and time constants are within {column_worst} of
-what was published, and all twelve within 1.1 deviations.
+The noise drifts, and both outputs have the same. Filtered noise makes up for the drift; that one noise drives
+both outputs no structure here says, so a test of whiteness still fails. Gains and time constants are within
+{column_worst} of what was published, and all twelve within 1.1 deviations.
 """
 
 

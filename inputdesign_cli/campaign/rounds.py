@@ -243,11 +243,13 @@ def _decided(
             more["last"] = values
     if plan is not None and decision.part is not None:
         files[f"plan_{number:02d}.csv"] = csv_text(decision.part).encode()
+        moved = np.stack(list(decision.part.columns.values())[1:], axis=1) - decision.offsets
         entry["plan"] = {
             "file": f"plan_{number:02d}.csv",
             "samples": plan.take,
             "planned_samples": len(plan.record),
             "power": plan.power,
+            "part_power": float(np.sum(np.mean(moved**2, axis=0))),
             "cost": plan.cost,
             "kind": plan.kind,
             "capped": plan.capped,

@@ -183,8 +183,13 @@ def campaign_facts(result: Result) -> Iterator[tuple[str, str]]:
     plan = now.get("plan")
     if plan is not None:
         whole = plan["planned_samples"]
-        of = f", the first of {whole} that are planned" if whole > plan["samples"] else ""
-        yield "next", f"apply {plan['samples']} samples of power {plan['power']:.4g} (signal.csv{of})"
+        of = (
+            f", the first of {whole} that are planned with {plan['power']:.4g}"
+            if whole > plan["samples"]
+            else ""
+        )
+        power = plan.get("part_power", plan["power"])
+        yield "next", f"apply {plan['samples']} samples of power {power:.4g} (signal.csv{of})"
 
 
 def campaign_answer(result: Result) -> str:

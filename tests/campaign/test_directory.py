@@ -50,6 +50,16 @@ def test_a_campaign_goes_on_until_the_data_meet_what_is_asked(run, begun, tmp_pa
     assert "the data meet what is asked" in out
 
 
+def test_the_power_that_is_told_is_that_of_the_signal(run, begun):
+    """Not that of the whole plan, of which the part is the beginning."""
+    part = np.loadtxt(begun / "signal.csv", delimiter=",", skiprows=1)
+    code, out, _ = run("status", "c")
+    assert code == 0
+    assert f"apply {len(part)} samples of power {np.mean(part[:, 1] ** 2):.4g} (signal.csv" in out
+    plan = read_run(begun)["campaign"]["rounds"][-1]["plan"]
+    assert f"planned with {plan['power']:.4g}" in out
+
+
 def test_a_withdrawn_record_does_not_count_and_stays(run, begun, tmp_path):
     for number in (1, 2):
         run("next", "c", applied(begun, tmp_path / f"r{number}.csv"), "--no-figures")
