@@ -38,7 +38,7 @@ def accepted(memory: Memory, given: Path, part: Part, *, unlike: bool) -> tuple[
     entry: dict[str, Json] = {"samples": part.samples, "plan": plan["file"], "withdrawn": False}
     if part.excitation is None:
         told = f"{given.name} has no column r: whether {plan['file']} was applied cannot be told"
-        energy = part.samples * float(plan.get("part_power", plan["power"]))
+        energy = part.samples * (plan["part_power"] if "part_power" in plan else plan["power"])
         return entry | {"energy": energy}, [told, *_shorter(given, plan, part.samples)]
     applied = part.excitation - np.array(plan["offset"], dtype=float)
     match = _matched(memory, plan, part, part.excitation)
