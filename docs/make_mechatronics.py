@@ -59,7 +59,7 @@ this is what the margin became:
 {deduced}
 
 The controller is tuned anew at each of thirty motors within 20 %, as it will be after the experiment, and at
-each the margin must hold for every motor that the data leave over.
+each the margin must hold for every motor within r_u.
 
 ## 2. The signal
 

@@ -10,6 +10,7 @@ from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.runs.results import Result
 from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.specification import Spec
+from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.wizard.composing import LEAST
 from inputdesign_cli.wizard.phrases import short
 from inputdesign_cli.wizard.spectra import Solve
@@ -65,10 +66,11 @@ def verdict(spec: Spec, result: Result, solve: Solve, there: float | None = None
     kept = spec.accuracy.loop
     if kept is not None and loop and (ratio <= 1.0):
         peak = 20.0 * np.log10(kept.peak)
+        sure = 100.0 * (kept.confidence or DEFAULT_CONFIDENCE)
         said.append(
-            f"The peak of |S| of the loop stays below {peak:.3g} dB for every plant that the data do not "
-            f"rule out (95 % confidence): a gain margin of {loop['gain_margin']:.3g} and a phase margin of "
-            f"{loop['phase_margin']:.3g} degrees are kept."
+            f"The peak of |S| of the loop stays below {peak:.3g} dB for every plant within the error of the "
+            f"model (r_u, to first order, {sure:.3g} % confidence): a gain margin of "
+            f"{loop['gain_margin']:.3g} and a phase margin of {loop['phase_margin']:.3g} degrees are kept."
         )
     return Verdict(ratio, (*said, *_elsewhere(result, ratio), *_open_dead_times(result)))
 
