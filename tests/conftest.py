@@ -1,5 +1,6 @@
 """Experiments that several tests share; what they import is in `tests/support`."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -13,6 +14,15 @@ from inputdesign_cli import load_spec
 from inputdesign_cli.tasks.build.system import build_experiment
 
 SPECS = Path(__file__).parent.parent / "specs"
+# New objects before the collector of cycles looks at them: by itself it does so every 700.
+_NEW_OBJECTS = 50_000
+
+
+def pytest_collection_finish():
+    """What was imported and collected stays, so that the collector need not look through it again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(_NEW_OBJECTS, 10, 10)
 
 
 @pytest.fixture

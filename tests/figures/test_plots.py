@@ -3,6 +3,7 @@
 import struct
 import sys
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 
 import matplotlib as mpl
@@ -18,9 +19,22 @@ from inputdesign_cli.runs.results import Results
 from tests.support.curves import CURVES, FIT, G, T, W, bound
 
 
+@cache
+def drawn(name, narrow=False):
+    """The picture of curves, the box of its page, and its texts with theirs; drawn once for all tests."""
+    found = []
+
+    def seen(page):
+        renderer = page.canvas.get_renderer()
+        texts = [(t.get_text(), t.get_window_extent(renderer)) for t in headings(page)]
+        found.append((page.bbox.padded(1.0), texts))
+
+    return draw(CURVES[name], narrow=narrow, seen=seen), *found[0]
+
+
 @pytest.mark.parametrize("name", CURVES)
 def test_a_png_of_the_promised_size(name):
-    data = draw(CURVES[name])
+    data, _, _ = drawn(name)
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     width, height = struct.unpack(">II", data[16:24])
     assert width == 1050
@@ -73,21 +87,14 @@ def test_text_has_one_size_is_no_formula_and_no_legend_hides_a_curve(name, page)
 @pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("name", CURVES)
 def test_no_text_leaves_the_page_or_lies_on_another(name, narrow):
-    found = {}
-
-    def seen(page):
-        renderer = page.canvas.get_renderer()
-        found["page"] = page.bbox.padded(1.0)
-        found["texts"] = [(t.get_text(), t.get_window_extent(renderer)) for t in headings(page)]
-
-    draw(CURVES[name], narrow=narrow, seen=seen)
-    (left, bottom), (right, top) = found["page"].min, found["page"].max
-    for text, box in found["texts"]:
+    _, page, texts = drawn(name, narrow)
+    (left, bottom), (right, top) = page.min, page.max
+    for text, box in texts:
         assert left <= box.x0, text
         assert box.x1 <= right, text
         assert bottom <= box.y0, text
         assert box.y1 <= top, text
-    for (text, box), (other, its) in combinations(found["texts"], 2):
+    for (text, box), (other, its) in combinations(texts, 2):
         assert overlap(box, its) <= 2.0, (text, other)
 
 

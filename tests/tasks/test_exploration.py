@@ -42,7 +42,7 @@ def run(tmp_path_factory):
     return folder / "run"
 
 
-def test_the_plant_of_a_log_is_found(run):
+def test_the_plant_of_a_log_is_found_and_trusted(run):
     result = json.loads((run / "result.json").read_text())
     told = result["exploration"]
     assert told["reasons"] == []
@@ -130,11 +130,6 @@ def test_an_integrator_earns_no_trust_and_is_offered(tmp_path):
     result = identify(parse_spec(f"{spec[1]}\n{spec[2]}\n", design=False), log).result
     assert result["identification"]["theta"]["K"] == pytest.approx(0.02, rel=0.02)
     assert not any("is asked" in note for note in result["notes"]), "this spec asks for nothing"
-
-
-def test_a_time_constant_that_the_record_tells_is_trusted(tmp_path):
-    found = explore(record(tmp_path / "log.csv", samples=300))
-    assert not found.reasons
 
 
 def test_an_input_that_stands_still_takes_no_excitation_from_the_others(tmp_path):

@@ -137,7 +137,10 @@ def looped(rng, samples, pattern, noise):
     return u[:, None], y[:, None]
 
 
-@pytest.mark.parametrize(("pattern", "noise"), [("prbs", "arx"), ("prbs", "oe"), ("steps", "oe")])
+@pytest.mark.parametrize(
+    ("pattern", "noise"),
+    [("prbs", "arx"), ("steps", "oe"), pytest.param("prbs", "oe", marks=pytest.mark.slow)],
+)
 def test_a_controller_that_answers_at_once_is_not_taken_for_the_plant(pattern, noise):
     found = explore_records([looped(np.random.default_rng(1), 1000, pattern, noise)], feedback=True)
     (taken,) = found.taken
@@ -161,8 +164,10 @@ def test_a_plant_that_acts_at_once_in_a_loop_that_answers_late():
     assert found.taken[0].orders.delays == (0,)
 
 
-@pytest.mark.parametrize("delay", [0, 2])
-@pytest.mark.parametrize("hold", [1, 8])
+@pytest.mark.parametrize(
+    ("hold", "delay"),
+    [(1, 0), (8, 2), *(pytest.param(*pair, marks=pytest.mark.slow) for pair in ((1, 2), (8, 0)))],
+)
 def test_a_static_gain_has_no_pole(delay, hold):
     rng = np.random.default_rng(1)
     u = held(rng, 1000, hold)
