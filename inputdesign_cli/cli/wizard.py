@@ -59,6 +59,9 @@ def wizard(
     if output.exists() and not overwrite:
         hint = "choose another name with -o, or overwrite it with --overwrite"
         raise OutputError.because("output-exists", f"{output} exists already", hint)
+    if answers is not None and output.exists() and output.samefile(answers):
+        hint = "choose another name for the spec with -o"
+        raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
     known = read_answers(answers, given or [])
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     there = {*known, *told_by_plant(known)}

@@ -60,6 +60,7 @@ def make_signal(asked: ReadyMade) -> Results:
         SpecError: `too-few-lines`, `bad-period`, `not-supported`, `beyond-nyquist`.
     """
     u, period = _made(asked)
+    _check_apart(u, asked)
     record = scaled(u, asked.levels)
     time = asked.sample_time * np.arange(len(u), dtype=float)
     channels = {f"u{i + 1}": column for i, column in enumerate(record.T)}
@@ -118,6 +119,23 @@ def _made(asked: ReadyMade) -> tuple[Array, int]:
             hint=f"write at most --steps {samples}, or more --samples",
         )
     return steps(asked.number or 2, samples, r, rng), samples
+
+
+def _check_apart(u: Array, asked: ReadyMade) -> None:
+    """Raise `SpecError` (`bad-period`) where some input (N, r) is a combination of the others."""
+    if asked.inputs == 1:
+        return
+    moved = u - u.mean(axis=0)
+    rank = int(np.linalg.matrix_rank(moved.T @ moved, hermitian=True))
+    if rank == asked.inputs:
+        return
+    longer = f"--prbs {(asked.inputs + 1).bit_length()} or more" if asked.kind == "prbs" else "more levels"
+    raise bad_spec(
+        "bad-period",
+        f"of {asked.inputs} inputs over {len(u)} samples, {asked.inputs - rank} follow from the others, "
+        "so that what they do could not be told apart",
+        hint=f"write {longer}, and --samples enough for them",
+    )
 
 
 def _check_size(samples: int, inputs: int, *, whole_period: bool = False) -> None:

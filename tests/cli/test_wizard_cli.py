@@ -141,3 +141,13 @@ def test_a_trade_is_a_sweep_with_a_table(run, tmp_path):
     assert (tmp_path / "runs" / "small-trade" / "trade.png").stat().st_size > 5000
     code, _, err = run("solve", "small.yaml", "--trade", "colour")
     assert (code, "neither samples nor amplitude" in err) == (2, True)
+
+
+def test_answers_are_not_lost_to_the_spec(run, tmp_path):
+    answers = tmp_path / "a.yaml"
+    text = "".join(f"{key}: {told}\n" for key, told in (one.split("=", 1) for one in ANSWERS))
+    answers.write_text(text)
+    code, _, err = run("wizard", "--answers", answers, "-o", answers, "--overwrite", "--no-solve")
+    assert code == 2
+    assert "holds the answers" in err
+    assert answers.read_text() == text

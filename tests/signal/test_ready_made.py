@@ -102,3 +102,18 @@ def test_levels_are_written_without_rounding():
     assert sorted(levels.tolist()) == [float(x) for x in range(40, 61, 2)]
     tiny = scaled(np.array([[-1.0], [0.0], [1.0]]), [(0.0, 1e-20)])[:, 0]
     assert tiny == pytest.approx([0.0, 5e-21, 1e-20], rel=1e-12)
+
+
+@pytest.mark.parametrize("bits", [2, 3, 4])
+def test_inputs_of_a_period_are_independent_or_refused(bits):
+    """A period of 2^bits - 1 samples about its mean has 2^bits - 2 directions."""
+    for inputs in range(2, 2**bits + 2):
+        asked = ReadyMade("prbs", bits=bits, levels=((-1.0, 1.0),) * inputs)
+        if inputs > 2**bits - 2:
+            with pytest.raises(SpecError, match="told apart"):
+                make_signal(asked)
+            continue
+        columns = make_signal(asked).tables["signal"].columns
+        u = np.stack([values for name, values in columns.items() if name.startswith("u")], axis=1)
+        singular = np.linalg.svd(u - u.mean(axis=0), compute_uv=False)
+        assert singular[-1] > 0.1
