@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _ENDINGS = ("csv", "mat", "npz", "h", "png")
 _ROUNDING = 1e-12
+# Beyond these sizes squares and their sums leave double precision.
+_SMALLEST, _LARGEST = 1e-15, 1e15
 _TIME_UNITS = ("s", "ms", "us", "min", "h", "d")
 
 
@@ -85,8 +87,15 @@ def signal(
         raise typer.BadParameter(f"give one of --prbs, --multisine, --chirp and --steps, not {said}")
     (kind,) = chosen
     files = _files(output or [], overwrite)
-    if not 0.0 < sample_time < math.inf:
-        raise typer.BadParameter("it is a positive number", param_hint="--sample-time")
+    others = {"--band": (bool(band), "multisine"), "--odd": (odd, "multisine")}
+    others |= {"--periods": (periods > 1, "multisine"), "--hold": (hold > 1, "prbs")}
+    for option, (stated, owner) in others.items():
+        if stated and kind != owner:
+            message = f"it is of --{owner}, and does nothing to --{kind}: leave it out"
+            raise typer.BadParameter(message, param_hint=option)
+    if not _SMALLEST <= sample_time <= _LARGEST:
+        message = f"it is a positive number, from {_SMALLEST:g} to {_LARGEST:g}"
+        raise typer.BadParameter(message, param_hint="--sample-time")
     if time_unit not in _TIME_UNITS:
         raise typer.BadParameter(f"it is one of {', '.join(_TIME_UNITS)}", param_hint="--time-unit")
     from inputdesign_cli.tasks.ready_made import ReadyMade, make_signal
@@ -152,6 +161,9 @@ def _pair(text: str, option: str) -> tuple[float, float]:
     negative = option != "--range" and found[0] < 0.0
     if not colon or not found[0] < found[1] or negative or math.isinf(found[0]) or math.isinf(found[1]):
         raise typer.BadParameter(f"{text!r} is not of the form LOW:HIGH, as in 0.1:2", param_hint=option)
+    if max(map(abs, found)) > _LARGEST or found[1] - found[0] < _SMALLEST:
+        message = f"{text!r} is beyond {_LARGEST:g}, or narrower than {_SMALLEST:g}: take another unit"
+        raise typer.BadParameter(message, param_hint=option)
     return found
 
 
