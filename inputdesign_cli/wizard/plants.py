@@ -14,7 +14,7 @@ from inputdesign_cli.errors import DataError, IdesignError, SpecError
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.phrases import LARGEST, after, needed, seconds_after, share, short
+from inputdesign_cli.wizard.phrases import LARGEST, NUMBER, after, needed, seconds_after, share, short
 from inputdesign_cli.wizard.questions import bad_answer
 
 _STEPS = (1.0, 2.0, 5.0, 10.0)
@@ -154,6 +154,11 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
 
 
 def _of_numbers(text: str) -> PlantAnswer:
+    for words in ("gain", "time constant", "dead time|delay"):
+        said = re.findall(rf"\b(?:{words})\b[^,;]*?{NUMBER}", text, re.I)
+        if len(said) > 1:
+            what = words.split("|")[0]
+            raise bad_answer("plant", f"it says the {what} more than once: {' and '.join(said)}")
     gain = after(text, "gain")
     if not gain:
         raise bad_answer("plant", "it does not say the gain, or says that it is zero")

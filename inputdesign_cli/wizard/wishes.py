@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+from inputdesign_cli.specification.models.loop import MOST_DECIBELS
 from inputdesign_cli.wizard.phrases import NUMBER, after, needed, number, seconds_after, share, short
 from inputdesign_cli.wizard.plants import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
@@ -103,6 +104,10 @@ def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
 def _margin(text: str) -> str:
     peak = number(rf"{_ALONE}{NUMBER}\s*dB", text)
     if peak is not None:
+        if peak > MOST_DECIBELS:
+            raise bad_answer(
+                "wish", f"{peak:g} dB are no margin: 6 dB are usual, and {MOST_DECIBELS:g} the most"
+            )
         return f"max_sensitivity_db: {short(needed(peak, 'wish', 'the margin in dB'))}"
     degrees = number(rf"{_ALONE}{NUMBER}\s*(?:degrees|deg|°)", text)
     if degrees is not None:

@@ -231,3 +231,23 @@ def test_a_margin_that_is_kept_is_said():
     peak = 10.0 ** (6.0 / 20.0)
     assert f"a gain margin of {peak / (peak - 1.0):.3g}" in said
     assert f"a phase margin of {np.degrees(2.0 * np.arcsin(0.5 / peak)):.3g} degrees" in said
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ({"plant": "gain 2 gain 3, time constant 180 s, dead time 25 s"}, "more than once: 2 and 3"),
+        ({"plant": "gain 2, time constant 180 s, time constant 90 s"}, "more than once: 180 and 90"),
+        ({"wish": "PI loop with 1e9 dB"}, "100 the most"),
+    ],
+)
+def test_answers_that_contradict_themselves_or_say_nothing_are_refused(answers, said):
+    known = {
+        "plant": "gain 2, time constant 180 s, dead time 25 s",
+        "wish": "PI loop with 6 dB",
+        "range": "plus/minus 5 around 40",
+        "time": "20 min",
+        "noise": "resolution 0.1",
+    }
+    with pytest.raises(SpecError, match=said):
+        compose(known | answers, "x", Path())

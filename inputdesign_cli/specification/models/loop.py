@@ -16,6 +16,8 @@ from inputdesign_cli.specification.models.section import Section
 
 # A peak of |S| is above one; a phase margin of 60 degrees takes a peak of one.
 _MOST_DEGREES = 60.0
+MOST_DECIBELS = 100.0
+"""A peak of |S| of a hundred thousand: the loop may be as near to instability as that."""
 
 
 class Simc(Section):
@@ -70,6 +72,11 @@ class LoopMargin(Section):
         """One margin, which a loop can have, and one controller."""
         yield from self.exactly_one("max_sensitivity_db", "phase_margin", "gain_margin")
         yield from self.at_most_one("controller", "tuning")
+        if self.max_sensitivity_db is not None and self.max_sensitivity_db > MOST_DECIBELS:
+            message = (
+                f"{{key}} is {self.max_sensitivity_db:g} dB, and beyond {MOST_DECIBELS:g} no margin is left"
+            )
+            yield PathDiagnostic("out-of-range", message, "write 6, say", ("max_sensitivity_db",))
         if self.phase_margin is not None and self.phase_margin >= _MOST_DEGREES:
             message = f"{{key}} is {self.phase_margin:g} degrees, and a peak of |S| keeps less than 60"
             yield PathDiagnostic("out-of-range", message, "write 45, say", ("phase_margin",))
