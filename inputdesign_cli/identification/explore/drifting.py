@@ -6,7 +6,8 @@ its own.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,8 +19,29 @@ from inputdesign_cli.identification.explore.regression import best_delays, outpu
 from inputdesign_cli.plant.polynomial import Array
 
 _ORDERS, _ROUNDS, _MOST_DELAY = (1, 2, 3, 4, 5), 3, 150
+# Of longer records means over stretches tell a slope as well: a line is slow.
+_MOST_SAMPLES = 4000
+# A record so long is dear to explain without a line that rises by so many times what is left beside it.
+_LONG, _PLAIN = 20_000, 4.0
 # A mode that decays by fewer nepers than that over the longest record is like a line.
 _DECAYS = 3.0
+
+
+@dataclass(frozen=True)
+class Lines:
+    """What outputs rise by whatever inputs do.
+
+    Attributes:
+        slopes: (p,), from sample to sample; zero where none can be told.
+        scatter: (p,), root mean square of what output-error models with these lines leave.
+    """
+
+    slopes: Array
+    scatter: Array
+
+    def beyond(self, least: Array, longest: int) -> Lines:
+        """Those lines that rise by more than `least` (p,) within so many samples; the others are level."""
+        return replace(self, slopes=np.where(np.abs(self.slopes) * longest > least, self.slopes, 0.0))
 
 
 def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, ramp: bool = False) -> Found:
@@ -35,21 +57,36 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
         SpecError: `too-few-samples`, `constant-input`, `constant-output` or `no-structure`.
     """
     _, moved = moving_in(parts)
-    level = None if ramp else explored(parts, feedback=feedback, step=step, ramp=False)
-    if level is not None and not (_drifts(level.estimate) or _hardly_decays(level)):
+    longest, samples = max(len(y) for _, y in moved), sum(len(y) for _, y in moved)
+    if ramp:
+        found = lines_of(moved)
+        return _even(parts, found.beyond(found.scatter, longest), feedback=feedback, step=step)
+    if samples > _LONG:
+        found = lines_of(moved)
+        plain = found.beyond(_PLAIN * found.scatter, longest)
+        if np.any(plain.slopes):
+            with suppress(SpecError):
+                even = _even(parts, plain, feedback=feedback, step=step)
+                if not _drifts(even.estimate):
+                    return even
+    level = explored(parts, feedback=feedback, step=step, ramp=False)
+    if not (_drifts(level.estimate) or _hardly_decays(level)):
         return level
-    slopes = slopes_of(moved)
-    if level is not None and not _stand_out(slopes, level):
+    lines = lines_of(moved).beyond(np.sqrt(np.diag(level.estimate.noise)), longest)
+    if not np.any(lines.slopes):
         return level
     try:
-        even = explored(levelled(parts, slopes), feedback=feedback, step=step, ramp=True)
+        even = _even(parts, lines, feedback=feedback, step=step)
     except SpecError:
-        if level is None:
-            raise
         return level
-    if level is None or (not _drifts(even.estimate) and _criterion(even, lines=1) < _criterion(level)):
-        return replace(even, slopes=slopes)
-    return level
+    fewer = _criterion(even, lines=1) < _criterion(level)
+    return even if fewer and not _drifts(even.estimate) else level
+
+
+def _even(parts: Parts, lines: Lines, *, feedback: bool, step: float) -> Found:
+    """What records without these lines tell; what is left of lines is estimated along."""
+    found = explored(levelled(parts, lines.slopes), feedback=feedback, step=step, ramp=True)
+    return replace(found, slopes=lines.slopes)
 
 
 def _drifts(estimate: Estimate) -> bool:
@@ -62,12 +99,6 @@ def _hardly_decays(found: Found) -> bool:
     return output_error_form(found.model).radius > 1.0 - _DECAYS / longest
 
 
-def _stand_out(slopes: Array, found: Found) -> bool:
-    """Whether some line rises by more than the noise scatters, over the longest record."""
-    longest = max(len(y) for _, y in found.used)
-    return bool(np.any(np.abs(slopes) * longest > np.sqrt(np.diag(found.estimate.noise))))
-
-
 def _criterion(found: Found, *, lines: int = 0) -> float:
     """BIC of the estimate from the whole record, with so many lines of each output."""
     samples, outputs = found.estimate.errors.shape
@@ -75,17 +106,22 @@ def _criterion(found: Found, *, lines: int = 0) -> float:
     return float(samples * np.linalg.slogdet(found.estimate.noise)[1] + unknowns * np.log(samples))
 
 
-def slopes_of(parts: Parts) -> Array:
-    """(p,): what every output rises by from sample to sample whatever inputs do; zero if none can be told.
+def lines_of(parts: Parts) -> Lines:
+    """The line that every output drifts along, whatever inputs do.
 
     By output-error models of several orders with a line; where it is gone, delays are looked for again.
 
     Args:
         parts: records u (n, r), y (n, p).
     """
+    stretch = -(-sum(len(y) for _, y in parts) // _MOST_SAMPLES)
+    if stretch > 1:
+        short = [_means(*part, stretch) for part in parts if len(part[1]) >= stretch]
+        found = lines_of(short)
+        return replace(found, slopes=found.slopes / stretch)
     longest = max(len(y) for _, y in parts)
     most = max(min(_MOST_DELAY, longest // 6), 1)
-    slopes = np.zeros(parts[0][1].shape[1])
+    slopes, scatter = np.zeros((2, parts[0][1].shape[1]))
     for i in range(slopes.size):
         own = [(u, y[:, i : i + 1]) for u, y in parts]
         # A line that goes beyond what the output does is that of a plant which integrates.
@@ -93,11 +129,19 @@ def slopes_of(parts: Parts) -> Array:
         for _ in range(_ROUNDS):
             even = levelled(own, slopes[i : i + 1])
             delays = best_delays(even, 1, 2, most, (1,) * even[0][0].shape[1]).delays
-            rises = [output_error(even, n, max(n, 2), delays, line=True).slope for n in _ORDERS]
+            tried = [output_error(even, n, max(n, 2), delays, line=True) for n in _ORDERS]
             # A pole next to one takes the place of the line at some order, seldom at most of them.
-            found = slopes[i] + float(np.median(rises))
+            found = slopes[i] + float(np.median([model.slope for model in tried]))
             slopes[i] = found if np.isfinite(found) and abs(found) * longest < reach else 0.0
-    return slopes
+            scatter[i] = np.sqrt(np.median([model.loss for model in tried]))
+    return Lines(slopes, scatter)
+
+
+def _means(u: Array, y: Array, stretch: int) -> tuple[Array, Array]:
+    """Over stretches of so many samples, the last samples left out that do not make one."""
+    whole = len(y) // stretch * stretch
+    means = (x[:whole].reshape(-1, stretch, x.shape[1]).mean(axis=1) for x in (u, y))
+    return next(means), next(means)
 
 
 def levelled(parts: Parts, slopes: Array) -> list[tuple[Array, Array]]:

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from inputdesign_cli.identification.explore import explore_records
-from inputdesign_cli.identification.explore.drifting import slopes_of
+from inputdesign_cli.identification.explore.drifting import lines_of
 
 GAIN, LAG, SECOND, LATE, STEP, FINER = 2.35, 205.0, 8.0, 28.0, 5.0, 20
 
@@ -54,5 +54,37 @@ def test_the_slope_of_a_line_does_not_depend_on_another(seed):
     """By least squares: a line that is added to the data is added to what is found."""
     u, y = heater(seed)
     line = 0.002 * np.arange(len(y))[:, None]
-    with_line, without = slopes_of([(u, y + line)]), slopes_of([(u, y)])
-    assert with_line - without == pytest.approx([0.002], abs=1e-6)
+    with_line, without = lines_of([(u, y + line)]), lines_of([(u, y)])
+    assert with_line.slopes - without.slopes == pytest.approx([0.002], abs=1e-6)
+
+
+def test_only_outputs_that_drift_lose_a_line():
+    one, two = heater(3), heater(4)
+    y = np.column_stack([one[1], two[1]])
+    y[:, 1] += 0.002 * np.arange(len(y))
+    records = [(np.column_stack([one[0], two[0]]), y)]
+    lines = lines_of(records).beyond(np.array([0.2, 0.2]), len(y))
+    assert lines.slopes == pytest.approx([0.0, 0.002], abs=2e-4)
+    assert lines.slopes[0] == 0.0
+
+
+def test_the_line_of_a_long_record_is_told_by_its_means():
+    """Means over stretches keep a line; the plant is sampled so fast that they tell it as well."""
+    u, y = heater(5, 12_000)
+    line = 5e-4 * np.arange(len(y))[:, None]
+    with_line, without = lines_of([(u, y + line)]), lines_of([(u, y)])
+    assert with_line.slopes - without.slopes == pytest.approx([5e-4], rel=1e-3)
+    assert np.abs(without.slopes) * len(y) < without.scatter
+
+
+@pytest.mark.slow
+def test_a_long_record_that_drifts_is_explained_as_one_that_does_not():
+    u, y = heater(1, 40_008)
+    drift = 6.0 / len(y)
+    level = explore_records([(u, y)], step=STEP)
+    even = explore_records([(u, y + drift * np.arange(len(y))[:, None])], step=STEP)
+    assert level.slopes is None
+    assert even.slopes == pytest.approx([drift], rel=0.02)
+    assert even.estimate.theta == pytest.approx(
+        level.estimate.theta, abs=2.0 * np.sqrt(np.diag(level.estimate.covariance))
+    )
