@@ -123,6 +123,47 @@ def test_a_signal_that_comes_while_something_is_finalised_is_not_lost(number, co
     assert (done.returncode, "Traceback" in done.stderr) == (code, False)
 
 
+DROPPED = """
+import signal, sys, time
+import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli
+from inputdesign_cli.cli.terminal import guarded
+
+_, number, name, where = sys.argv
+sys.argv = sys.argv[:1]
+
+def work():
+    try:
+        __import__(name)
+        import wave
+        time.sleep(20)
+    finally:
+        import colorsys
+        print("tidied up")
+
+def run():
+    cli.streams.prepare_signals()
+    cli.typer.run(guarded(work)) if where == "guarded" else work()
+
+cli.main = run
+command.main()
+"""
+
+
+@pytest.mark.parametrize("where", ["guarded", "outside"])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_that_an_import_drops_is_not_lost(tmp_path, number, code, where):
+    dropping = (
+        f"import signal\ntry:\n    signal.raise_signal({int(number)})\nexcept BaseException:\n    pass\n"
+    )
+    (tmp_path / "dropping.py").write_text(dropping)
+    command = [sys.executable, "-c", DROPPED, str(int(number)), "dropping", where]
+    paths = os.pathsep.join([str(tmp_path), str(ROOT)])
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, env={**os.environ, "PYTHONPATH": paths}
+    )
+    assert (done.returncode, "Traceback" in done.stderr, done.stdout) == (code, False, "tidied up\n")
+
+
 WRAPPED = """
 import signal, sys
 import inputdesign_cli.__main__ as command, inputdesign_cli.cli as cli

@@ -20,7 +20,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 _ORDERS, _ROUNDS, _MOST_DELAY = (1, 2, 3, 4, 5), 3, 150
 # Of longer records means over stretches tell a slope as well: a line is slow.
-_MOST_SAMPLES = 4000
+# Records with fewer such means tell none beside their own start.
+_MOST_SAMPLES, _FEWEST = 4000, 10
 # A record so long is dear to explain without a line that rises by so many times what is left beside it.
 _LONG, _PLAIN = 20_000, 4.0
 # A mode that decays by fewer nepers than that over the longest record is like a line.
@@ -58,15 +59,14 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
     """
     _, moved = moving_in(parts)
     longest, samples = max(len(y) for _, y in moved), sum(len(y) for _, y in moved)
-    if ramp:
-        found = lines_of(moved)
-        return _even(parts, found.beyond(found.scatter, longest), feedback=feedback, step=step)
-    if samples > _LONG:
-        found = lines_of(moved)
-        plain = found.beyond(_PLAIN * found.scatter, longest)
-        if np.any(plain.slopes):
-            with suppress(SpecError):
-                even = _even(parts, plain, feedback=feedback, step=step)
+    if ramp or samples > _LONG:
+        lines = lines_of(moved)
+        lines = lines.beyond(lines.scatter * (1.0 if ramp else _PLAIN), longest)
+        if ramp:
+            return _even(parts, lines, feedback=feedback, step=step)
+        with suppress(SpecError):
+            if np.any(lines.slopes):
+                even = _even(parts, lines, feedback=feedback, step=step)
                 if not _drifts(even.estimate):
                     return even
     level = explored(parts, feedback=feedback, step=step, ramp=False)
@@ -79,8 +79,8 @@ def explore_records(parts: Parts, *, feedback: bool = False, step: float = 1.0, 
         even = _even(parts, lines, feedback=feedback, step=step)
     except SpecError:
         return level
-    fewer = _criterion(even, lines=1) < _criterion(level)
-    return even if fewer and not _drifts(even.estimate) else level
+    better = _criterion(even, lines=1) < _criterion(level)
+    return even if better and not _drifts(even.estimate) else level
 
 
 def _even(parts: Parts, lines: Lines, *, feedback: bool, step: float) -> Found:
@@ -114,15 +114,18 @@ def lines_of(parts: Parts) -> Lines:
     Args:
         parts: records u (n, r), y (n, p).
     """
+    outputs = parts[0][1].shape[1]
     stretch = -(-sum(len(y) for _, y in parts) // _MOST_SAMPLES)
     if stretch > 1:
-        short = [_means(*part, stretch) for part in parts if len(part[1]) >= stretch]
+        short = [_means(*part, stretch) for part in parts if len(part[1]) >= _FEWEST * stretch]
+        if not short:
+            return Lines(np.zeros(outputs), np.full(outputs, np.inf))
         found = lines_of(short)
         return replace(found, slopes=found.slopes / stretch)
     longest = max(len(y) for _, y in parts)
     most = max(min(_MOST_DELAY, longest // 6), 1)
-    slopes, scatter = np.zeros((2, parts[0][1].shape[1]))
-    for i in range(slopes.size):
+    slopes, scatter = np.zeros((2, outputs))
+    for i in range(outputs):
         own = [(u, y[:, i : i + 1]) for u, y in parts]
         # A line that goes beyond what the output does is that of a plant which integrates.
         reach = max(float(np.ptp(y)) for _, y in own)

@@ -38,14 +38,13 @@ def without_drift(log: Log, found: Found) -> Log:
         return log
     single = len(found.slopes) == 1
     words = (
-        "the line through {} was partly the work of the inputs: beside the plant one is left that rises by {}"
+        "the line through {} was partly the work of the inputs: one that rises by {} is left beside the plant"
         if log.lined
-        else "{} drifts, whatever the inputs do: a line that rises by {}, found beside the plant,"
+        else "{} drifts, whatever the inputs do, along a line that rises by {}, found beside the plant"
     )
     told = [
         words.format("y" if single else f"y{i + 1}", f"{slope / log.step:.4g} per {log.time_unit}")
-        + (", which was taken away too" if log.lined else " was taken away")
-        + " (what is left of it was estimated along)"
+        + "; it was taken away (what is left of it was estimated along)"
         for i, slope in enumerate(found.slopes)
         if slope
     ]

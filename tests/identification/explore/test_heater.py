@@ -77,6 +77,13 @@ def test_the_line_of_a_long_record_is_told_by_its_means():
     assert np.abs(without.slopes) * len(y) < without.scatter
 
 
+def test_many_short_records_tell_no_line():
+    u, y = heater(6, 4800)
+    parts = [(u[i : i + 6], y[i : i + 6]) for i in range(0, len(y), 6)]
+    lines = lines_of(parts)
+    assert lines.beyond(lines.scatter, 6).slopes == pytest.approx([0.0])
+
+
 @pytest.mark.slow
 def test_a_long_record_that_drifts_is_explained_as_one_that_does_not():
     u, y = heater(1, 40_008)
