@@ -1,23 +1,56 @@
-"""Interruptions as they are: imports of compiled modules make other errors of them, or lose them."""
+"""Interruptions as they are: Python and compiled modules make other errors of them, or lose them."""
 
 from __future__ import annotations
 
 import signal
 import sys
-import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.abc import MetaPathFinder
 from types import FrameType
-from typing import NoReturn
 
 _came: list[int] = []
+# An import that is interrupted may drop the interruption, or crash in a compiled module: it may end first, if
+# that takes no longer than so many seconds. A lookup or a finalizer may drop one, too. So often is looked.
+_PATIENCE, _MOMENT = 5.0, 0.05
+_waiting_since: list[float] = []
 
 
-def interrupt(number: int, _frame: FrameType | None) -> NoReturn:
-    """A handler of signals: Ctrl-C is `KeyboardInterrupt`, others end the program in order."""
-    _came.append(number)
-    raise _end(number)
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """A handler of signals: Ctrl-C is `KeyboardInterrupt`, others end the program in order.
+
+    Modules that are being imported are imported first. What is dropped on its way is raised again.
+
+    Raises:
+        KeyboardInterrupt, SystemExit: now, or in a moment by way of SIGALRM.
+    """
+
+    def later(_: int, frame: FrameType | None) -> None:
+        if isinstance(sys.exc_info()[1], KeyboardInterrupt | SystemExit):
+            signal.setitimer(signal.ITIMER_REAL, _MOMENT)  # it tidies up on its way
+        else:
+            interrupt(number, frame)
+
+    signal.signal(signal.SIGALRM, later)
+    signal.setitimer(signal.ITIMER_REAL, _MOMENT)
+    if not (_imports(frame) and _has_patience()):
+        _came.append(number)
+        raise _end(number)
+
+
+def _imports(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _has_patience() -> bool:
+    now = time.monotonic()
+    if not _waiting_since:
+        _waiting_since.append(now)
+    return now - _waiting_since[0] < _PATIENCE
 
 
 @contextmanager
@@ -25,13 +58,12 @@ def bare_interruptions() -> Iterator[None]:
     """Within, Ctrl-C and the end by a signal are never the cause of another error, but themselves.
 
     Some errors name an interruption in their text alone, so that the signals are kept that `interrupt` saw.
-    Where a module that is imported drops the interruption, the next import raises it again.
 
     Raises:
-        KeyboardInterrupt, SystemExit: where an error was made of one of them, or it was dropped.
+        KeyboardInterrupt, SystemExit: where an error was made of one of them.
     """
-    again = _Again()
-    sys.meta_path.insert(0, again)
+    _came.clear()
+    _waiting_since.clear()
     try:
         yield
     except Exception as error:
@@ -41,18 +73,8 @@ def bare_interruptions() -> Iterator[None]:
             raise _end(_came[-1]) from None
         raise
     finally:
-        sys.meta_path.remove(again)
-        _came.clear()
-
-
-class _Again(MetaPathFinder):
-    """Finds no module, and raises an interruption that is on its way no longer."""
-
-    def find_spec(self, *_: object) -> None:
-        # What tidies up after an interruption may import, too, and other threads have none.
-        under_way = isinstance(sys.exc_info()[1], KeyboardInterrupt | SystemExit)
-        if _came and not under_way and threading.current_thread() is threading.main_thread():
-            raise _end(_came[-1])
+        if _came or _waiting_since:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def _end(number: int) -> KeyboardInterrupt | SystemExit:
