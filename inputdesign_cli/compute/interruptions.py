@@ -26,8 +26,8 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     """
 
     def later(_: int, frame: FrameType | None) -> None:
-        if isinstance(sys.exc_info()[1], KeyboardInterrupt | SystemExit):
-            signal.setitimer(signal.ITIMER_REAL, _MOMENT)  # it tidies up on its way
+        if _is_under_way(sys.exc_info()[1]):
+            signal.setitimer(signal.ITIMER_REAL, _MOMENT)
         else:
             interrupt(number, frame)
 
@@ -36,6 +36,15 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     if not (_imports(frame) and _has_patience()):
         _came.append(number)
         raise _end(number)
+
+
+def _is_under_way(handled: BaseException | None) -> bool:
+    """Whether what is handled came of an interruption, or ends a generator: something may be tidying up."""
+    while handled is not None:
+        if isinstance(handled, KeyboardInterrupt | SystemExit | GeneratorExit):
+            return True
+        handled = handled.__context__
+    return False
 
 
 def _imports(frame: FrameType | None) -> bool:

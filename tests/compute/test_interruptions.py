@@ -71,7 +71,10 @@ def dropping(tidied):
             assert {Dropping(): 1}[Dropping()] == 1
             time.sleep(20)
         finally:
-            time.sleep(0.3)
+            try:
+                raise ValueError("while it tidies up")
+            except ValueError:
+                time.sleep(0.3)
             tidied.append(True)
 
 
