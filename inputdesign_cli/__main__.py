@@ -33,22 +33,22 @@ def main() -> None:
 
             run()
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # once is enough
         sys.stderr.write("interrupted\n")
         sys.exit(INTERRUPTED)
 
 
 def _send_again(lost: UnraisableHookArgs) -> None:
-    """A signal whose exception was raised in a finalizer, where Python drops it, is sent once more."""
-    if issubclass(lost.exc_type, KeyboardInterrupt):
-        number = signal.SIGINT
-    elif isinstance(lost.exc_value, SystemExit) and isinstance(lost.exc_value.code, int):
-        number = signal.Signals(lost.exc_value.code - 128)
-    else:
+    """An interruption that was raised in a finalizer, where Python drops it, comes again.
+
+    The handler of `compute.interruptions` sees to that; before it stands, Ctrl-C is sent once more.
+    """
+    if not issubclass(lost.exc_type, KeyboardInterrupt | SystemExit):
         sys.__unraisablehook__(lost)
-        return
-    again = threading.Timer(_AGAIN, os.kill, [os.getpid(), number])
-    again.daemon = True
-    again.start()
+    elif signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        again = threading.Timer(_AGAIN, os.kill, [os.getpid(), signal.SIGINT])
+        again.daemon = True
+        again.start()
 
 
 if __name__ == "__main__":

@@ -10,9 +10,10 @@ from contextlib import contextmanager
 from types import FrameType
 
 _came: list[int] = []
-# An import that is interrupted may drop the interruption, or crash in a compiled module: it may end first, if
-# that takes no longer than so many seconds. A lookup or a finalizer may drop one, too. So often is looked.
-_PATIENCE, _MOMENT = 5.0, 0.05
+# An import that is interrupted may drop the interruption, or crash in a compiled module. It may end first.
+_PATIENCE = 5.0  # seconds that it may take
+# Lookups and finalizers may drop an interruption, too.
+_MOMENT = 0.05  # seconds until it is raised again
 _waiting_since: list[float] = []
 
 
@@ -83,6 +84,7 @@ def bare_interruptions() -> Iterator[None]:
         raise
     finally:
         if _came or _waiting_since:
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)  # one that is on its way would come after the end
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
