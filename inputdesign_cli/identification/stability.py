@@ -9,6 +9,8 @@ from inputdesign_cli.plant.polynomial import Array
 
 # A root is never moved closer to the circle than this.
 _MARGIN = 1e-3
+# A root that is nearer counts as on it. Specs refuse what is within rounding of the circle.
+_ON_THE_CIRCLE = 1e-9
 # A sum of coefficients that is zero, as far as decimals can tell.
 _EXACT = 1e-12
 
@@ -16,13 +18,13 @@ _EXACT = 1e-12
 def is_stable(monic: Array) -> NDArray[np.bool_]:
     """(runs,): whether all roots in z of each polynomial (runs, m + 1) lie inside the unit circle.
 
-    By the step-down recursion: the reflection coefficients are below one in modulus.
+    By the step-down recursion: the reflection coefficients are below one in modulus, by more than rounding.
     """
     stable = np.ones(monic.shape[0], dtype=bool)
     p = monic
     while p.shape[1] > 1:
         last = p[:, -1:]
-        stable &= np.abs(last[:, 0]) < 1.0
+        stable &= np.abs(last[:, 0]) < 1.0 - _ON_THE_CIRCLE
         room = np.where(np.abs(last) < 1.0, 1.0 - last**2, 1.0)
         p = ((p - last * p[:, ::-1]) / room)[:, :-1]
     return stable
@@ -41,5 +43,5 @@ def reflected(monic: Array) -> Array:
     modulus = np.abs(roots)
     roots = np.where(modulus >= 1.0, roots / np.maximum(modulus, 1.0) ** 2, roots)
     modulus = np.maximum(np.abs(roots), 1e-300)
-    roots = roots * np.minimum(1.0, (1.0 - _MARGIN) / modulus) ** (modulus > 1.0 - 1e-9)
+    roots = roots * np.minimum(1.0, (1.0 - _MARGIN) / modulus) ** (modulus > 1.0 - _ON_THE_CIRCLE)
     return np.atleast_1d(np.asarray(np.poly(roots).real, dtype=float))

@@ -16,6 +16,10 @@ IN_STATES = (
     "{{parameters: {{K: 2, T: 10, L: {delay}}}, sample: zoh, "
     "state_space: {{A: [['-1/T']], B: [['K/T']], C: [[1]], delay: L}}}}"
 )
+IN_FUNCTIONS = (
+    "{{parameters: {{K: 2, T: 10}}, B: [0, 'K*(1 - exp(-(1 - {delay})/T))', "
+    "'K*(exp(-(1 - {delay})/T) - exp(-1/T))'], F: [1, '-exp(-1/T)']}}"
+)
 COLOUR = "D: [1, -0.4], "
 
 
@@ -201,3 +205,20 @@ def test_a_spike_does_not_buy_a_dead_time_that_explains_the_rest(seed):
     assert found.repeated is None
     # One spike in 600 samples is noise of 4.1, forty times that of the plant.
     assert np.all((found.theta > [1.0, 3.0, 0.0]) & (found.theta < [4.0, 30.0, 8.0]))
+
+
+@pytest.mark.parametrize("colour", ["", COLOUR], ids=["white", "coloured"])
+@pytest.mark.parametrize("words", [IN_S, IN_STATES, IN_FUNCTIONS], ids=["s", "states", "functions"])
+def test_a_line_through_the_outputs_changes_no_estimate_that_knows_of_it(words, colour):
+    """With a slope of 0.004 a sample it is the one without; what does not know of it is far off."""
+    u, y = cut_out(0.4, 7, colour=0.4 if colour else 0.0)
+    line = 0.004 * np.arange(float(N))[:, None]
+    model = model_of(words, 0.4, colour)
+    plain, drifting = (identify(model, u, own, start=model.theta, ramp=True) for own in (y, y + line))
+    deviations = np.sqrt(np.diag(plain.covariance))
+    assert np.abs(drifting.theta - plain.theta) == pytest.approx(0.0, abs=1e-3 * deviations.min())
+    np.testing.assert_allclose(drifting.covariance, plain.covariance, rtol=1e-3)
+    off = plain.theta - model.theta
+    assert off @ np.linalg.solve(plain.covariance, off) < scipy.stats.chi2.ppf(0.999, model.theta.size)
+    unknowing = identify(model, u, y + line, start=model.theta)
+    assert (np.abs(unknowing.theta - plain.theta) / deviations).max() > 3.0

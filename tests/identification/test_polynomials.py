@@ -3,13 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from inputdesign_cli import parse_spec
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.identification import fit_batch, identify, identify_polynomials
+from inputdesign_cli.identification.estimators import estimator
+from inputdesign_cli.identification.stability import is_stable, reflected
 from inputdesign_cli.identification.structure import Structure
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.monte_carlo.statistics import whitened_eigenvalues, wishart_range
 from inputdesign_cli.plant import PolynomialModel
+from inputdesign_cli.specification.models.polynomials import check_delay_stable
 from inputdesign_cli.spectrum import MatrixFirBasis
+from inputdesign_cli.tasks.build.system import build_model
 from tests.support.plants import arrays, arx, box_jenkins
 from tests.support.records import shifted, simulated
 
@@ -245,3 +250,35 @@ def test_estimates_reach_the_cramer_rao_bound(model):
     eigenvalues = whitened_eigenvalues(found.theta, information)
     low, high = wishart_range(len(model.names), 500, np.random.default_rng(17))
     assert low < eigenvalues.min() <= eigenvalues.max() < high
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-15, 1e-13, 1e-12, 1e-11, 1e-10, 3e-10, 3e-9, 1e-8, 1e-4])
+@pytest.mark.parametrize("angle", [0.0, 1.0, np.pi])
+def test_what_counts_as_stable_may_stand_in_a_spec(gap, angle):
+    roots = (1.0 - gap) * np.exp(1j * np.array([angle, -angle] if angle == 1.0 else [angle]))
+    for others in ((), (0.5,), (0.5, -0.9)):
+        monic = np.poly([*roots, *others]).real
+        taken = bool(is_stable(monic[None])[0])
+        assert taken or gap < 1e-6
+        assert gap > 1e-11 or not taken
+        assert not taken or check_delay_stable(tuple(monic.tolist())) is None
+        assert check_delay_stable(tuple(reflected(monic).tolist())) is None
+
+
+_IN_S = "{continuous: {gain: 2, time_constant: 10}, sample: zoh}"
+
+
+@pytest.mark.parametrize("gap", [-0.5, 0.0, 1e-13, 1e-11, 1e-8])
+@pytest.mark.parametrize("plant", ["{B: [0, 1], F: [1, -0.7]}", _IN_S], ids=["q", "s"])
+def test_noise_that_a_search_may_arrive_at_may_stand_in_a_spec(plant, gap):
+    """Whatever the step, C and D have their roots inside the circle by more than rounding."""
+    words = f"plant: {plant}\nnoise: {{variance: 1, C: [1, 0.2], D: [1, -0.5]}}\n"
+    model = build_model(parse_spec(words, design=False))
+    record = estimator(model, 1.0).kind.record(*np.random.default_rng(3).standard_normal((2, 50, 1)))
+    theta = model.theta.copy()
+    for name, sign in (("c1", 1.0), ("d1", -1.0)):
+        theta[list(model.names).index(name)] = sign * (1.0 - gap)
+    found = dict(zip(model.names, record.stabilised(theta), strict=True))
+    for name in ("c1", "d1"):
+        assert check_delay_stable((1.0, float(found[name]))) is None
+    assert found[model.names[0]] == theta[0]

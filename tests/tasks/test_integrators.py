@@ -206,6 +206,24 @@ def test_a_free_pole_that_white_noise_drives_has_no_finite_information():
     assert "known: [a0]" in found.hint
 
 
+def test_noise_whose_free_pole_integrates_is_told_with_remedies_that_work():
+    """D with its root on the circle, known, is the integrator of drift: true."""
+    text = """
+plant: {B: [0, 1], F: [1, -0.7]}
+noise: {variance: 1, D: [1, -0.99999999]}
+accuracy: {model_error: {relative: 0.1}}
+experiment: {samples: 500}
+"""
+    found = refused(text)
+    assert (found.code, found.key) == ("infinite-information", "noise")
+    assert "fed back" not in found.message
+    assert "noise.known: [d1]" in found.hint
+    assert "drift: true" in found.hint
+    known = solve(parse_spec(text, overrides=["noise.known=[d1]"])).result
+    drifting = solve(parse_spec(text, overrides=["noise={variance: 1, drift: true}"])).result
+    assert known["cost"] == pytest.approx(drifting["cost"], rel=1e-5)
+
+
 def test_a_plant_in_continuous_time_that_integrates():
     """Lines off zero; the record's own information is that of its samples, by the closed form of a sum."""
     text = """

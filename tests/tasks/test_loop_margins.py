@@ -171,6 +171,8 @@ def test_margins_are_told_as_the_peak_that_keeps_them(margin, expected):
         ("accuracy.loop.max_sensitivity_db=3", "admissible-not-positive", "accuracy.loop"),
         ("accuracy={loop: {max_sensitivity_db: 6}}", "needs-controller", "accuracy.loop"),
         ("accuracy={loop: {tuning: {simc: {}}}}", "missing-key", "accuracy.loop"),
+        ("accuracy.loop.max_sensitivity_db=100.1", "out-of-range", "accuracy.loop.max_sensitivity_db"),
+        ("accuracy.loop.max_sensitivity_db=1e9", "out-of-range", "accuracy.loop.max_sensitivity_db"),
         ("accuracy.loop.gain_margin=2", "conflicting-keys", "accuracy.loop.gain_margin"),
         (
             "accuracy={loop: {gain_margin: 1, tuning: {simc: {}}}}",

@@ -42,10 +42,15 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
     if not experiment.model.continuous:
         endless = _growing(experiment, source.noise_gradient)
         if endless:
-            known = f"list it in plant.known: [{endless.split(', ')[0]}]"
-            hint = (
-                f"{known}; in q^-1 it may be free as a root of A, where the noise passes through it as well"
+            fed_back = "" if experiment.loop is None else " and fed back"
+            first = endless.split(", ")[0]
+            part = "plant" if _moves_plant(experiment, first) else "noise"
+            another = (
+                "in q^-1 it may be free as a root of A, where the noise passes through it as well"
+                if part == "plant"
+                else "or say noise: {drift: true}, and leave that root out of D"
             )
+            hint = f"list it in {part}.known: [{first}]; {another}"
             if any(spec.noise.drifts) and not all(spec.noise.drifts):
                 hint = (
                     "the inputs wander with the drift that they counteract: let every output drift (noise: "
@@ -53,9 +58,9 @@ def on_finite_information(spec: Spec, experiment: Experiment) -> Experiment:
                 )
             raise spec.complain(
                 "infinite-information",
-                f"the noise alone, which is integrated and fed back, tells without end of {endless}",
+                f"the noise alone, which is integrated{fed_back}, tells without end of {endless}",
                 hint=hint,
-                key="plant",
+                key=part,
             )
     lo, hi = experiment.band
     grown = "" if lo > 0.0 else _growing(experiment, experiment.excitation_gradient)
@@ -88,6 +93,13 @@ def _wanders(experiment: Experiment) -> bool:
     if experiment.loop is not None or model.continuous:
         return False
     return bool(np.any(_grows(experiment, lambda w: model.plant_at(w)[:, None])))
+
+
+def _moves_plant(experiment: Experiment, name: str) -> bool:
+    """Whether G depends on a parameter: those of the noise alone leave it as it is."""
+    model = experiment.model
+    gradient = model.plant_gradient([0.3 * experiment.band[1]])
+    return bool(np.any(gradient[:, model.names.index(name)]))
 
 
 def _growing(experiment: Experiment, gradient: Callable[[ArrayLike], ComplexArray]) -> str:

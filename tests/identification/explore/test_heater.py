@@ -33,14 +33,14 @@ def is_the_heater(found):
     np.testing.assert_allclose(lags, [LAG + SECOND, LAG * SECOND], rtol=0.1)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_correlated_noise_is_not_taken_for_white(seed):
     found = explore_records([heater(seed)], step=STEP)
     is_the_heater(found)
     assert found.slopes is None
 
 
-@pytest.mark.parametrize("a_degree_an_hour", [1.0, -0.3])
+@pytest.mark.parametrize("a_degree_an_hour", [1.0, pytest.param(-0.3, marks=pytest.mark.slow)])
 def test_a_drift_is_no_slow_pole(a_degree_an_hour):
     u, y = heater(1)
     drift = a_degree_an_hour * STEP / 3600.0
