@@ -45,7 +45,7 @@ def solve(
     no_output: NoOutput = False,
     keep_partial: KeepPartial = False,
     fast: Fast = False,
-    trade: TradeWords = "",
+    trade: TradeWords = None,
     figures: Figures = True,
     figure_format: FigureFormat = "png",
     json_output: Json = False,
@@ -70,8 +70,16 @@ def solve(
         if trade:
             read = read_spec(spec, overrides, confine)
             beside = place.directory.with_name(f"{place.directory.name}-trade")
-            words, silent = [word for word in trade.split(",") if word], quiet or json_output
-            tell_trade(spec, read, words, beside, overrides=overrides or [], confine=confine, quiet=silent)
+            tell_trade(
+                spec,
+                read,
+                trade.split(","),
+                beside,
+                overrides=overrides or [],
+                confine=confine,
+                figure_format=figure_format,
+                quiet=quiet or json_output,
+            )
         return
     with stoppable() as stop, ending_early(stop) as came:
         results, place = _results("solve", place, overrides, confine, quiet)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inputdesign_cli.cli.completion import spec_keys
-from inputdesign_cli.cli.options import Confine, Json, Quiet, SpecFile, SweepOutput, one_of
+from inputdesign_cli.cli.options import Confine, FigureFormat, Json, Quiet, SpecFile, SweepOutput, one_of
 from inputdesign_cli.cli.reading import name_of, standard_input
 from inputdesign_cli.cli.terminal import EXIT_INTERNAL, aligned
 from inputdesign_cli.cli.workers import ClusterAddress, Jobs, WorkerTimeout, executor
@@ -67,6 +67,7 @@ def sweep(
     plots: Annotated[
         bool, typer.Option("--plots", help="Draw the figures of every point too, not only of the sweep.")
     ] = False,
+    figure_format: FigureFormat = "png",
     json_output: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -104,6 +105,7 @@ def sweep(
             fail_fast=fail_fast,
             rerun_failed=rerun_failed,
             figures=plots,
+            figure_format=figure_format,
             overwrite=overwrite,
             watch=line,
         )

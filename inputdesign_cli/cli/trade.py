@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 WORDS = ("samples", "amplitude")
 
 
-def _words(text: str) -> str:
-    for word in filter(None, text.split(",")):
+def _words(text: str | None) -> str | None:
+    for word in () if text is None else text.split(","):
         if word not in WORDS:
-            raise typer.BadParameter(f"{word} is neither samples nor amplitude")
+            raise typer.BadParameter(f'"{word}" is neither samples nor amplitude')
     return text
 
 
 TradeWords = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--trade",
         metavar="samples,amplitude",
@@ -45,22 +45,24 @@ def tell_trade(
     *,
     overrides: Sequence[str],
     confine: Path | None,
+    figure_format: str = "png",
     quiet: bool,
 ) -> Trade:
-    """Run the sweep, draw trade.png into its directory, and print the table."""
+    """Run the sweep, draw the trade into its directory, and print the table."""
     with computing(directory, quiet=quiet, doing=f"trading {' and '.join(words)}"):
-        from inputdesign_cli.figures.style import rendered
+        from inputdesign_cli.figures.sweep_figures import draw_into
         from inputdesign_cli.figures.trade import draw_trade
-        from inputdesign_cli.runs.run_directory import write_bytes
         from inputdesign_cli.sweep.trade import run_trade
 
-        found = run_trade(file, spec, words, directory, overrides=overrides, confine=confine)
-        write_bytes(directory / "trade.png", rendered(lambda page: draw_trade(found, page)))
+        found = run_trade(
+            file, spec, words, directory, overrides=overrides, confine=confine, figure_format=figure_format
+        )
+        drawn = draw_into(directory, "trade", lambda page: draw_trade(found, page), figure_format)
     if not quiet:
         typer.echo("\n" + trade_table(found))
         if not found.criterion:
             typer.echo("\nerror of the model over what is asked: below one is enough; more time to the right")
-        typer.echo(f"\nfiles   {directory}: trade.png, sweep.csv, sweep.yaml")
+        typer.echo(f"\nfiles   {directory}: {drawn.name}, sweep.csv, sweep.yaml")
     return found
 
 

@@ -54,7 +54,7 @@ def wizard(
     At most ten questions: the plant, what the model is for, what the experiment may use, the noise.
     They are asked in the terminal where no option answers them. What is written is an ordinary spec.
     """
-    from inputdesign_cli.wizard.questions import QUESTIONS, read_answers, told_by_plant
+    from inputdesign_cli.wizard.questions import QUESTIONS, Answers, read_answers, told_by_plant
 
     if output.exists() and not overwrite:
         hint = "choose another name with -o, or overwrite it with --overwrite"
@@ -62,14 +62,17 @@ def wizard(
     if answers is not None and output.exists() and output.samefile(answers):
         hint = "choose another name for the spec with -o"
         raise OutputError.because("output-exists", f"{output} holds the answers, and would be lost", hint)
-    known = read_answers(answers, given or [])
+    said = read_answers(answers, given or [])
+    known = said.texts
     terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     there = {*known, *told_by_plant(known)}
     unanswered = [one.key for one in QUESTIONS if one.default is None and one.key not in there]
     if unanswered and not known and not terminal:
         _refuse(unanswered)
-    draft = _asked(known, output, quiet) if unanswered and terminal else None
-    with computing(output, quiet=quiet, doing="thinking"):
+    draft = None
+    if unanswered and terminal:
+        draft, said = _asked(known, output, quiet), Answers()  # what is typed stands in no file
+    with said.located(), computing(output, quiet=quiet, doing="thinking"):
         from inputdesign_cli.runs.run_directory import write_text
         from inputdesign_cli.wizard.composing import compose
         from inputdesign_cli.wizard.spectra import with_spectrum

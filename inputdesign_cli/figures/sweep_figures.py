@@ -20,6 +20,7 @@ from inputdesign_cli.figures.style import (
     BLACK,
     DASHED,
     DOTTED,
+    FILE_TYPES,
     GREY,
     PALETTE,
     TYPE_SIZE,
@@ -42,24 +43,43 @@ from inputdesign_cli.figures.sweep_moments import draw_moments, moment_entries
 from inputdesign_cli.figures.sweep_table import QUANTITIES, SweepTable
 from inputdesign_cli.runs.objectives import OBJECTIVES, objective
 from inputdesign_cli.runs.results import Array
+from inputdesign_cli.runs.run_directory import output_errors, write_bytes
 
 # What no design whatever does better.
 BOUNDS = {"objective.any_spectrum_bound": "any spectrum", "objective.any_structure_bound": "any moments"}
 MOST_CURVES = len(PALETTE)
 MOST_KEYS = 3
+NAMES = ("curves", "map", "moments")
 COLUMNS, ROW = 3, 0.6  # of small multiples: beside each other, and what a further row adds to the page
 MOST_LABELLED = 100  # cells of a map that carry their number
 _CELL = 0.6  # inches of the page that a column of a map takes where it has numbers
 _FLAT = 0.02  # criteria that differ by less, relative to their size, look equal
 
 
-def draw_sweep(table: SweepTable, root: Path) -> list[Path]:
-    """Draw the figures that suit the sweep as PNG files, and return their paths."""
-    drawn = []
-    for name, paint in sweep_figures(table):
-        drawn.append(root / f"{name}.png")
-        drawn[-1].write_bytes(rendered(paint))
-    return drawn
+def draw_sweep(table: SweepTable, root: Path, file_type: str = "png") -> list[Path]:
+    """Draw the figures that suit the sweep, and return their paths; those of an earlier call go."""
+    for name in NAMES:
+        _remove(root, name)
+    return [draw_into(root, name, paint, file_type) for name, paint in sweep_figures(table)]
+
+
+def draw_into(root: Path, name: str, paint: Callable[[Figure], None], file_type: str) -> Path:
+    """Draw a figure of a sweep in place of one in any format, and return its path.
+
+    Raises:
+        OutputError: see `write_bytes`.
+    """
+    content = rendered(paint, FILE_TYPES[file_type])
+    _remove(root, name)
+    path = root / f"{name}.{file_type}"
+    write_bytes(path, content)
+    return path
+
+
+def _remove(root: Path, name: str) -> None:
+    with output_errors(root):
+        for file_type in FILE_TYPES:
+            (root / f"{name}.{file_type}").unlink(missing_ok=True)
 
 
 def sweep_figures(table: SweepTable) -> list[tuple[str, Callable[[Figure], None]]]:

@@ -37,8 +37,7 @@ def header_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
     unit = next((name.removeprefix("time_") for name in channels if name.startswith("time_")), "s")
     samples = len(next(iter(signals.values())))
     lines = [
-        "#ifndef IDESIGN_SIGNAL_H",
-        "#define IDESIGN_SIGNAL_H",
+        "#pragma once",  # two of them in one file clash by their names, and none is left out silently
         "",
         f"#define SIGNAL_SAMPLES {samples}",
         f"#define SIGNAL_SAMPLE_TIME {sample_time!r} /* {unit} */",
@@ -51,7 +50,7 @@ def header_bytes(channels: Mapping[str, Array], sample_time: float) -> bytes:
             for i in range(0, samples, _A_LINE)
         ]
         lines += ["", f"static const double {head}[SIGNAL_SAMPLES] = {{{note}", ",\n".join(rows), "};"]
-    return "\n".join([*lines, "", "#endif", ""]).encode()
+    return "\n".join([*lines, ""]).encode()
 
 
 WRITERS: dict[str, Callable[[Mapping[str, Array], float], bytes]] = {

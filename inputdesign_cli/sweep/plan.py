@@ -45,7 +45,7 @@ class Plan:
             )
         return self._keys[index]
 
-    def job(self, index: int, root: Path, *, figures: bool, with_files: bool) -> PointJob:
+    def job(self, index: int, root: Path, *, figures: str, with_files: bool) -> PointJob:
         """A point for a worker; `with_files` if the worker may not see the files that the spec names."""
         overrides = tuple(self.grid.overrides(self.grid[index]))
         files = None

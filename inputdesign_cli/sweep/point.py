@@ -45,7 +45,7 @@ class PointJob:
     draft: SpecTemplate
     overrides: tuple[str, ...]
     verb: Verb
-    figures: bool
+    figures: str
     root: Path
     files: dict[str, bytes] | None = None  # what the spec names, for a machine that may not see our files
 
@@ -103,7 +103,7 @@ def _compute(job: PointJob, directory: Path) -> PointEnd:
         from inputdesign_cli.figures.plots import draw_all
         from inputdesign_cli.runs.run_directory import write_run
 
-        write_run(results, directory, draw_all(results) if job.figures else {})
+        write_run(results, directory, draw_all(results, job.figures) if job.figures else {})
     except OutputError:
         raise
     except IdesignError as error:

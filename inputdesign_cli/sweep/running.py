@@ -130,6 +130,7 @@ def sweep(
     fail_fast: bool = False,
     rerun_failed: bool = False,
     figures: bool = False,
+    figure_format: str = "png",
     overwrite: bool = False,
     watch: Callable[[Progress], None] | None = None,
 ) -> SweepSummary:
@@ -143,6 +144,7 @@ def sweep(
         fail_fast: stop at the first point without a result instead of noting it in the table.
         rerun_failed: try points again that failed in an earlier call.
         figures: draw the figures of every point too.
+        figure_format: of all figures: png, svg or pdf.
         overwrite: replace the table of a sweep of another spec, of other keys or of another verb.
         watch: is told after every point how far the sweep is.
 
@@ -159,7 +161,8 @@ def sweep(
         layout.remove_page()
         _write_summary(plan, layout, made_from, {})
         replace_text(layout.root / SPEC, to_yaml(plan.data()))
-        run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, figures, watch)
+        drawn = figure_format if figures else ""
+        run = _Run(plan, layout, executor or InProcess(), fail_fast, rerun_failed, drawn, watch)
         try:
             run.compute()
         finally:
@@ -168,7 +171,7 @@ def sweep(
         if fail_fast and run.first_failure:
             raise run.first_failure
         files = [directory / name for name in (TABLE, SUMMARY, SPEC)]
-        files += _draw(directory)
+        files += _draw(directory, figure_format)
         found = (run.computed, statuses, run.first_failure, files, run.damaged)
         return SweepSummary(directory, len(plan.grid), *found)
 
@@ -180,7 +183,7 @@ class _Run:
     executor: Executor
     fail_fast: bool
     rerun_failed: bool
-    figures: bool
+    figures: str
     watch: Callable[[Progress], None] | None
     passed: int = 0
     computed: int = 0
@@ -293,11 +296,11 @@ class _Run:
             self.watch(Progress(len(self.plan.grid), self.passed, self.computed, self.failed))
 
 
-def _draw(root: Path) -> list[Path]:
+def _draw(root: Path, figure_format: str) -> list[Path]:
     from inputdesign_cli.figures.sweep_figures import draw_sweep
     from inputdesign_cli.figures.sweep_table import read_sweep
 
-    return draw_sweep(read_sweep(root), root)
+    return draw_sweep(read_sweep(root), root, figure_format)
 
 
 def _write_summary(plan: Plan, layout: Layout, made_from: Sequence[str], statuses: dict[str, int]) -> None:

@@ -30,6 +30,7 @@ def run_trade(
     overrides: Sequence[str] = (),
     confine: Path | None = None,
     executor: Executor | None = None,
+    figure_format: str = "png",
 ) -> Trade:
     """The best accuracy at a quarter to twice the length, at half to twice the amplitude, as a sweep.
 
@@ -37,6 +38,7 @@ def run_trade(
         file: of the spec, to which the `overrides` belong.
         words: "samples", "amplitude" or both.
         directory: of the sweep.
+        figure_format: of its figures: png, svg or pdf.
 
     Raises:
         SpecError: `needs-limits` where an amplitude is to be varied that is not limited; see `sweep`.
@@ -44,7 +46,15 @@ def run_trade(
     """
     settings = [*overrides, *trade_settings(spec, words)]
     # The directory belongs to the run beside it, whatever was traded there before.
-    sweep(file, settings, directory=directory, confine=confine, executor=executor, overwrite=True)
+    sweep(
+        file,
+        settings,
+        directory=directory,
+        confine=confine,
+        executor=executor,
+        figure_format=figure_format,
+        overwrite=True,
+    )
     return read_trade(read_sweep(directory), spec)
 
 

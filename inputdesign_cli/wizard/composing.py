@@ -11,7 +11,8 @@ from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.log_noise import log_noise_lines
 from inputdesign_cli.wizard.means import input_range, limit_lines, loop_line, noise_lines, signal_lines
 from inputdesign_cli.wizard.phrases import seconds, short, with_plain_numbers
-from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
+from inputdesign_cli.wizard.plant_answer import PlantAnswer
+from inputdesign_cli.wizard.plants import understand_plant
 from inputdesign_cli.wizard.questions import bad_answer, complete
 from inputdesign_cli.wizard.wishes import wished
 

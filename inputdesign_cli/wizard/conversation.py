@@ -7,7 +7,8 @@ from pathlib import Path
 
 from inputdesign_cli.errors import IdesignError, OutputError
 from inputdesign_cli.wizard.composing import Draft, compose
-from inputdesign_cli.wizard.plants import PlantAnswer, understand_plant
+from inputdesign_cli.wizard.plant_answer import PlantAnswer
+from inputdesign_cli.wizard.plants import understand_plant
 from inputdesign_cli.wizard.questions import QUESTIONS, Question, told_by_plant
 
 # In place of what was not asked yet: it goes with every other answer.

@@ -39,6 +39,7 @@ _HINTS = {
     "unstable-loop": "take a smaller Kp, of the same sign as the gain of the plant, or a larger Ti",
     "unbounded-error": 'ask for "parameters within 5 %", or for a Bode plot from a frequency above zero on',
     "delay-beyond-record": "take more time; what is a second, and what a minute?",
+    "infinite-information": "let a controller hold the plant in the experiment, and write its settings",
     "not-identifiable": "has it a factor that cancels, or is it too small to be seen?",
     "coarse-converter": "move the operating point, or let the converter reach further",
     "data-missing-column": "name the columns in the first line of the file: time, u, y (at rest: y)",
@@ -78,6 +79,8 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
         why = f"{lines[1]} frequencies between these two repeat within the time, and {lines[2]} are needed"
     quieter = _QUIETER.search(one.hint)
     hint = _HINTS.get(one.code, "")
+    if one.code == "infinite-information" and asked.key != "loop":
+        hint = ""  # a controller holds it already
     if quieter:
         least, roomy = quieter.groups()
         hint = f"ask for more than {least} dB (the nearer, the longer the experiment), such as {roomy} dB"
@@ -96,9 +99,12 @@ def _told(one: Diagnostic, said: Mapping[str, str], key: str) -> Diagnostic:
 
 def _question(one: Diagnostic, said: Mapping[str, str]) -> str:
     """The question whose answer an entry of the spec comes from; empty where that is not known."""
-    # In open loop the only controller is that of the wish.
-    if one.code == "unstable-loop" and not re.search(r"\bKp\b", said.get("loop", ""), re.I):
+    # In open loop the only controller is that of the wish, and none holds a plant that integrates.
+    held = re.search(r"\bKp\b", said.get("loop", ""), re.I)
+    if one.code == "unstable-loop" and not held:
         return "wish"
+    if one.code == "infinite-information" and not held:
+        return "loop"
     if one.code in _OF_CODE:
         return _OF_CODE[one.code]
     found = (name for path, name in _ANSWERS.items() if f"{one.key}.".startswith(f"{path}."))

@@ -10,8 +10,8 @@ import numpy as np
 
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.phrases import NUMBER, after, after_if_named, needed, number, short
-from inputdesign_cli.wizard.plants import PlantAnswer
-from inputdesign_cli.wizard.questions import bad_answer
+from inputdesign_cli.wizard.plant_answer import PlantAnswer
+from inputdesign_cli.wizard.questions import bad_answer, file_of
 from inputdesign_cli.wizard.wishes import pid
 
 _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", "three levels": "ternary"}
@@ -134,8 +134,7 @@ def _at_rest(path: Path) -> tuple[float, float, str]:
     """Variance of the innovation, the pole of the noise (0 where it is white), and how that is known."""
     from inputdesign_cli.tasks.build.tables import read_samples
 
-    if not path.is_file():
-        raise bad_answer("noise", f"there is no file {path}")
+    file_of("noise", path)
     with in_their_words({}, "noise"):
         y = read_samples(path, {"y": "y"}, key="noise")["y"]
     if y.size < 20:

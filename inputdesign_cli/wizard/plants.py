@@ -1,71 +1,25 @@
-"""The plant in the user's words: a template, numbers, a step response, a log, a system of python-control."""
+"""The plant in the user's words: a template, numbers, a step response, a log, a system in JSON."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from inputdesign_cli.errors import DataError, IdesignError, SpecError
-from inputdesign_cli.regular_file import read_regular
+from inputdesign_cli.errors import IdesignError, SpecError
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.phrases import LARGEST, NUMBER, after, needed, seconds_after, share, short
-from inputdesign_cli.wizard.questions import bad_answer
+from inputdesign_cli.wizard.json_plants import system_of
+from inputdesign_cli.wizard.phrases import NUMBER, after, needed, seconds_after, share, short
+from inputdesign_cli.wizard.plant_answer import PlantAnswer
+from inputdesign_cli.wizard.questions import bad_answer, file_of
 
-_STEPS = (1.0, 2.0, 5.0, 10.0)
 _LEAST_ROWS = 10  # of a step response
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
-
-
-@dataclass(frozen=True)
-class PlantAnswer:
-    """What is known of the plant.
-
-    Args:
-        lines: of the spec, with comments.
-        slow, late: its slowest time constant and its dead time, in seconds.
-        intervals: what the parameters may be, by name; none where nothing is said.
-        values: the parameters by name.
-        controller: under which it usually runs, as YAML.
-        files: to be written beside the spec, by name.
-        covariance: the one of them that tells how good the estimate is.
-        sampling: seconds between samples, where that is known already.
-        tunable: whether rules of tuning know it.
-        channels: the larger number of its inputs and outputs.
-        explored: the model of a log, whose noise is told in the spec.
-        source: the name of that log.
-        against: what the log says against that model, a sentence each.
-    """
-
-    lines: tuple[str, ...]
-    slow: float
-    late: float
-    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    controller: str | None = None
-    files: Mapping[str, bytes] = field(default_factory=dict)
-    covariance: str | None = None
-    sampling: float | None = None
-    tunable: bool = False
-    channels: int = 1
-    explored: Spec | None = None
-    source: str = ""
-    against: tuple[str, ...] = ()
-
-    @property
-    def sample_time(self) -> float:
-        """A twentieth of the time constant, rounded down to 1, 2 or 5 times a power of ten."""
-        if self.sampling is not None:
-            return self.sampling
-        wanted = self.slow / 20.0
-        decade = 10.0 ** np.floor(np.log10(wanted))
-        return float(decade * max(step for step in _STEPS if step * decade <= wanted * (1 + 1e-9)))
 
 
 def _around(values: Mapping[str, float], part: float) -> dict[str, tuple[float, float]]:
@@ -139,15 +93,11 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
     if text.lower() in TEMPLATES:
         return TEMPLATES[text.lower()]
     if word.lower() in ("step", "log") and rest.strip():
-        path = folder / rest.strip()
-        if not path.is_file():
-            raise bad_answer("plant", f"there is no file {path}")
+        path = file_of("plant", folder / rest.strip())
         with in_their_words({}, "plant"):
             return _stepped(path, stem) if word.lower() == "step" else _explored(path, stem)
     if text.endswith(".json"):
-        if not (folder / text).is_file():
-            raise bad_answer("plant", f"there is no file {folder / text}")
-        return _of_control(folder / text)
+        return system_of(file_of("plant", folder / text))
     if re.search(r"\bgain\b", text, re.I):
         return _of_numbers(text)
     raise bad_answer("plant", f'"{text}" is none of these')
@@ -290,42 +240,3 @@ def _first_order(path: Path, explored: Spec) -> bytes | None:
         if not found.result["identification"]["failed"]:
             return clock.encode() + found.files["model.yaml"]
     return None
-
-
-def _of_control(path: Path) -> PlantAnswer:
-    """num and den in s, as python-control has them, and a delay."""
-    try:
-        data = json.loads(read_regular(path))
-        num, den = ([float(c) for c in data[key]] for key in ("num", "den"))
-        late = float(data.get("delay", 0.0))
-        sizes = np.abs([*num, *den, late])
-        if not np.all(sizes <= LARGEST):  # NaN is not, either
-            raise ValueError(f"a number is beyond {LARGEST:g}")
-        sampled = bool(data.get("dt"))
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        why = f'{path.name} does not hold {{"num": [2], "den": [180, 1], "delay": 25}} or the like: {error}'
-        raise DataError(bad_answer("plant", why).diagnostics) from None
-    num, den = (np.trim_zeros(part, "f") for part in (num, den))
-    if sampled:
-        raise bad_answer("plant", f"the system of {path.name} is sampled (dt), and is to be in s")
-    if not num or len(num) > len(den):
-        raise bad_answer("plant", f"num of {path.name} must not be zero, nor have more entries than den")
-    if late < 0.0:
-        raise bad_answer("plant", f"the delay in {path.name} is negative")
-    poles = np.roots(den)
-    decays = -poles.real[poles.real < 0]
-    if not decays.size:
-        raise bad_answer(
-            "plant", f"the system of {path.name} has no stable pole: its time constant is not known"
-        )
-    delay = f", delay: {short(late)}" if late else ""
-    return PlantAnswer(
-        (
-            f"plant:  # from {path.name}",
-            f"  continuous: {{numerator: {num}, denominator: {den}{delay}}}",
-            "  sample: zoh",
-        ),
-        float(1.0 / decays.min()),
-        late,
-        tunable=len(num) == 1 and len(den) in (2, 3) and bool(np.all(poles.imag == 0.0)),
-    )

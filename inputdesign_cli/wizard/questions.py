@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from inputdesign_cli.errors import SpecError
+from inputdesign_cli.errors import Diagnostic, IdesignError, Location, SpecError
 from inputdesign_cli.specification.wording import unknown_word
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.reader import read
@@ -91,33 +92,88 @@ def bad_answer(key: str, why: str) -> SpecError:
     return SpecError.because("bad-answer", f"{asked.asks} ({key}): {why}", f"allowed: {asked.allowed}", key)
 
 
-def read_answers(file: Path | None, given: Sequence[str] = ()) -> dict[str, str]:
+@dataclass(frozen=True)
+class Answers:
+    """Answers by question, and where those of a file stand.
+
+    Args:
+        texts: what was answered.
+        places: of the answers in the file; for questions that it leaves open, its beginning.
+    """
+
+    texts: dict[str, str] = field(default_factory=dict)
+    places: dict[str, Location] = field(default_factory=dict)
+
+    @contextmanager
+    def located(self) -> Iterator[None]:
+        """Errors inside that are about an answer of the file tell where it stands."""
+        try:
+            yield
+        except IdesignError as error:
+            raise type(error)([self._placed(one) for one in error.diagnostics]) from error
+
+    def _placed(self, one: Diagnostic) -> Diagnostic:
+        return replace(one, location=one.location or self.places.get(one.key))
+
+
+def file_of(key: str, path: Path) -> Path:
+    """The path of a file that an answer names, which is there.
+
+    Raises:
+        SpecError: `bad-answer`.
+    """
+    if path.is_dir():
+        raise bad_answer(key, f"{path} is a folder")
+    if path.exists() and not path.is_file():
+        raise bad_answer(key, f"{path} is a pipe or a device, not a file")
+    if not path.is_file():
+        raise bad_answer(key, f"there is no file {path}")
+    return path
+
+
+def read_answers(file: Path | None, given: Sequence[str] = ()) -> Answers:
     """The answers of a YAML file and of `KEY=TEXT`, which come first.
 
     Raises:
-        SpecError: `bad-answer` for a question that there is not; the file cannot be read.
+        SpecError: `bad-answer` for a question that there is not, or for what is no text; the file cannot
+            be read.
     """
-    found: dict[str, str] = {}
-    if file is not None:
-        tree = read(read_text(file), str(file))
-        if tree.diagnostics:
-            raise SpecError(tree.diagnostics)
-        if not isinstance(tree.data, dict):
-            message = "answers are a mapping of questions to texts"
-            raise SpecError.because("bad-answer", message, f"the questions are {', '.join(KEYS)}")
-        found |= {str(key): _plain(value) for key, value in tree.data.items()}
+    answers = Answers() if file is None else _of_file(file)
     for text in given:
         key, equals, value = text.partition("=")
         if not equals:
             message = f'"{text}" is no answer'
             raise SpecError.because("bad-answer", message, 'write KEY=TEXT, as in time="1 h"')
-        found[key.strip()] = value.strip()
-    for key in found:
+        answers.texts[key.strip()] = value.strip()
+        answers.places.pop(key.strip(), None)
+    for key in answers.texts:
         if key not in KEYS:
             message, hint = unknown_word(key, KEYS)
             told = message.replace("{key}", "the question")
-            raise SpecError.because("bad-answer", told, hint or f"the questions are {', '.join(KEYS)}")
-    return found
+            hint = hint or f"the questions are {', '.join(KEYS)}"
+            raise SpecError.because("bad-answer", told, hint, location=answers.places.get(key))
+    return answers
+
+
+def _of_file(file: Path) -> Answers:
+    tree = read(read_text(file), str(file))
+    if tree.diagnostics:
+        raise SpecError(tree.diagnostics)
+    begins = tree.places.location(tree.places.mark(())) or Location(str(file), 1, 1)
+    if not isinstance(tree.data, dict):
+        message, hint = "answers are a mapping of questions to texts", f"the questions are {', '.join(KEYS)}"
+        raise SpecError.because("bad-answer", message, hint, location=begins)
+    answers = Answers(places=dict.fromkeys((one.key for one in QUESTIONS if one.default is None), begins))
+    for key, value in tree.data.items():
+        place = tree.places.location(tree.places.mark((key,)))
+        if isinstance(value, dict | list):
+            what = "a mapping" if isinstance(value, dict) else "a list"
+            message, hint = f"the answer to {key} is {what}", 'an answer is one text: put it in quotes ("..")'
+            raise SpecError.because("bad-answer", message, hint, key, place)
+        answers.texts[key] = _plain(value)
+        if place is not None:
+            answers.places[key] = place
+    return answers
 
 
 def complete(answers: Mapping[str, str]) -> dict[str, str]:

@@ -7,7 +7,7 @@ import re
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
 from inputdesign_cli.wizard.phrases import NUMBER, after, needed, number, seconds_after, share, short
-from inputdesign_cli.wizard.plants import PlantAnswer
+from inputdesign_cli.wizard.plant_answer import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 
 _NORMAL, _RAYLEIGH = 1.96, math.sqrt(math.log(20.0))  # 95 % of real and of complex errors, in deviations

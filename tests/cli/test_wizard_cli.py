@@ -139,8 +139,15 @@ def test_a_trade_is_a_sweep_with_a_table(run, tmp_path):
     assert all(a > b for row in cells.values() for a, b in pairwise(row))
     assert all(a > b > c for a, b, c in zip(*cells.values(), strict=True))
     assert (tmp_path / "runs" / "small-trade" / "trade.png").stat().st_size > 5000
-    code, _, err = run("solve", "small.yaml", "--trade", "colour")
-    assert (code, "neither samples nor amplitude" in err) == (2, True)
+    for words in ("colour", "", "samples,"):
+        code, _, err = run("solve", "small.yaml", "--trade", words)
+        assert (code, "neither samples nor amplitude" in err) == (2, True)
+    code, out, _ = run("solve", "small.yaml", "--fast", "--trade", "samples", "--figure-format", "svg")
+    assert code == 0
+    assert "trade.svg" in out
+    drawn = {path.name for path in (tmp_path / "runs" / "small-trade").iterdir() if path.stem != "sweep"}
+    assert {"trade.svg", "curves.svg"} <= drawn
+    assert not any(name.endswith((".png", ".pdf")) for name in drawn)
 
 
 def test_answers_are_not_lost_to_the_spec(run, tmp_path):

@@ -244,3 +244,12 @@ def test_a_margin_above_the_one_that_is_named_will_do(tmp_path):
     below = float(least[1]) - 0.02
     with pytest.raises(SpecError):
         compose({**ENGINEER, "wish": f"PI loop with {below:.3g} dB"}, "x", tmp_path).validate()
+
+
+@pytest.mark.parametrize(("loop", "key"), [("open", "loop"), ("PI Kp 1, Ti 9", "plant")])
+def test_a_controller_is_asked_for_only_where_there_is_none(loop, key):
+    with pytest.raises(SpecError) as error, in_their_words({"loop": loop}):
+        raise SpecError.because("infinite-information", "it tells without end", "", "plant")
+    (told,) = error.value.diagnostics
+    assert told.key == key
+    assert ("let a controller hold" in told.hint) == (key == "loop")

@@ -97,7 +97,7 @@ def test_answers_come_from_a_file_and_from_options(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("plant: heater\ndrift: no\ntime: 1 h\nlimits: 1\n")
     expected = {"plant": "heater", "drift": "no", "time": "2 h", "limits": "1"}
-    assert read_answers(file, ["time=2 h"]) == expected
+    assert read_answers(file, ["time=2 h"]).texts == expected
     for wrong in (["tim=2 h"], ["2 h"]):
         with pytest.raises(SpecError) as caught:
             read_answers(file, wrong)

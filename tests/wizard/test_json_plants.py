@@ -1,0 +1,62 @@
+"""Plants in JSON: what is wrong is told in its words, and a pole at zero is known, not estimated."""
+
+import json
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec
+from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.wizard.composing import compose
+from inputdesign_cli.wizard.json_plants import system_of
+from tests.wizard.test_faults import GOOD
+
+_TANK = {"num": [4, 2], "den": [360, 2, 0], "delay": 25}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"num": [2], "den": [0, 0]}', "den of p.json is zero"),
+        ('{"num": [0], "den": [1, 1]}', "num of p.json is zero"),
+        ('{"num": [1, 2, 3], "den": [1, 1]}', "num of p.json has more entries than den"),
+        ("[1]", "it is no mapping in braces"),
+        ('{"num": [NaN], "den": [1, 1]}', "a number of num is not finite"),
+        ('{"num": [1], "den": [1, Infinity]}', "a number of den is not finite"),
+        ('{"den": [1, 1]}', "it has no num"),
+        ('{"num": [true], "den": [1, 1]}', "true in num is no number"),
+        ('{"num": [1], "den": [1, 1], "delay": "x"}', '"x" in delay is no number'),
+        ('{"num": [[1]], "den": [1, 1]}', "[1] in num is no number"),
+        ('{"num": 3, "den": [1, 1]}', "num is no list of numbers"),
+        ("[" * 100_000, "does not hold"),
+        ('{"num": [1], "den": [1, 1], "dealy": 25}', "it has dealy, too"),
+        ('{"num": [1], "den": [1, 1], "delay": null}', "null in delay is no number"),
+        ('{"num": [1], "den": [1, 1], "delay": NaN}', "a number of delay is not finite"),
+    ],
+)
+def test_what_is_wrong_is_told(tmp_path, text, words):
+    file = tmp_path / "p.json"
+    file.write_text(text)
+    with pytest.raises((SpecError, DataError)) as error:
+        system_of(file)
+    assert words in str(error.value)
+
+
+def test_an_integrator_is_known(tmp_path):
+    (tmp_path / "p.json").write_text(json.dumps(_TANK))
+    loop = "PI Kp 0.0005, Ti 3000"
+    draft = compose(GOOD | {"plant": "p.json", "loop": loop}, "s", tmp_path)
+    plant = parse_spec(draft.text, design=False).plant
+    assert plant.kind == "continuous"
+    assert {one.label for one in plant.named_parameters} == {"b1", "b0", "a1", "L"}
+    matrix = plant.continuous
+    s = 1j * np.array([1e-4, 1e-2, 1.0])
+    found = np.polyval(matrix.numerator_matrix[0][0], s) / np.polyval(matrix.denominator_matrix[0][0], s)
+    assert found == pytest.approx(np.polyval(_TANK["num"], s) / np.polyval(_TANK["den"], s), rel=1e-12)
+
+
+def test_a_zero_that_cancels_the_integrator_leaves_none(tmp_path):
+    for name, num, den in (("a", [2, 0], [180, 1, 0]), ("b", [2], [180, 1])):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"num": num, "den": den}))
+    one, other = (system_of(tmp_path / f"{name}.json") for name in "ab")
+    assert one.lines[1:] == other.lines[1:]
