@@ -4,8 +4,8 @@
 docs/data and judges its model.yaml by the second, by the functions of the command. Beside it stands the best
 ARX model of the first half, orders to 8 and delays to 8, that is chosen on that same second half; and what
 the same search reaches there where the first half alone chooses: by simulation of its last 40 %, by BIC, and
-the median of all. The column moves one input in each half, so that neither tells the other: its whole record
-is explored, blocks in turn.
+the median of all. The column moves one input in each half, so that neither tells the other: blocks of its
+record estimate and judge in turn, for `explore` and for the search.
 """
 
 import argparse
@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.identification.explore import fits
+from inputdesign_cli.identification.explore.joint import divided
 from inputdesign_cli.plant import PolynomialModel
 from inputdesign_cli.specification import load_spec
 from inputdesign_cli.tasks import explore
@@ -85,51 +86,57 @@ class Searched:
     median: float
 
 
-def least_squares(record, a: int, b: int, delay: int) -> tuple[PolynomialModel, float] | None:
-    """An ARX model of one output with its BIC, or None where the record is too short for it."""
-    u, y = record
+def least_squares(parts, a: int, b: int, delay: int) -> tuple[PolynomialModel, float] | None:
+    """An ARX model of one output with its BIC, or None where the records are too short for it."""
     begin = max(a, b + delay - 1)
-    rows = len(y) - begin
-    if rows <= a + b * u.shape[1] + 1:
+    inputs = parts[0][0].shape[1]
+    known, right = [], []
+    for u, y in parts:
+        rows = len(y) - begin
+        if rows <= 0:
+            return None
+        columns = [-y[begin - lag : len(y) - lag, 0] for lag in range(1, a + 1)]
+        for j in range(inputs):
+            columns += [u[begin - lag : len(u) - lag, j] for lag in range(delay, delay + b)]
+        known.append(np.stack([*columns, np.ones(rows)], 1))
+        right.append(y[begin:, 0])
+    known, right = np.concatenate(known), np.concatenate(right)
+    if len(right) <= known.shape[1]:
         return None
-    columns = [-y[begin - lag : len(y) - lag, 0] for lag in range(1, a + 1)]
-    for j in range(u.shape[1]):
-        columns += [u[begin - lag : len(u) - lag, j] for lag in range(delay, delay + b)]
-    known = np.stack([*columns, np.ones(rows)], 1)
-    theta = np.linalg.lstsq(known, y[begin:, 0], rcond=None)[0]
-    parts = np.split(theta[a:-1], u.shape[1])
-    if not all(np.any(part) for part in parts):
+    theta = np.linalg.lstsq(known, right, rcond=None)[0]
+    each = np.split(theta[a:-1], inputs)
+    if not all(np.any(part) for part in each):
         return None
     one = (np.ones(1),)
     model = PolynomialModel(
-        (tuple(np.concatenate([np.zeros(delay), part]) for part in parts),),
+        (tuple(np.concatenate([np.zeros(delay), part]) for part in each),),
         (np.concatenate([[1.0], theta[:a]]),),
-        ((np.ones(1),) * u.shape[1],),
+        ((np.ones(1),) * inputs,),
         one,
         one,
         np.eye(1),
     )
-    variance = np.mean((y[begin:, 0] - known @ theta) ** 2)
-    return model, rows * np.log(variance) + theta.size * np.log(rows)
+    variance = np.mean((right - known @ theta) ** 2)
+    return model, len(right) * np.log(variance) + theta.size * np.log(len(right))
 
 
 def brute_force(first, second) -> Searched:
-    """ARX models of one output that least squares finds on `first`, judged by `second`.
+    """ARX models of one output that least squares finds on the records `first`, judged by `second`.
 
     What is chosen by the largest of hundreds of fits on `second` has been lucky there; rules that see
     `first` alone tell what the search is worth to a user.
     """
-    u, y = first
-    at = int(SHARE * len(y))
-    begun, rest = (u[:at], y[:at]), (u[at:], y[at:])
+    cuts = [int(SHARE * len(y)) for _, y in first]
+    begun = [(u[:at], y[:at]) for (u, y), at in zip(first, cuts, strict=True)]
+    rest = [(u[at:], y[at:]) for (u, y), at in zip(first, cuts, strict=True)]
     found = []
     for orders in itertools.product(range(1, HIGHEST + 1), range(1, HIGHEST + 1), range(HIGHEST + 1)):
         whole, part = least_squares(first, *orders), least_squares(begun, *orders)
         if whole is None or part is None:
             continue
         # All are judged by the same samples, past what the longest of them needs to begin.
-        unseen = fits(part[0], [rest], 2 * HIGHEST).simulation[0]
-        found.append((fits(whole[0], [second]).simulation[0], unseen, -whole[1]))
+        unseen = fits(part[0], rest, 2 * HIGHEST).simulation[0]
+        found.append((fits(whole[0], second).simulation[0], unseen, -whole[1]))
     judged, unseen, criterion = np.nan_to_num(np.array(found).T, neginf=-1e9)
     return Searched(
         float(judged.max()),
@@ -149,34 +156,29 @@ def model_of(result, output: int) -> str:
 def compared(name: str) -> None:
     """Print the rows of one record."""
     files, columns, _ = RECORDS[name]
-    if name == "column":
-        started = time.perf_counter()
-        result = explore([DATA / file for file in files], Preparation(columns=columns)).results.result
-        seconds = time.perf_counter() - started
-        for i, fit in enumerate(result["validation"]["simulation_fit_percent"]):
-            print(
-                f"| {name} | y{i + 1} | {model_of(result, i)} | {fit:.1f} | | | | | | {seconds:.0f} |",
-                flush=True,
-            )
-        return
+    prepared = Preparation(columns=columns)
     with tempfile.TemporaryDirectory() as folder:
-        first, second = halves(name, Path(folder))
+        # Of the column the blocks that estimated stand for the first half, those that judged for the second.
+        paths = [DATA / file for file in files] if name == "column" else halves(name, Path(folder))
         started = time.perf_counter()
-        found = explore([first], Preparation(columns=columns))
+        found = explore(paths[:1], prepared)
         seconds = time.perf_counter() - started
-        model = Path(folder) / "model.yaml"
-        model.write_bytes(found.results.files["model.yaml"])
-        judged = explore(
-            [second], Preparation(columns=columns), model=load_spec(model, design=False)
-        ).results.result["validation"]["simulation_fit_percent"]
-        logs = [read_log(file, Preparation(columns=columns)) for file in (first, second)]
-        for i, fit in enumerate(judged if isinstance(judged, list) else [judged]):
-            best = brute_force(*[(log.u, log.y[:, i : i + 1]) for log in logs])
-            row = [name, f"y{i + 1}", model_of(found.results.result, i), f"{fit:.1f}", f"{best.best:.1f}"]
-            others = [f"{x:.1f}" for x in (best.by_rest, best.by_criterion, best.median)]
-            print(
-                "|", " | ".join([*row, f"{fit - best.best:+.1f}", *others, f"{seconds:.0f}"]), "|", flush=True
-            )
+        logs = [read_log(path, prepared) for path in paths]
+        parts = [[(log.u, log.y)] for log in logs]
+        validation = found.results.result["validation"]
+        if name == "column":
+            *parts, _ = divided(parts[0])
+        else:
+            model = Path(folder) / "model.yaml"
+            model.write_bytes(found.results.files["model.yaml"])
+            judged = explore(paths[1:], prepared, model=load_spec(model, design=False))
+            validation = judged.results.result["validation"]
+    fitted = validation["simulation_fit_percent"]
+    for i, fit in enumerate(fitted if isinstance(fitted, list) else [fitted]):
+        best = brute_force(*([(u, y[:, i : i + 1]) for u, y in some] for some in parts))
+        row = [name, f"y{i + 1}", model_of(found.results.result, i), f"{fit:.1f}", f"{best.best:.1f}"]
+        others = [f"{x:.1f}" for x in (best.by_rest, best.by_criterion, best.median)]
+        print("|", " | ".join([*row, f"{fit - best.best:+.1f}", *others, f"{seconds:.0f}"]), "|", flush=True)
 
 
 def long_record(rows: int) -> None:

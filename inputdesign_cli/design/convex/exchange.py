@@ -138,6 +138,11 @@ def exchange(
             if not solved and state.gap > goal and asked == tolerance:
                 asked *= _FINER
                 continue
+            if stalled and state.gap > goal and not state.dense:
+                # Of multipliers of very different sizes the dense method tells more digits.
+                state.dense = True
+                gaps.clear()
+                continue
             if not solved or state.gap <= goal or stalled:
                 break
             if done(state.best.objective, state.certificate.bound):

@@ -81,13 +81,18 @@ class FiniteSolution:
     converged: bool
 
 
-def solve_program(program: FiniteProgram, *, tolerance: float, rough: float) -> FiniteSolution | None:
+def solve_program(
+    program: FiniteProgram, *, tolerance: float, rough: float, dense: bool = False
+) -> FiniteSolution | None:
     """Solve to about the tolerance, a large program to the `rough` one; None when there is no point to show.
+
+    Args:
+        dense: take a small program for a large one.
 
     Raises:
         InaccurateError: `out-of-time`.
     """
-    if program.work > _LARGE:
+    if dense or program.work > _LARGE:
         found, error = by_interior(program, tolerance=rough)
         if error <= _STAYS * rough or (np.isfinite(error) and program.work > _MOST_WAITED_FOR):
             return found

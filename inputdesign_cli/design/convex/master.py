@@ -105,6 +105,7 @@ def solve_master(
     tolerance: float,
     rough: float = 0.0,
     keep: bool = False,
+    dense: bool = False,
 ) -> MasterSolution | None:
     """Solve one finite program; None when the solver has no point to show.
 
@@ -113,6 +114,7 @@ def solve_master(
         rough: a tolerance that will do where it saves many steps: those of a large program.
         keep: let any multiple of the best spectrum be added to the face, so that the program stays
             feasible where scaling up is no remedy.
+        dense: see `solve_program`.
     """
     ray = best.z[:, None] / problem.price.at(best.z) if keep else np.zeros((best.z.size, 0))
     several = not problem.scaled and len(problem.costs) > 1
@@ -152,7 +154,7 @@ def solve_master(
         size=problem.experiment.size,
     )
     exact = max(_SOLVER_MARGIN * tolerance, _SOLVER_FLOOR)
-    solution = solve_program(program, tolerance=exact, rough=max(_SOLVER_MARGIN * rough, exact))
+    solution = solve_program(program, tolerance=exact, rough=max(_SOLVER_MARGIN * rough, exact), dense=dense)
     if solution is None:
         return None
     y = worth * _in_cone(face, solution.v[:inside])

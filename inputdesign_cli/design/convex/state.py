@@ -54,6 +54,7 @@ class State:
     active: tuple[Place, ...] = ()
     proof: Proof | None = None
     solved: tuple[Face, Array] | None = None  # the face and y of the latest finite program
+    dense: bool = False  # see `finite.solve_program`
 
     @property
     def gap(self) -> float:
@@ -78,6 +79,7 @@ class State:
             tolerance=tolerance,
             rough=_SHARE_OF_GAP * min(self.gap, 1.0) if self.gap > _FAR_OFF else 0.0,
             keep=self.interior is not None,
+            dense=self.dense,
         )
         if answer is None:
             return False
