@@ -109,14 +109,14 @@ class _Candidates:
         values, power = self.generator.values(rng), self.generator.spectrum.power
         values = values * np.sqrt(power / _power(values))
         if self.generator.method == "slewed":
-            values = self._switched(values, rng)
+            values = self._switched(values, self._strongest, rng)
         factor, evaluator = self.generator.factor, self.evaluator
         designed = evaluator.target.designed or power
         if best is not None and best.met and self._free:
             held = np.repeat(values, self.limiter.settings.hold, axis=0)
             if evaluator.costs_more(held, (1.0 + best.extra_power) * designed):
                 return best
-        samples, met = self._levelled(values)
+        samples, met = self._levelled(values, rng, switched=best is None)
         return Record(
             samples,
             self.generator.method,
@@ -132,11 +132,18 @@ class _Candidates:
         stated = self.limiter.settings.level is not None
         return self.evaluator.target.meets and self.limiter.plain and not stated
 
-    def _switched(self, values: Array, rng: np.random.Generator) -> Array:
-        """The values (m, r) of two levels, switched at better times; what repeats stays so."""
+    @property
+    def _strongest(self) -> float:
+        """The highest level; where there is none, that of the design."""
+        return 1.0 if any(limits.reach is None for limits in self.limiter.inputs) else _FAR
+
+    def _switched(self, values: Array, level: float, rng: np.random.Generator) -> Array:
+        """The values (m, r) of two levels, switched at better times; what repeats stays so.
+
+        Args:
+            level: at which they are tried, where none is stated.
+        """
         limiter, evaluator, settings = self.limiter, self.evaluator, self.limiter.settings
-        # At the level that is stated, or the highest; where there is none, at that of the design.
-        level = 1.0 if any(limits.reach is None for limits in limiter.inputs) else _FAR
         if settings.level is not None:
             values, level = _of_peaks(values, settings.level), 1.0
 
@@ -147,8 +154,13 @@ class _Candidates:
         enough = 1.0 if evaluator.target.meets else None
         return np.tile(better_switching(period, figure, rng, _SWITCHINGS, enough), (settings.periods, 1))
 
-    def _levelled(self, values: Array) -> tuple[Array, bool]:
-        """The record at its level, and whether it does what is asked."""
+    def _levelled(self, values: Array, rng: np.random.Generator, *, switched: bool) -> tuple[Array, bool]:
+        """The record at its level, and whether it does what is asked.
+
+        Args:
+            switched: whether two levels that miss it, as high as they may be, are switched at other times
+                than the spectrum asks.
+        """
         limiter, settings, evaluator = self.limiter, self.limiter.settings, self.evaluator
         if settings.level is not None:
             samples = limiter.record(_of_peaks(values, settings.level), 1.0)
@@ -164,7 +176,10 @@ class _Candidates:
             return samples, True
         if settings.method in LEVELLED and evaluator.ratio(limiter.record(values, _FAR * level)) > MET:
             # More of the same levels is always better, and there is no more.
-            return self._affordable(values, _FAR * level), False
+            if settings.method == "binary" and switched:
+                values = self._switched(values, _FAR * level, rng)
+            if evaluator.figure(limiter.record(values, _FAR * level)) > 1.0:
+                return self._affordable(values, _FAR * level), False
         if not limiter.plain:
             values = self._lowered(values, level)
             level, met = first_level(lambda a: evaluator.figure(limiter.record(values, a)), 0.98 * level)

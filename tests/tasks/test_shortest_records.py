@@ -1,5 +1,6 @@
 """The shortest record within limits on single samples: solving at shorter lengths finds none that meets."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from unittest.mock import Mock
@@ -7,6 +8,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from scipy.signal import lfilter
 
 from inputdesign_cli import parse_spec, solve
 from inputdesign_cli.compute.time_limit import OutOfTimeError
@@ -158,3 +160,43 @@ def test_records_too_short_to_tell_do_not_end_the_search(start):
     found = Slow([48]).found(start, longest=20_000)
     assert found is not None
     assert 48 <= found <= 49
+
+
+def shortest_of_two_levels(b: float, pole: float, variance: float, relative: float, alpha: float) -> int:
+    """Of b q^-1 / (1 - pole q^-1), levels of one, from rest: all sequences of each length are looked at."""
+    w = np.linspace(0.0, np.pi, 400)
+    z = np.exp(-1j * w)
+    F = 1.0 - pole * z
+    gradients = np.stack([z / F, -b * z**2 / F**2]) / np.abs(b * z / F)
+    for samples in range(3, 16):
+        u = np.array([(1.0, *rest, 0.0) for rest in itertools.product((1.0, -1.0), repeat=samples - 2)])
+        of_b = lfilter([0.0, 1.0], [1.0, -pole], u)
+        of_f = lfilter([0.0, -b], [1.0, -pole], of_b)
+        psi = np.stack([of_b, of_f], axis=-1)
+        covariances = np.linalg.inv(psi.swapaxes(1, 2) @ psi / variance)
+        worst = np.zeros(len(u))
+        for gradient in gradients.T:
+            rows = np.stack([gradient.real, gradient.imag])
+            worst = np.maximum(worst, np.linalg.eigvalsh(rows @ covariances @ rows.T)[:, -1])
+        if alpha * np.sqrt(worst.min()) <= relative:
+            return samples
+    raise AssertionError
+
+
+@pytest.mark.parametrize("relative", [0.15, 0.2, 0.25])
+def test_two_levels_are_as_short_as_any_that_there_are(relative):
+    """Within a sample of the shortest of all sequences."""
+    text = f"""
+plant: {{B: [0, 1.0], F: [1, -0.7]}}
+noise: {{variance: 0.1}}
+accuracy: {{model_error: {{relative: {relative}, alpha: 2}}}}
+spectrum: {{type: multisine, lines: 50}}
+limits: {{amplitude: 1}}
+signal: {{type: binary, seed: 1}}
+solver: {{any_spectrum: false}}
+objective: shortest_experiment
+"""
+    found = solve(parse_spec(text)).result["signal"]
+    assert found["worst_ratio"] <= 1.0 + 1e-9
+    least = shortest_of_two_levels(1.0, 0.7, 0.1, relative, 2.0)
+    assert least <= found["samples"] <= least + 1
