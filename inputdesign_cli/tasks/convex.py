@@ -140,7 +140,9 @@ class ConvexTask:
             files = other_files(made.request, self.header.units, record)
         if done.design.result.x.any():
             taken = result.get("signal", {}).get("of_limits", {})
-            notes += [*made.notes, *record_notes(made.request, done.experiment.samples, record, taken)]
+            limited = any(limit.upper for limit in done.design.problem.limits)
+            notes += made.notes
+            notes += record_notes(made.request, done.experiment.samples, record, taken, of_powers=limited)
             if record is not None and known is not None:
                 notes += shortfall(done.design, record, known)
                 asked, step = done.problem.requirements, self.record.step

@@ -32,7 +32,7 @@ from inputdesign_cli.tasks.result.estimates import (
 from inputdesign_cli.tasks.result.faults import faults, loop_faults
 from inputdesign_cli.tasks.result.refutations import differences, refutations, repetitions
 from inputdesign_cli.tasks.result.rivals import beyond_errors, rival_entries, rival_notes, ruled_out_notes
-from inputdesign_cli.tasks.result.unrelated import answering, idle
+from inputdesign_cli.tasks.result.unrelated import answering, hardly_explained, idle
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,10 @@ def identification_results(task: Identification, found: Identified, started: flo
     elif found.preparation.levels:
         result["identification"]["operating_point"] = dict(found.preparation.levels)
     tables, curves = data_curves(header.units, found.data.u, found.data.y, estimate)
-    against = speaking_against(task, found)
+    against = [
+        *speaking_against(task, found),
+        *hardly_explained(header.units, found.model, estimate),
+    ]
     notes = identification_notes(found.data.notes, found.model, estimate, against)
     notes += differences(estimate, [name for name, _ in found.data.files])
     notes += prior_notes(estimate, stated=task.has_prior)

@@ -36,3 +36,24 @@ def test_explore_tells_the_line_that_it_took_away(tmp_path):
     assert len(told) == 1
     rises = float(told[0].split("rises by ")[1].split(" per min")[0])
     assert rises == pytest.approx(0.01, abs=3e-4)
+
+
+@pytest.mark.parametrize(("gain", "words"), [(0.3, "is seen, but noise and drift"), (0.0, "explain nothing")])
+def test_noise_that_wanders_farther_than_the_plant_does_not_hide_it(tmp_path, gain, words):
+    """The likelihood ratio of least squares on differences with the noise known: beyond chance, or not."""
+    rng = np.random.default_rng(11)
+    samples, deviation = 600, 0.3
+    u = np.repeat(rng.choice([-1.0, 1.0], samples // 10), 10)
+    walk = np.cumsum(deviation * rng.standard_normal(samples))
+    y = lfilter([0, gain], [1, -0.7], u) + walk
+    moves = np.diff(y)
+    caused = np.diff(lfilter([0, 1.0], [1, -0.7], u))
+    ratio = (caused @ moves) ** 2 / (caused @ caused) / deviation**2
+    assert (ratio > 50.0) == bool(gain)
+    data = tmp_path / "log.csv"
+    np.savetxt(data, np.column_stack([u, y]), delimiter=",", header="u,y", comments="")
+    text = "plant: {B: [0, 0.3], F: [1, -0.7]}\nnoise: {drift: true, variance: 0.09}\n"
+    found = tasks.identify(parse_spec(text, design=False), data).result
+    assert found["identification"]["fit_percent"] < 0.0
+    assert sum(words in note for note in found["notes"]) == 1
+    assert sum("explain nothing of y" in note or "is seen, but" in note for note in found["notes"]) == 1

@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 from inputdesign_cli import parse_spec
@@ -76,10 +77,20 @@ def test_only_coefficients_have_orders(kind):
     assert told == {**({physical: False} if physical else {}), tuple(sorted(orders)): True}
 
 
-def test_a_lag_more_is_written_as_it_is_said():
-    plant = """{parameters: {K: 2.1, T1: 180, T2: 9, L: 25}, sample: zoh,
-      continuous: {numerator: [K], denominator: [[T1, 1], [T2, 1]], delay: L}}"""
-    assert build_identification(parse_spec(f"plant: {plant}\n{SPEC}")).nominal.names == ("K", "T1", "T2", "L")
+@pytest.mark.parametrize("late", [", dead_time: 25", ", dead_time: 0", ""], ids=["late", "at once", "no key"])
+def test_a_lag_more_is_written_as_it_is_said(late):
+    """Written into the spec it is the same plant behind a lag, all of it to be estimated."""
+    plant = f"{{continuous: {{gain: 2.1, time_constant: 180{late}}}, sample: zoh}}"
+    spec, found = remedies(plant)
+    parameters, continuous = re.findall(r"plant\.\w+: (\{.*?\})(?= and plant| in place)", found["plant"])
+    more = f"plant: {{parameters: {parameters}, continuous: {continuous}, sample: zoh}}\n{SPEC}"
+    model, before = (build_identification(one).nominal for one in (parse_spec(more), spec))
+    assert model.names == ("K", "T1", "T2", *(("L",) if late == ", dead_time: 25" else ()))
+    w = np.array([1e-4, 1e-2, 0.1])
+    # A lag of 18 s where samples are 5 s apart: at low frequencies a delay of as much.
+    low = model.plant_at(w)[:, 0, 0] / before.plant_at(w)[:, 0, 0]
+    assert low[0] == pytest.approx(1.0 / (1.0 + 18.0j * w[0] / 5.0), rel=1e-6)
+    assert np.all(np.diff(np.abs(low)) < 0.0)
 
 
 def test_a_noise_that_drifts_is_not_told_to_drift():

@@ -24,6 +24,7 @@ from inputdesign_cli.accuracy.over_frequency import OverFrequency
 from inputdesign_cli.errors import SpecError
 from inputdesign_cli.information import Experiment
 from inputdesign_cli.plant import Model, Rational, ScalarTransfer
+from inputdesign_cli.runs.rounding import rounded_down, rounded_up
 from inputdesign_cli.specification import ModelError as StatedError, Spec
 from inputdesign_cli.specification.models.accuracy import DEFAULT_CONFIDENCE
 from inputdesign_cli.specification.models.controller import Controller
@@ -213,7 +214,7 @@ def _beside(at: float, lo: float, hi: float, unit: float) -> str:
     margin = 1e-2 * (hi - lo)
     left, right = (lo, at - margin), (at + margin, hi)
     edges = right if right[1] - right[0] >= left[1] - left[0] else left
-    return ", ".join(f"{edge / unit:.4g}" for edge in edges)
+    return f"{rounded_up(edges[0] / unit, 4)}, {rounded_down(edges[1] / unit, 4)}"
 
 
 def _check_fraction(spec: Spec, model: Model, entry: Entry | None) -> None:

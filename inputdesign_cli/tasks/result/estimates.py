@@ -110,7 +110,7 @@ def identification_notes(
 
     Args:
         model: the estimate as a model.
-        against: what its tests and the record say against it.
+        against: what its tests and the record say against it, and what the inputs do not explain.
     """
     notes, samples, predictor = list(of_the_data), len(estimate.errors), predictor_of(model)
     at_the_edge = [
@@ -126,14 +126,6 @@ def identification_notes(
             "count on noise that vanishes or never fades; take more data, or a lower order"
         )
     notes += against
-    unexplained = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
-    if unexplained:
-        single = len(estimate.noise) == 1
-        outputs = " and ".join("y" if single else f"y{i + 1}" for i in unexplained)
-        notes.append(
-            f"the inputs explain nothing of {outputs} in this model: see whether the columns are those of "
-            "the plant, in their order and their units, before anything is built on it"
-        )
     deviations = np.sqrt(np.diag(estimate.covariance))
     vague = [n for n, v, s in zip(estimate.names, estimate.theta, deviations, strict=True) if s > abs(v)]
     notes += vague_notes(model, vague)

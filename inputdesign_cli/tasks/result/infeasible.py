@@ -13,10 +13,11 @@ from inputdesign_cli.design.convex.feasible import UnreachableError
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.runs.rounding import rounded_up
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.spectrum import LinesBasis
 from inputdesign_cli.tasks.result.needed_factor import needed_factor
-from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound, named, rounded_up
+from inputdesign_cli.tasks.result.within_limits import Bought, StatedBound, named
 
 _TOLERANCE = 1e-5
 _ROOM = 1.0 + 1e-4  # so that what is asked is met with room to spare

@@ -21,13 +21,19 @@ _NO_RECORD = (
 
 
 def record_notes(
-    request: RecordRequest, experiment: int, record: Record | None, of_limits: Mapping[str, float]
+    request: RecordRequest,
+    experiment: int,
+    record: Record | None,
+    of_limits: Mapping[str, float],
+    *,
+    of_powers: bool = False,
 ) -> list[str]:
     """What a user should know before applying the record.
 
     Args:
         experiment: its samples.
         of_limits: the share of each limit on single samples that the record takes.
+        of_powers: whether powers are limited.
     """
     if record is None:
         too_long = request.length(experiment) > request.longest
@@ -39,11 +45,15 @@ def record_notes(
             "of the accuracy that it reaches: take more samples (signal.samples), or a model of lower order"
         )
     elif not record.met:
-        notes.append(
-            f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; the limits on the "
-            "powers, the level asked for or its length leave no room: a little more power or a few more "
-            "samples would do"
+        held = of_powers or bool(of_limits) or request.bounds.hard or request.settings.level is not None
+        why = (
+            "the limits on the powers, the level asked for or its length leave no room: a little more power "
+            "or a few more samples would do"
+            if held
+            else "no level of it would do, since too little of what it causes comes before its last sample: "
+            "take more samples"
         )
+        notes.append(f"the record misses the accuracy: its worst ratio is {record.worst_ratio:.7g}; {why}")
     if record.method != "given" and record.extra_power > _DEAR:
         notes.append(
             f"the record costs {1.0 + record.extra_power:.3g} times what the designed spectrum does: its "

@@ -8,6 +8,7 @@ from inputdesign_cli.plant import Model
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
+_SHARE = 0.1  # of the lag that is there: where the search for another one begins
 _LAG = "one more lag, [T2, 1] as another factor of the denominator (a list of factors) and T2 in parameters"
 
 
@@ -41,10 +42,7 @@ def vague_notes(model: Model, vague: Sequence[str]) -> list[str]:
 def _of_plant(plant: Mapping[str, Json]) -> str:
     stated = plant.get("continuous", {})
     if "gain" in stated:
-        return (
-            "write plant.continuous with numerator: [K], denominator: [[T1, 1], [T2, 1]] and all three in "
-            "parameters, in place of gain and time_constant"
-        )
+        return _lag_more(stated)
     if "state_space" in plant:
         return "give A, B and C of the state space one more state"
     if "parameters" not in plant:
@@ -54,6 +52,19 @@ def _of_plant(plant: Mapping[str, Json]) -> str:
     if "continuous" in plant:
         return f"give the numerator one more coefficient, or the denominator {_LAG}"
     return "give B or F (or A) one more coefficient, by a name in parameters"
+
+
+def _lag_more(stated: Mapping[str, Json]) -> str:
+    """Gain, time constant and dead time by names, and one more lag, to begin the search with."""
+    lag = stated["time_constant"]
+    values = {"K": stated["gain"], "T1": lag, "T2": _SHARE * lag, "L": stated.get("dead_time", 0.0)}
+    late = ", delay: L" if values["L"] else ""
+    listed = ", ".join(f"{name}: {value:.4g}" for name, value in values.items() if name != "L" or late)
+    keys = "gain, time_constant and dead_time" if late else "gain and time_constant"
+    return (
+        f"write plant.parameters: {{{listed}}} and plant.continuous: {{numerator: [K], denominator: "
+        f"[[T1, 1], [T2, 1]]{late}}} in place of {keys}"
+    )
 
 
 def _of_noise(model: Model, blocks: Mapping[str, Mapping[str, Json]]) -> dict[str, str]:

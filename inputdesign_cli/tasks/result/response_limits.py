@@ -9,8 +9,9 @@ import numpy as np
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.response import UnreachableError
 from inputdesign_cli.errors import Diagnostic, InfeasibleError
+from inputdesign_cli.runs.rounding import rounded_up
 from inputdesign_cli.runs.units import Units
-from inputdesign_cli.tasks.result.within_limits import named, rounded_up
+from inputdesign_cli.tasks.result.within_limits import named
 
 
 def unreachable(units: Units, error: UnreachableError, samples: int) -> InfeasibleError:

@@ -61,9 +61,32 @@ def idle(units: Units, nominal: Model, estimated: Model, estimate: Estimate) -> 
     return told
 
 
-def driven_by_nothing(model: Model, estimate: Estimate) -> list[int]:
-    """The outputs (from zero) of a model in units of samples whose row of G cannot be told from zero."""
-    w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi
+def hardly_explained(units: Units, model: Model, estimate: Estimate) -> list[str]:
+    """A sentence for outputs that are farther from the simulation than from their mean, and why they are."""
+    far = [i for i, fit in enumerate(estimate.fit) if fit is not None and fit < 0.0]
+    untold = driven_by_nothing(model, estimate, units.step) if far else []
+    sentences = (
+        "the inputs explain nothing of {} in this model: see whether the columns are those of the plant, in "
+        "their order and their units, before anything is built on it",
+        "what the inputs cause in {} is seen, but noise and drift move it more: simulated from the inputs "
+        "alone, the model is farther off than the mean",
+    )
+    told = []
+    for sentence, listed in zip(
+        sentences, ([i for i in far if i in untold], [i for i in far if i not in untold]), strict=True
+    ):
+        outputs = " and ".join("y" if len(estimate.noise) == 1 else f"y{i + 1}" for i in listed)
+        told += [sentence.format(outputs)] if listed else []
+    return told
+
+
+def driven_by_nothing(model: Model, estimate: Estimate, step: float = 1.0) -> list[int]:
+    """The outputs (from zero) of a model whose row of G cannot be told from zero.
+
+    Args:
+        step: between samples, in the unit of time of the model.
+    """
+    w = np.geomspace(_LEAST_FREQUENCY, 1.0, _FREQUENCIES) * np.pi / step
     with np.errstate(all="ignore"):
         gradient, G = model.plant_gradient(w), model.plant_at(w)
     found = []

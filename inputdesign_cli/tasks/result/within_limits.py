@@ -12,6 +12,7 @@ from inputdesign_cli.design.convex.exchange import ExchangeResult
 from inputdesign_cli.design.convex.limits import PowerLimit
 from inputdesign_cli.design.convex.problem import Problem
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.rounding import rounded_down, rounded_up
 from inputdesign_cli.runs.units import Units
 
 # A limit takes part in the conflict when its share of the proof's weight is above this.
@@ -155,15 +156,3 @@ def _entry(limit: PowerLimit, share: float) -> dict[str, Json]:
     if limit.channel is not None:
         entry["channel"] = limit.channel + 1
     return entry | {"max" if limit.upper else "min": limit.bound, "share": share}
-
-
-def rounded_up(value: float, digits: int = 6) -> str:
-    """So many digits, rounded up: what is printed suffices."""
-    unit = 10.0 ** (digits - 1 - int(np.floor(np.log10(value))))
-    return f"{np.ceil(value * unit * (1 - 1e-12)) / unit:.{digits}g}"
-
-
-def rounded_down(value: float, digits: int) -> str:
-    """So many digits, rounded down."""
-    unit = 10.0 ** (digits - 1 - int(np.floor(np.log10(value))))
-    return f"{np.floor(value * unit * (1 + 1e-12)) / unit:.{digits}g}"
