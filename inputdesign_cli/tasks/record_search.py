@@ -35,6 +35,7 @@ _WORDS = {
     "filtered_noise": "noise",
     "multisine": "a multisine",
     "binary": "a binary signal",
+    "ternary": "a signal of three levels",
     "slewed": "a signal of ramps between two levels",
 }
 
