@@ -18,7 +18,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import TICKDOWN, TICKLEFT
-from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import (
+    FuncFormatter,
+    LogFormatterSciNotation,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    NullLocator,
+)
 
 from inputdesign_cli.runs.results import Array
 
@@ -42,6 +49,9 @@ OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what 
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
 _LETTERS_PER_INCH, _BESIDE_LABEL = 12.0, 6
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
+
+# A logarithmic axis that ends below so many times its beginning has even steps.
+_EVEN, _STEPS = 8.0, 6
 
 DASHED = (0, (5, 2))
 DOTTED = (0, (1, 1.2))
@@ -182,10 +192,17 @@ def log_axes(axes: Axes, which: Literal["x", "y"], nonpositive: Literal["clip", 
 
 
 def plain_decades(axes: Axes, which: Literal["x", "y"]) -> None:
-    """Make one axis logarithmic over a few decades about one: 0.5, 1, 2, 5 in place of powers of ten."""
+    """Make one axis logarithmic over a few decades about one: 0.5, 1, 2, 5 in place of powers of ten.
+
+    Where that would leave one number or two, as over what is drawn so far, there are even steps.
+    """
     log_axes(axes, which)
     axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    low, high = axis.get_view_interval()
+    even = high < _EVEN * low
+    axis.set_major_locator(MaxNLocator(_STEPS, steps=[1, 2, 5]) if even else LogLocator(subs=(1.0, 2.0, 5.0)))
+    if even:
+        axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())
 
