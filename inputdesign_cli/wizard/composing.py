@@ -122,7 +122,7 @@ def compose(answers: Mapping[str, str], stem: str, folder: Path, plant: PlantAns
         *plant.lines,
     ]
     if plant.explored is None:
-        heads += noise_lines(said["noise"], said["drift"], folder)
+        heads += noise_lines(said["noise"], said["drift"], folder, step)
     else:
         heads[2:4] = []  # the included file has them
         heads += [f"# against this model: {one}" for one in plant.against]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from inputdesign_cli.plant.filtering import filtered
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.specification import Noise, Spec
-from inputdesign_cli.wizard.means import DRIFTING, at_rest, drifts, noise_level
-from inputdesign_cli.wizard.phrases import after, short
+from inputdesign_cli.wizard.means import DRIFTING, at_rest, drifts, names_resolution, noise_level
+from inputdesign_cli.wizard.phrases import short
 from inputdesign_cli.wizard.questions import AS_LOG
 
 _LONG = 100_000  # samples after which no pole that a log tells remembers anything
@@ -41,13 +41,13 @@ def log_noise_lines(explored: Spec, source: str, text: str, drift: str, folder: 
     moves = bool(np.any(told.drift))
     if text == AS_LOG and drifts(drift, otherwise=moves) == moves:
         return _as_told(told, source)
-    size, colour, comment = _level(text, folder, powers)
+    size, colour, comment = _level(text, folder, powers, explored.sample_time)
     variance: Json = float(f"{size:.6g}")
     wanted = drifts(drift, otherwise=moves)
     A = getattr(explored.plant, "A", None) or (1.0,)
     steady = not (wanted or moves or at_rest(text))
     gains = _gains(told, A, powers.size) if steady else np.ones(powers.size)
-    if after(text, "resolution") is not None and np.max(powers * gains) > size:
+    if names_resolution(text) and np.max(powers * gains) > size:
         variance, comment = np.asarray(told.variance).tolist(), f"of {source}: more than rounding leaves"
     elif np.any(gains > 1.0):
         own = (size / gains).tolist()
@@ -81,11 +81,11 @@ def _as_told(told: Noise, source: str) -> list[str]:
     return [f"noise:  # as {source} tells", f"  variance: {variance}", *_shape(told)]
 
 
-def _level(text: str, folder: Path, powers: NDArray[np.float64]) -> tuple[float, float, str]:
+def _level(text: str, folder: Path, powers: NDArray[np.float64], step: float) -> tuple[float, float, str]:
     """See `noise_level`; the largest variance of the log where that is to tell it."""
     if text == AS_LOG:
         return float(np.max(powers)), 0.0, "the variance that the log tells"
-    return noise_level(text, folder)
+    return noise_level(text, folder, step)
 
 
 def _shape(told: Noise) -> list[str]:

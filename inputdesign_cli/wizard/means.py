@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.wizard.faults import in_their_words
-from inputdesign_cli.wizard.phrases import NUMBER, after, after_if_named, needed, number, short
+from inputdesign_cli.wizard.phrases import NUMBER, PLUS_MINUS, Phrase, needed, seconds, short
 from inputdesign_cli.wizard.plant_answer import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer, file_of
 from inputdesign_cli.wizard.wishes import pid
@@ -18,6 +18,12 @@ _TYPES = {"any": "multisine", "multisine": "multisine", "two levels": "binary", 
 _MADE = {"multisine": "  # how samples are made of the spectrum: sinusoids as dense as the record allows"}
 _LEAST_BITS, _MOST_BITS = 2, 32
 DRIFTING = (1.0, -0.8)  # C of noise that drifts
+# A unit, which is not converted: "%", "bar", "degC", "m/s"; not a word of the phrases.
+_UNIT = r"(?:\s*(?!(?:to|around|about|at|by|and|up|over|per|within)\b)[^\s\d,;|+±-][^\s,;|]*)?"
+_MOVED = r"(?:\s*(?!(?:per|and)\b)[^\s\d,;|/]+)?"
+_PER = r"(?:\s*(?:per|/)\s*(s|sec|second|min|minute|h|hour)\b)?"
+_SPANS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # seconds, by the first letter
+_SAME_STEP = 0.01  # of rows and samples
 _WHITE = 3.0  # correlations above so many deviations of chance colour the noise
 
 
@@ -35,22 +41,24 @@ def input_range(text: str) -> Range:
     Raises:
         SpecError: `bad-answer`.
     """
-    ends = re.fullmatch(rf"(?:from\s*)?{NUMBER}\s*(?:to|\.\.)\s*{NUMBER}\s*\S{{0,3}}", text.strip(), re.I)
+    said = Phrase(text, "range")
+    ends = said.take(rf"^\s*(?:from\s*)?{NUMBER}{_UNIT}\s*(?:to\b|\.\.)\s*{NUMBER}{_UNIT}\s*$")
     if ends is not None:
-        low, high = float(ends.group(1)), float(ends.group(2))
+        low, high = float(ends[1]), float(ends[2])
         if not low < high:
             raise bad_answer("range", f"{low:g} is not below {high:g}")
         return Range(0.5 * (high - low), 0.5 * (low + high))
-    side = number(
-        rf"(?:plus/minus|plus or minus|\+/?-|±|by)?\s*{NUMBER}\s*\S{{0,3}}\s*(?:around|about|at)", text
-    )
-    if side is None:
-        side = number(rf"(?:plus/minus|plus or minus|\+/?-|±)\s*{NUMBER}", text)
+    about = said.take(rf"^\s*{NUMBER}{_UNIT}\s*{PLUS_MINUS}\s*{NUMBER}{_UNIT}\s*$")
+    if about is not None:
+        return Range(needed(float(about[2]), "range", "the amplitude"), float(about[1]))
+    middle = said.after_if_named("around|about|at", _UNIT)
+    side = said.number(rf"(?:{PLUS_MINUS}|\bby\b)\s*{NUMBER}{_UNIT}")
+    if side is None and middle is not None:
+        side = said.number(rf"{NUMBER}{_UNIT}")
     if side is None:
         raise bad_answer("range", f'"{text}" is no range')
-    return Range(
-        needed(side, "range", "the amplitude"), after_if_named(text, "around|about|at", "range") or 0.0
-    )
+    said.finish()
+    return Range(needed(side, "range", "the amplitude"), middle or 0.0)
 
 
 def limit_lines(span: Range, text: str, duration: float, step: float) -> list[str]:
@@ -59,9 +67,7 @@ def limit_lines(span: Range, text: str, duration: float, step: float) -> list[st
     Raises:
         SpecError: `bad-answer`.
     """
-    rate, output = (after_if_named(text, word, "limits") for word in ("rate", "output"))
-    if rate is None and output is None and text.lower() not in ("none", "no"):
-        raise bad_answer("limits", f'"{text}" is none of these')
+    rate, output = _limited(text)
     peak = short(span.amplitude)
     lines = ["limits:  # counted from the operating point"]
     if output is None:
@@ -76,14 +82,31 @@ def limit_lines(span: Range, text: str, duration: float, step: float) -> list[st
     return [*lines, f"  duration: {short(duration)}  # seconds"]
 
 
-def noise_lines(text: str, drift: str, folder: Path) -> list[str]:
+def _limited(text: str) -> tuple[float | None, float | None]:
+    """What the answer `limits` says of the rate, a second, and of the output."""
+    said = Phrase(text, "limits")
+    output = said.after_if_named("output", _UNIT)
+    found = said.take(rf"\brate\b\s*(?:of\s*)?{NUMBER}{_MOVED}{_PER}")
+    if found is None and said.take(r"\brate\b"):
+        raise bad_answer("limits", '"rate" has no number behind it')
+    if found is None and output is None and text.lower() not in ("none", "no"):
+        raise bad_answer("limits", f'"{text}" is none of these')
+    said.finish("none no")
+    rate = None if found is None else float(found[1]) / _SPANS[(found[2] or "s")[:1].lower()]
+    return rate, output
+
+
+def noise_lines(text: str, drift: str, folder: Path, step: float) -> list[str]:
     """The lines of `noise`.
+
+    Args:
+        step: seconds between samples.
 
     Raises:
         SpecError: `bad-answer`.
         DataError: a file cannot be used.
     """
-    size, colour, comment = noise_level(text, folder)
+    size, colour, comment = noise_level(text, folder, step)
     lines = ["noise:", f"  variance: {short(size)}  # {comment}"]
     if drifts(drift):
         return [*lines, "  drift: true  # an integrator in the noise", f"  C: {list(DRIFTING)}"]
@@ -110,8 +133,11 @@ def at_rest(text: str) -> bool:
     return text.partition(" ")[0].lower() == "rest"
 
 
-def noise_level(text: str, folder: Path) -> tuple[float, float, str]:
+def noise_level(text: str, folder: Path, step: float) -> tuple[float, float, str]:
     """The variance of white noise, or of what a pole (0 where there is none) colours, and how it is known.
+
+    Args:
+        step: seconds between samples.
 
     Raises:
         SpecError: `bad-answer`.
@@ -119,24 +145,48 @@ def noise_level(text: str, folder: Path) -> tuple[float, float, str]:
     """
     if at_rest(text):
         name = text.partition(" ")[2]
-        level, colour, comment = _at_rest(folder / name.strip())
+        level, colour, comment = _at_rest(folder / name.strip(), step)
         return level, colour, f"of {name.strip()}: {comment}"
-    deviation, step = after(text, "standard deviation|deviation|std"), after(text, "resolution")
+    said = Phrase(text, "noise")
+    deviation, rounding = said.after("standard deviation|deviation|std", _UNIT), _resolution(said)
+    if deviation is None and rounding is None:
+        raise bad_answer("noise", "it does not say a standard deviation or a resolution")
+    said.finish()
+    told, size = [], 0.0
     if deviation is not None:
-        size = needed(deviation, "noise", "the standard deviation")
-        return size**2, 0.0, f"standard deviation {short(size)}"
-    size = needed(step, "noise", "a standard deviation or a resolution")
-    told = f"rounding to {short(size)} has a variance of its square over 12: the least that noise can be"
-    return size**2 / 12.0, 0.0, told
+        size += needed(deviation, "noise", "the standard deviation") ** 2
+        told.append(f"standard deviation {short(deviation)}")
+    if rounding is not None:
+        size += needed(rounding, "noise", "the resolution") ** 2 / 12.0
+        least = "" if told else ": the least that noise can be"
+        told.append(f"rounding to {short(rounding)} has a variance of its square over 12{least}")
+    return size, 0.0, "; ".join(told)
 
 
-def _at_rest(path: Path) -> tuple[float, float, str]:
-    """Variance of the innovation, the pole of the noise (0 where it is white), and how that is known."""
+def _resolution(said: Phrase) -> float | None:
+    """The step of a sensor; of one with so many bits, from what it spans."""
+    bits = said.take(rf"\bresolution\b\s*(?:of\s*)?(\d+)\s*bits?\s*(?:up to|over|to|range)\s*{NUMBER}{_UNIT}")
+    if bits is None:
+        return said.after_if_named("resolution", _UNIT)
+    return needed(float(bits[2]), "noise", "its range") / 2.0 ** int(bits[1])
+
+
+def names_resolution(text: str) -> bool:
+    """Whether the answer `noise` says how a sensor rounds."""
+    return not at_rest(text) and re.search(r"\bresolution\b", text, re.I) is not None
+
+
+def _at_rest(path: Path, step: float) -> tuple[float, float, str]:
+    """Variance of the innovation, the pole of the noise (0 where it is white), and how that is known.
+
+    Rows that are farther apart than samples, or nearer, tell of noise with one pole: its correlation fades
+    by the same factor in the same time.
+    """
     from inputdesign_cli.tasks.build.tables import read_samples
 
     file_of("noise", path)
     with in_their_words({}, "noise"):
-        y = read_samples(path, {"y": "y"}, key="noise")["y"]
+        y, apart = read_samples(path, {"y": "y"}, key="noise")["y"], _seconds_apart(path) or step
     if y.size < 20:
         raise bad_answer("noise", f"{path.name} has {y.size} rows, and 20 are the least")
     v = y - y.mean()
@@ -144,10 +194,31 @@ def _at_rest(path: Path) -> tuple[float, float, str]:
     if power == 0.0:
         raise bad_answer("noise", f"y of {path.name} does not change; write the resolution of the sensor")
     rho = float(np.mean(v[1:] * v[:-1]) / power)
+    elsewhere = "" if abs(apart - step) <= _SAME_STEP * step else f", {short(apart)} s apart"
     if abs(rho) <= _WHITE / np.sqrt(y.size):
-        return power, 0.0, f"{y.size} samples, white as far as they tell"
-    rho = min(rho, 0.98)
-    return power * (1.0 - rho**2), rho, f"{y.size} samples, correlation {rho:.2g} from one to the next"
+        return power, 0.0, f"{y.size} samples{elsewhere}, white as far as they tell"
+    seen, rho = rho, min(rho, 0.98)
+    if elsewhere:
+        rho = min(max(rho, 0.0) ** (step / apart), 0.98)
+    return (
+        power * (1.0 - rho**2),
+        rho,
+        f"{y.size} samples{elsewhere}, correlation {seen:.2g} from one to the next",
+    )
+
+
+def _seconds_apart(path: Path) -> float | None:
+    """The time between the rows of a file, where a column tells it."""
+    from inputdesign_cli.tasks.build.columns import time_unit_in
+    from inputdesign_cli.tasks.build.files import read_sheet
+    from inputdesign_cli.tasks.build.tables import columns_of, is_dated, time_columns
+
+    sheet = read_sheet(path, key="noise")
+    for name in time_columns(sheet)[:1]:
+        unit = "s" if is_dated(sheet, name) else time_unit_in(sheet, name) or "s"
+        apart = float(np.median(np.diff(columns_of(sheet, {"time": name})["time"])))
+        return seconds(f"{apart!r} {unit}", "noise") if apart > 0.0 else None
+    return None
 
 
 def loop_line(text: str, plant: PlantAnswer) -> str | None:
@@ -162,7 +233,10 @@ def loop_line(text: str, plant: PlantAnswer) -> str | None:
         return None
     if plant.channels > 1:
         raise bad_answer("loop", f"the plant has {plant.channels} channels, and one PI has one: write open")
-    return f"{{pid: {pid(text, 'loop')}}}"
+    said = Phrase(text, "loop")
+    settings = pid(said, stated=True)
+    said.finish("PI PID controller")
+    return f"{{pid: {settings}}}"
 
 
 def signal_lines(kind: str, converter: str, span: Range, limits: str) -> list[str]:
@@ -177,15 +251,17 @@ def signal_lines(kind: str, converter: str, span: Range, limits: str) -> list[st
     if kind.lower() not in _TYPES:
         raise bad_answer("signals", f'"{kind}" is none of these')
     lines = ["signal:", f"  type: {_TYPES[kind.lower()]}{_MADE.get(_TYPES[kind.lower()], '')}", "  seed: 1"]
-    if after(limits, "output") is not None:
+    if _limited(limits)[1] is not None:
         lines.append("  candidates: 1  # it is fitted to the limit on the output at every plant")
     lines.append(f"  offset: {short(span.offset)}  # the operating point, added to signal.csv")
     if converter.lower() in ("no", "none"):
         return lines
-    bits = re.search(r"(?<![\w.+-])(\d+)\s*bits?", converter, re.I)
-    most = after(converter, "up to|over|to|range")
+    said = Phrase(converter, "converter")
+    bits = said.take(r"(?<![\w.+-])(\d+)\s*bits?\b")
+    most = said.after("up to|over|to|range", _UNIT)
     if bits is None or most is None:
         raise bad_answer("converter", f'"{converter}" is none of these')
+    said.finish()
     if not _LEAST_BITS <= int(bits.group(1)) <= _MOST_BITS:
         raise bad_answer("converter", f"converters have {_LEAST_BITS} to {_MOST_BITS} bits")
     return [

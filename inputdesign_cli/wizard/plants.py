@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,18 +12,19 @@ from inputdesign_cli.errors import IdesignError, SpecError
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.wizard.faults import in_their_words
 from inputdesign_cli.wizard.json_plants import system_of
-from inputdesign_cli.wizard.phrases import NUMBER, after, needed, seconds_after, share, short
+from inputdesign_cli.wizard.phrases import NUMBER, Phrase, needed, short
 from inputdesign_cli.wizard.plant_answer import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer, file_of
 
+_QUANTITIES = {"gain": "gain", "time_constant": "time constant", "dead_time": "dead time|delay"}
 _LEAST_ROWS = 10  # of a step response
 _NOISE_BLOCK = re.compile(r"^noise:\n(?:[ ]+.*\n)+", re.M)  # of a model.yaml
 _NOISES = ("noise: {variance: 1}", "noise: {variance: 1, drift: true, C: [1, -0.8]}")
 
 
-def _around(values: Mapping[str, float], part: float) -> dict[str, tuple[float, float]]:
-    ends = {name: (v * (1.0 - part), v * (1.0 + part)) for name, v in values.items()}
-    return {name: (min(pair), max(pair)) for name, pair in ends.items()}
+def _around(value: float, share: float) -> tuple[float, float]:
+    ends = (value * (1.0 - share), value * (1.0 + share))
+    return min(ends), max(ends)
 
 
 def _template(
@@ -34,7 +34,7 @@ def _template(
         tuple(lines.strip("\n").split("\n")),
         slow,
         late,
-        _around(values, 0.2),
+        {name: _around(value, 0.2) for name, value in values.items()},
         values,
         controller,
         tunable=controller is None and "natural_frequency" not in values and bool(values),
@@ -104,21 +104,32 @@ def understand_plant(text: str, stem: str, folder: Path) -> PlantAnswer:
 
 
 def _of_numbers(text: str) -> PlantAnswer:
-    for words in ("gain", "time constant", "dead time|delay"):
+    for words in _QUANTITIES.values():
         said = re.findall(rf"\b(?:{words})\b[^,;]*?{NUMBER}", text, re.I)
         if len(said) > 1:
             what = words.split("|")[0]
             raise bad_answer("plant", f"it says the {what} more than once: {' and '.join(said)}")
-    gain = after(text, "gain")
-    if not gain:
+    phrase = Phrase(text, "plant")
+    own: dict[str, float] = {}
+    values: dict[str, float] = {}
+    for name, words in _QUANTITIES.items():
+        found = phrase.known_within(words, name != "gain")
+        if found is not None:
+            values[name] = found[0]
+            own |= {} if found[1] is None else {name: found[1]}
+    part = phrase.share()
+    phrase.finish("known")
+    if not values.get("gain"):
         raise bad_answer("plant", "it does not say the gain, or says that it is zero")
-    slow = needed(seconds_after(text, "time constant", "plant"), "plant", "the time constant")
-    late = seconds_after(text, "dead time|delay", "plant") or 0.0
+    slow = needed(values.get("time_constant"), "plant", "the time constant")
+    late = values.get("dead_time", 0.0)
     if late < 0.0:
         raise bad_answer("plant", "the dead time is negative")
-    values = {"gain": gain, "time_constant": slow} | ({"dead_time": late} if late else {})
-    part = share(text)
-    if part is not None and not 0.0 < part < 0.9:
+    values = {name: value for name, value in values.items() if value}
+    if part is None and len(own) == 1 and list(own) == list(values)[-1:]:
+        part, own = own.popitem()[1], {}  # what stands at the end is said of all
+    shares = dict.fromkeys(values, part) | own if part is not None else own
+    if not all(0.0 < share < 0.9 for share in shares.values()):
         raise bad_answer("plant", "within must be more than 0 and less than 90 %")
     listed = ", ".join(f"{name}: {short(value)}" for name, value in values.items())
     lines = (
@@ -126,7 +137,8 @@ def _of_numbers(text: str) -> PlantAnswer:
         f"  continuous: {{{listed}}}",
         "  sample: zoh  # what a converter holds",
     )
-    return PlantAnswer(lines, slow, late, _around(values, part) if part else {}, values, tunable=True)
+    around = {name: _around(values[name], share) for name, share in shares.items()}
+    return PlantAnswer(lines, slow, late, around, values, tunable=True)
 
 
 def _stepped(path: Path, stem: str) -> PlantAnswer:

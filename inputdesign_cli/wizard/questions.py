@@ -33,7 +33,7 @@ QUESTIONS = (
     Question(
         "wish",
         "What is the model for?",
-        '"PI loop with 6 dB" (or PID; 45 degrees, gain margin 2); "own loop with 6 dB, Kp 1.5, Ti 180"; '
+        '"PI loop with 6 dB" (or PID; 29 degrees, gain margin 2); "own loop with 6 dB, Kp 1.5, Ti 180"; '
         '"prediction within 5 % up to 0.05"; "parameters within 5 %"; '
         '"Bode plot within 5 % from 0.001 to 0.05" (rad/s)',
     ),

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 
 from inputdesign_cli.specification.models.loop import MOST_DECIBELS
-from inputdesign_cli.wizard.phrases import NUMBER, after, needed, number, seconds_after, share, short
+from inputdesign_cli.wizard.phrases import NUMBER, Phrase, needed, short
 from inputdesign_cli.wizard.plant_answer import PlantAnswer
 from inputdesign_cli.wizard.questions import bad_answer
 
@@ -25,21 +24,24 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
     Raises:
         SpecError: `bad-answer`.
     """
-    if re.search(r"\bloop\b", text, re.I):
-        return _loop(text, plant, controlled)
-    part = share(text)
+    said = Phrase(text, "wish")
+    if said.take(r"\bloop\b"):
+        return _loop(said, plant, controlled)
+    part = said.share()
     if part is None or not 0.0 < part < 1.0:
         raise bad_answer("wish", "it does not say within how many per cent, between 0 and 100")
     per_cent = f"{100 * part:g} %"
-    if re.search(r"predict", text, re.I):
-        high = needed(after(text, "up to|to"), "wish", "up to which frequency (rad/s)")
+    if said.take(r"\bpredict\w*"):
+        high = needed(said.frequency_after("up to|to"), "wish", "up to which frequency (rad/s)")
+        said.finish()
         _below_nyquist(high, plant)
         low = min(2.0 * math.pi / duration, 0.1 * high)
         return [
             f"accuracy:  # G known within {per_cent}, from one period in the experiment to what you named",
             f"  model_error: {{relative: {short(part)}, band: [{short(low)}, {short(high)}]}}",
         ]
-    if re.search(r"parameter", text, re.I):
+    if said.take(r"\bparameters?\b"):
+        said.finish("physical")
         if not plant.values:
             raise bad_answer(
                 "wish", "this plant has no parameters with names; ask for a prediction or a Bode plot"
@@ -51,9 +53,10 @@ def wished(text: str, plant: PlantAnswer, controlled: bool, duration: float) -> 
             f"accuracy:  # {per_cent} is 1.96 standard deviations, so that 95 % of estimates are within it",
             f"  standard_deviation: {{{listed}}}",
         ]
-    if re.search(r"bode|frequency response", text, re.I):
-        low = needed(after(text, "from"), "wish", "from which frequency (rad/s)")
-        high = needed(after(text, "to"), "wish", "to which frequency (rad/s)")
+    if said.take(r"\b(?:bode(?: plot| diagram)?|frequency response)\b"):
+        low = needed(said.frequency_after("from"), "wish", "from which frequency (rad/s)")
+        high = needed(said.frequency_after("up to|to"), "wish", "to which frequency (rad/s)")
+        said.finish()
         if low >= high:
             raise bad_answer("wish", f"{low:g} is not below {high:g}")
         _below_nyquist(high, plant)
@@ -74,8 +77,8 @@ def _below_nyquist(high: float, plant: PlantAnswer) -> None:
         )
 
 
-def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
-    margin = _margin(text)
+def _loop(said: Phrase, plant: PlantAnswer, controlled: bool) -> list[str]:
+    margin = _margin(said)
     if plant.channels > 1:
         raise bad_answer(
             "wish",
@@ -83,15 +86,26 @@ def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
             'one output. Ask for "prediction within 10 % up to ..", or name the plant of one of its loops '
             '("gain .., time constant .., dead time ..")',
         )
-    if re.search(r"\bown\b", text, re.I):
-        return ["accuracy:", f"  loop: {{controller: {{pid: {pid(text, 'wish')}}}, {margin}}}"]
+    derivative = said.take(r"\bPID\b") is not None
+    own = said.take(r"\b(?:my\s+)?own\b|\bmy\b") is not None
+    settings = pid(said, stated=own)
+    if settings is not None:
+        said.finish("PI controller margin")
+        return ["accuracy:", f"  loop: {{controller: {{pid: {settings}}}, {margin}}}"]
     if plant.tunable:
-        rule = "{amigo: {type: pid}}" if re.search(r"\bpid\b", text, re.I) else "{simc: {}}"
-        named = "Astrom and Hagglund" if "amigo" in rule else "Skogestad, as fast as the dead time"
+        speed = None if derivative else said.seconds_after(r"(?:closed[- ]loop )?time constant|tau_c")
+        said.finish("PI controller margin")
+        simc = (
+            "{simc: {}}" if speed is None else f"{{simc: {{tau_c: {short(needed(speed, 'wish', 'tau_c'))}}}}}"
+        )
+        rule = "{amigo: {type: pid}}" if derivative else simc
+        pace = "as fast as the dead time" if speed is None else "as fast as you said"
+        named = "Astrom and Hagglund" if derivative else f"Skogestad, {pace}"
         return [
             "accuracy:  # the controller follows from the plant; all that the data leave keep the margin",
             f"  loop: {{tuning: {rule}, {margin}}}  # tuned by the rule of {named}",
         ]
+    said.finish("PI controller margin")
     if controlled:
         return ["accuracy:  # with the controller of the experiment", f"  loop: {{{margin}}}"]
     raise bad_answer(
@@ -101,33 +115,41 @@ def _loop(text: str, plant: PlantAnswer, controlled: bool) -> list[str]:
     )
 
 
-def _margin(text: str) -> str:
-    peak = number(rf"{_ALONE}{NUMBER}\s*dB", text)
+def _margin(said: Phrase) -> str:
+    factor = said.take(rf"\bgain margin\b\s*(?:of\s*)?{_ALONE}{NUMBER}(\s*dB\b)?")
+    if factor is not None:
+        size = 10.0 ** (float(factor[1]) / 20.0) if factor[2] else float(factor[1])
+        if not 1.0 < size < math.inf:
+            raise bad_answer(
+                "wish", f"a gain margin is a factor above one, or dB above zero, not {factor[1]}"
+            )
+        return f"gain_margin: {short(size)}"
+    peak = said.number(rf"{_ALONE}{NUMBER}\s*dB\b")
     if peak is not None:
         if peak > MOST_DECIBELS:
             raise bad_answer(
                 "wish", f"{peak:g} dB are no margin: 6 dB are usual, and {MOST_DECIBELS:g} the most"
             )
         return f"max_sensitivity_db: {short(needed(peak, 'wish', 'the margin in dB'))}"
-    degrees = number(rf"{_ALONE}{NUMBER}\s*(?:degrees|deg|°)", text)
+    said.take(r"\bphase margin\b")
+    degrees = said.number(rf"{_ALONE}{NUMBER}\s*(?:degrees\b|deg\b|°)")
     if degrees is not None:
         if not 0.0 < degrees < 60.0:
             raise bad_answer("wish", "a phase margin is between 0 and 60 degrees here")
         return f"phase_margin: {short(degrees)}"
-    factor = after(text, "gain margin")
-    if factor is not None and factor > 1.0:
-        return f"gain_margin: {short(factor)}"
-    raise bad_answer("wish", "it does not say the margin: 6 dB, 45 degrees or gain margin 2")
+    raise bad_answer("wish", "it does not say the margin: 6 dB, 29 degrees or gain margin 2")
 
 
-def pid(text: str, key: str) -> str:
-    """The settings "Kp 1, Ti 60, Td 5" as YAML."""
-    gain = after(text, "Kp")
+def pid(said: Phrase, *, stated: bool) -> str | None:
+    """The settings "Kp 1, Ti 60, Td 5" as YAML; None where there are none and none must be."""
+    gain = said.after("Kp")
+    times = {name: said.seconds_after(name) for name in ("Ti", "Td")}
     if not gain:
-        raise bad_answer(key, "it does not say Kp, as in Kp 1, Ti 60")
-    times = {name: seconds_after(text, name, key) for name in ("Ti", "Td")}
-    parts = [
-        f"Kp: {short(gain)}",
-        *(f"{n}: {short(needed(t, key, n))}" for n, t in times.items() if t is not None),
-    ]
+        if not stated and gain is None and not any(times.values()):
+            return None
+        raise bad_answer(said.key, "it does not say Kp, as in Kp 1, Ti 60")
+    parts = [f"Kp: {short(gain)}"]
+    for name, time in times.items():
+        if time is not None:
+            parts.append(f"{name}: {short(needed(time, said.key, name))}")
     return "{" + ", ".join(parts) + "}"

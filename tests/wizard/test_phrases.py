@@ -1,0 +1,124 @@
+"""Answers are read to their last word, in the units that they name."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from inputdesign_cli.errors import SpecError
+from inputdesign_cli.wizard.composing import compose
+from tests.wizard.test_wizard import ENGINEER
+
+PHRASES = {
+    "plant": [
+        "gain about 2, time constant about 180 s, dead time about 25 s, each within 30 %",
+        "gain 2 +- 10 %, time constant 3 min +- 20 %, dead time 25 s within 30 %",
+        "gain 2.1 degC/%, time constant 180",
+    ],
+    "wish": [
+        "PI loop with 6 dB",
+        "I want a PI loop with 6 dB of margin",
+        "PID loop with 29 degrees",
+        "PI loop with a phase margin of 29 degrees",
+        "PI loop with gain margin of 6 dB",
+        "PI loop with 6 dB and a closed-loop time constant of 100 s",
+        "my controller is Kp 0.5, Ti 60 in a loop with 6 dB",
+        "prediction within 5 % up to 0.005 Hz",
+        "parameters within 5 %",
+        "Bode plot within 5 % from 0.001 to 0.05 rad/s",
+    ],
+    "range": ["plus/minus 5 around 40", "40 +/- 5", "35 % to 45 %", "5 around 40", "plus/minus 5 %"],
+    "limits": ["none", "rate 0.5", "rate 30 %/min", "output 3 degC and rate 1 K/s"],
+    "noise": ["standard deviation 0.2 degC", "resolution 12 bits up to 100", "std 0.2 and resolution 0.5"],
+    "loop": ["open", "PI Kp 1, Ti 60", "PID Kp 1, Ti 1 min, Td 5"],
+    "converter": ["no", "12 bits up to 100 V"],
+}
+EVERY = [(key, text) for key, texts in PHRASES.items() for text in texts]
+
+
+def written(key, text, folder=Path()):
+    return compose({**ENGINEER, key: text}, "x", folder).text
+
+
+def entry(name, text):
+    """What stands behind a key of the spec, up to a comment."""
+    return re.search(rf"\b{name}: ([^#\n]*)", text)[1].strip()
+
+
+@pytest.mark.parametrize(("key", "text"), EVERY)
+def test_a_word_that_is_not_understood_is_told(key, text):
+    """But for one behind a number, which is its unit."""
+    written(key, text)
+    for more in (f"{text}, nonsense", f"nonsense {text}", f"{text}, Tf 20"):
+        with pytest.raises(SpecError) as caught:
+            written(key, more)
+        (found,) = caught.value.diagnostics
+        assert (found.code, found.key) == ("bad-answer", key)
+
+
+@pytest.mark.parametrize(
+    ("text", "shares"),
+    [
+        ("gain 2 +- 10 %, time constant 180 s +- 20 %, dead time 25 s within 30 %", (0.1, 0.2, 0.3)),
+        ("gain 2, time constant 180 s, dead time 25 s, each within 30 %", (0.3, 0.3, 0.3)),
+        ("gain 2, time constant 180 s, dead time 25 s within 30 %", (0.3, 0.3, 0.3)),
+        ("gain 2 +- 10 %, time constant 180 s, dead time 25 s", (0.1, None, None)),
+        ("gain 2 +- 10 %, time constant 180 s, dead time 25 s, each within 30 %", (0.1, 0.3, 0.3)),
+    ],
+)
+def test_each_quantity_is_known_as_well_as_is_said(text, shares):
+    spec = written("plant", text)
+    for (name, value), share in zip(
+        (("gain", 2.0), ("time_constant", 180.0), ("dead_time", 25.0)), shares, strict=True
+    ):
+        found = re.search(rf"^    {name}: \[(.*), (.*)\]$", spec, re.M)
+        assert (found is None) == (share is None)
+        if found is not None:
+            ends = [float(found[1]), float(found[2])]
+            assert ends == pytest.approx([value * (1 - share), value * (1 + share)])
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "name", "value"),
+    [
+        ("limits", "rate 3 per minute", "rate", 3 / 60 * 5),
+        ("limits", "rate 30 %/min", "rate", 30 / 60 * 5),
+        ("limits", "rate 0.5", "rate", 0.5 * 5),
+        ("range", "40 +/- 5", "offset", 40),
+        ("range", "35 % to 45 %", "offset", 40),
+        ("plant", "gain 2, time constant 3 min", "time_constant", 180),
+        ("wish", "PI loop with gain margin of 10 dB", "gain_margin", 10**0.5),
+        ("noise", "resolution 12 bits up to 100", "variance", (100 / 4096) ** 2 / 12),
+        ("noise", "standard deviation 0.2 and resolution 0.5", "variance", 0.04 + 0.25 / 12),
+    ],
+)
+def test_units_are_those_that_are_named(key, text, name, value):
+    found = re.match(r"[-+.\de]+", entry(name, written(key, text)))
+    assert float(found[0]) == pytest.approx(value, rel=1e-5)
+
+
+def test_hertz_are_no_radians():
+    low, high = re.findall(r"[\d.]+", entry("band", written("wish", "prediction within 5 % up to 0.005 Hz")))
+    assert (float(low), float(high)) == pytest.approx((2 * np.pi / 3600, 0.005 * 2 * np.pi), rel=1e-4)
+
+
+@pytest.mark.parametrize("text", ["gain 2,5, time constant 180", "gain 2, time constant 2,5 min"])
+def test_a_decimal_comma_is_no_separator(text):
+    with pytest.raises(SpecError, match="number with a comma"):
+        written("plant", text)
+
+
+@pytest.mark.parametrize(("every", "head"), [(1, "time_s"), (20, "time_s"), (20, "time_min")])
+def test_noise_at_rest_has_its_own_sample_time(tmp_path, every, head):
+    """Noise with one pole, 0.9 over the five seconds of a sample, logged at another pace."""
+    pole = 0.9**0.2
+    white = np.random.default_rng(5).standard_normal(200_000)
+    seen = lfilter([0.2 * np.sqrt(1 - pole**2)], [1, -pole], white)[1000::every][:9000]
+    rows = np.column_stack([np.arange(len(seen)) * every / (60 if "min" in head else 1), seen])
+    np.savetxt(tmp_path / "rest.csv", rows, delimiter=",", header=f"{head},y", comments="")
+    spec = written("noise", "rest rest.csv", tmp_path)
+    found = -float(entry("D", spec).strip("[]").split(",")[1])
+    assert found == pytest.approx(0.9, abs=0.03)
+    assert float(entry("variance", spec)) == pytest.approx(0.04 * (1 - 0.81), rel=0.3)
