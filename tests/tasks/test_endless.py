@@ -160,20 +160,26 @@ def test_a_zero_on_the_circle_hides_power_from_the_output(rest, code):
         assert refused(OPEN + rest) == code
 
 
-def test_a_pole_inside_the_band_is_found():
-    text = """
+INSIDE = """
 plant: {B: [0, 1], A: [1, -0.5, 1]}
 noise: {variance: 0.1}
 experiment: {samples: 500, controller: {numerator: [-0.2, -0.1], denominator: [1]}}
 objective: best_accuracy
-accuracy: {criterion: D}
 limits: {input_power: 1}
-spectrum: {type: free}
 signal: {samples: 100, seed: 1, candidates: 1}
 """
-    assert refused(text) == "needs-limits"
-    found = solve(parse_spec(text, overrides=["limits.band=[1.35, 3.14159]"])).result
-    assert found["status"] == "optimal"
+
+
+@pytest.mark.parametrize("criterion", "DAET")
+def test_a_pole_inside_the_band_is_found(criterion):
+    text = f"{INSIDE}accuracy: {{criterion: {criterion}}}\n"
+    assert refused(text, "spectrum={type: free}") == "needs-limits"
+    on_it = f"spectrum={{type: multisine, frequencies: [0.4, {float(np.arccos(0.25))!r}, 2.0]}}"
+    assert refused(text, on_it) == "needs-limits"
+    fir = solve(parse_spec(text, overrides=["spectrum={type: fir, order: 2}"])).result
+    assert "any_spectrum_bound" not in fir["objective"]
+    beside = ["spectrum={type: free}", "limits.band=[1.35, 3.14159]"]
+    assert solve(parse_spec(text, overrides=beside)).result["status"] == "optimal"
 
 
 GAIN = """

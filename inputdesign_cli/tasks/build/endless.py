@@ -29,25 +29,31 @@ def check_reach(spec: Spec, question: Question) -> Reach:
     places = " and ".join(units.named(w) for w in found.frequencies)
     free = f"excitation at {places} takes nothing of what is {_counted(question)} and tells of the parameters"
     others, band = _others(spec, question), _band(spec, question, found)
-    if found.endless and found.reached:
+    lo, hi = question.experiment.band
+    off = 2.0 * _OFF * hi
+    ends = [any(abs(w - end) < off for w in found.frequencies) for end in (lo, hi)]
+    # Lines are kept off an end; a place inside the band they close in on from both sides.
+    inside = question.goal == "factor" and any(lo + off <= w <= hi - off for w in found.frequencies)
+    on_it = question.goal == "factor" and found.reached and not question.basis.free
+    outcome = (
+        _OUTCOMES[question.goal] if found.endless else "the best is approached with power ever nearer to it"
+    )
+    if found.reached and (found.endless or inside or on_it):
         section = "cost" if question.goal == "cost" else "limits"
         add = "give a weight, however small, to" if section == "cost" else "add"
         beside = f"leave it out by {band}" if question.basis.free else "choose lines beside it"
         raise spec.complain(
             "no-cost" if question.goal == "cost" else "needs-limits",
-            f"{free}: {_OUTCOMES[question.goal]}, and no spectrum is the best",
+            f"{free}: {outcome}, and no spectrum is the best",
             hint=f"{add} {others}; or {beside}",
             key=section,
         )
-    if found.endless:
+    if found.endless or inside:
         return Reach(
             bounded=False,
             note="the design is the best of its spectrum type, and there is no bound over every spectrum: "
-            f"{free}, so that {_OUTCOMES[question.goal]}; with {others} there is one",
+            f"{free}, so that {outcome}; with {others} there is one",
         )
-    lo, hi = question.experiment.band
-    off = 2.0 * _OFF * hi
-    ends = [any(abs(w - end) < off for w in found.frequencies) for end in (lo, hi)]
     inner = (lo + ends[0] * _OFF * hi, hi - ends[1] * _OFF * hi)
     if not question.basis.free:
         return Reach(attained=False, band=inner)
