@@ -59,7 +59,7 @@ def illustration_1(folder: Path) -> None:
     idesign("identify", str(initial), "--spec", spec, "-o", str(folder / "initial"))
     blocks = (folder / "initial" / "model.yaml").read_text(encoding="utf-8").split("\n# Covariance")[0]
     rest = (SPECS / "first_order.yaml").read_text(encoding="utf-8").splitlines()
-    kept = [line for line in rest if not line.startswith(("plant:", "noise:"))]
+    kept = [line for line in rest if not line.startswith(("sample_time:", "plant:", "noise:"))]
     designed = folder / "first_order.yaml"
     designed.write_text("\n".join([*kept, blocks]), encoding="utf-8")
     idesign("solve", str(designed), "-o", str(folder / "design"))

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from inputdesign_cli.campaign.acceptance import accepted
-from inputdesign_cli.campaign.memory import VERSION, Memory, digests
+from inputdesign_cli.campaign.memory import VERSION, Memory
 from inputdesign_cli.campaign.pictures import history
+from inputdesign_cli.campaign.unchanged import digests
 from inputdesign_cli.errors import DataError, Diagnostic
 from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
@@ -269,7 +270,7 @@ def _decided(
     more |= {"rounds": [*campaign["rounds"], entry], "state": decision.state}
     # Those of records stay: one that is withdrawn may not be what it was. Plans may be made anew.
     kept = {name: digest for name, digest in campaign.get("digests", {}).items() if name.startswith("record")}
-    more["digests"] = digests(files) | kept
+    more["digests"] = digests(more, files) | kept
     tables["rounds"], progress = history(more["rounds"], decision.rules.end)
     curves |= progress
     notes = [*decision.notes, *result.get("notes", [])]

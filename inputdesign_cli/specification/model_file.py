@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import isclose
+
 from pydantic import ValidationError
 
 from inputdesign_cli.errors import SpecError
@@ -10,14 +13,19 @@ from inputdesign_cli.specification.models.pydantic_errors import translate
 from inputdesign_cli.specification.models.spec import Spec
 from inputdesign_cli.specification.yaml.files import read_text
 from inputdesign_cli.specification.yaml.places import format_key
+from inputdesign_cli.specification.yaml.plain import Plain
 from inputdesign_cli.specification.yaml.reader import read
+
+# Sample times that only the digits of a text tell apart.
+_SAME = 1e-6
 
 
 def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
     """The block `estimate` of a file that the spec names at `key`; nothing else of the file is shown.
 
     Raises:
-        SpecError: `bad-model-file`; what is wrong with the file itself.
+        SpecError: `bad-model-file`; `wrong-estimate`, its data were sampled otherwise than the spec says;
+            what is wrong with the file itself.
     """
     try:
         text = read_text(spec.resolve_path(name))
@@ -30,7 +38,7 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
         data = read(text, name).data
         block = data.get("estimate") if isinstance(data, dict) else None
         try:
-            return Estimated.model_validate(block)
+            estimated = Estimated.model_validate(block)
         except ValidationError as error:
             first = translate(error, block, Estimated)[0]
             said = f" ({first.code} at {format_key(['estimate', *first.path])})"
@@ -43,3 +51,22 @@ def load_estimate(spec: Spec, name: str, key: str) -> Estimated:
             "covariance that is positive definite",
             key=key,
         ) from error
+    _check_clock(spec, name, data, key)
+    return estimated
+
+
+def _check_clock(spec: Spec, name: str, data: Mapping[str, Plain], key: str) -> None:
+    """Raise `SpecError` (`wrong-estimate`) where the file tells another sample time than the spec."""
+    step, unit = data.get("sample_time"), data.get("time_unit", spec.time_unit)
+    if not isinstance(step, int | float):  # as of files that were written before they told it
+        return
+    if unit == spec.time_unit and isclose(step, spec.sample_time, rel_tol=_SAME):
+        return
+    raise spec.complain(
+        "wrong-estimate",
+        f"{name} is an estimate from samples {step:g} {unit} apart, and sample_time is {spec.sample_time:g} "
+        f"{spec.time_unit} here",
+        hint=f"write sample_time: {step!r} and time_unit: {unit}, or take both with plant and noise by "
+        f"include: {name}; what does not depend on the sampling may stand here in numbers",
+        key=key,
+    )

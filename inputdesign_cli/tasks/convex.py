@@ -38,6 +38,7 @@ from inputdesign_cli.tasks.result.design import Designed, design_result
 from inputdesign_cli.tasks.result.ellipses import Pairs, experiment_ellipses
 from inputdesign_cli.tasks.result.infeasible import explain
 from inputdesign_cli.tasks.result.nyquist import nyquist_curves
+from inputdesign_cli.tasks.result.reach import Reach
 from inputdesign_cli.tasks.result.record_notes import record_notes, shortfall
 from inputdesign_cli.tasks.result.robust import robust_result
 from inputdesign_cli.tasks.result.signal import other_files, signal_curves, signal_entry
@@ -78,6 +79,7 @@ class ConvexTask:
     unstated: Sequence[ModelError]
     stated: Sequence[StatedBound]
     simulation: Simulation
+    reach: Reach
     foresight: Foresight | None = None
 
     def solve(self) -> Results:
@@ -109,12 +111,14 @@ class ConvexTask:
             result["spectrum"] |= {"factor_columns": self.columns.columns}
         self._check_length(result)
         solved = time.perf_counter()
-        audit(done, result, on_grid=self.grid is not None)
+        loose = 0.0 if self.reach.attained else self.tolerance
+        audit(done, result, on_grid=self.grid is not None, loose=loose)
         checked = time.perf_counter()
         if "ended_by" in how:
             notes = unfinished_notes(result)
         else:
-            notes = [] if done.design.any_spectrum else [no_other_spectra()]
+            notes = [] if done.design.any_spectrum or self.reach.note else [no_other_spectra()]
+        notes += [self.reach.note] if self.reach.note else []
         try:
             made = fitting_record(self.record, done.question, done.design, done.experiment.samples)
             if self.exact is not None:

@@ -107,14 +107,8 @@ def explore(paths: Sequence[Path], preparation: Preparation) -> Exploration:
         "exploration": exploration_entry(log, found, loops, reasons),
         "validation": validation_entry(found.validation),
     }
-    head = f"sample_time: {log.step!r}\ntime_unit: {log.time_unit}\n".encode()
-    files = {**results.files, "model.yaml": head + results.files["model.yaml"]}
     complete = replace(
-        results,
-        result=result,
-        resolved_spec=text,
-        curves={**results.curves, **structure_curves(found)},
-        files=files,
+        results, result=result, resolved_spec=text, curves={**results.curves, **structure_curves(found)}
     )
     against = tuple(refutations(found.model, found.estimate))
     return Exploration(

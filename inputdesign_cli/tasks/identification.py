@@ -216,7 +216,7 @@ def identification_results(task: Identification, found: Identified, started: flo
     if notes:
         result["notes"] = notes
     result["timing_s"] = {"identification": time.perf_counter() - started}
-    files = {"model.yaml": model_text(found.model, estimate).encode()}
+    files = {"model.yaml": model_text(header.units, found.model, estimate).encode()}
     return Results(result, header.resolved_spec, header.units.time_unit, tables, curves, files)
 
 

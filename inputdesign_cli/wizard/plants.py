@@ -250,5 +250,5 @@ def _first_order(path: Path, explored: Spec) -> bytes | None:
         except IdesignError:
             continue
         if not found.result["identification"]["failed"]:
-            return clock.encode() + found.files["model.yaml"]
+            return found.files["model.yaml"]
     return None

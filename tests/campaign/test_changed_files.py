@@ -119,3 +119,73 @@ def test_a_record_that_is_gone_is_to_be_put_back(run, begun, tmp_path):
     code, _, err = run("next", "c")
     assert (code, "run-incomplete" in err, "put it back" in err) == (2, True, True)
     assert "run the spec again" not in err
+
+
+def appended(path):
+    path.write_bytes(path.read_bytes() + b"\n")
+
+
+def asked_less(path):
+    path.write_text(path.read_text().replace("0.05", "0.5"))
+
+
+def decided_otherwise(path):
+    result = json.loads(path.read_text())
+    result["campaign"]["rounds"][-1]["worst_ratio"] = 0.5
+    path.write_text(json.dumps(result))
+
+
+DECIDING = {
+    "spec.yaml": asked_less,
+    "signal.csv": lambda path: path.write_text(path.read_text() + "999,3\n"),
+    "plan_01.csv": appended,
+    "plan_02.csv": appended,
+    "record_01.csv": appended,
+    "result.json": decided_otherwise,
+}
+
+
+def test_every_file_that_decides_is_known_by_its_digest(run, begun, tmp_path):
+    """Each of the directory is changed in turn; the others are pictures, estimates and copies."""
+    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
+    record = applied(begun, tmp_path / "r2.csv")
+    told = set()
+    for path in sorted(begun.iterdir()):
+        kept = path.read_bytes()
+        DECIDING.get(path.name, appended)(path)
+        code, _, err = run("status", "c")
+        if code:
+            told.add(path.name)
+            assert "campaign-changed" in err
+            assert f"c/{path.name}" in err
+            assert "put it back" in err
+            changed = (begun / "result.json").read_bytes()
+            assert run("next", "c", record, "--no-figures")[0] == 2
+            assert (begun / "result.json").read_bytes() == changed
+        path.write_bytes(kept)
+    assert told == set(DECIDING)
+    assert run("next", "c", record, "--no-figures")[0] == 0
+
+
+def test_what_is_told_of_a_changed_signal_mends_it(run, begun, tmp_path):
+    appended(begun / "signal.csv")
+    assert "plan_01.csv beside it holds the same samples" in run("status", "c")[2]
+    (begun / "signal.csv").write_bytes((begun / "plan_01.csv").read_bytes())
+    assert run("status", "c")[0] == 0
+
+
+def test_where_the_result_is_gone_the_records_are_not_given_up(run, begun, tmp_path):
+    assert run("next", "c", applied(begun, tmp_path / "r1.csv"), "--no-figures")[0] == 0
+    record, kept = applied(begun, tmp_path / "r2.csv"), (begun / "result.json").read_bytes()
+    (begun / "result.json").unlink()
+    for command in (("next", "c", record), ("next", "c"), ("status", "c")):
+        code, _, err = run(*command)
+        assert (code, "run-missing" in err) == (2, True)
+        assert "put it back from a copy" in err
+        assert "idesign identify" in err
+        assert "solve SPEC" not in err
+    (begun / "result.json").write_bytes(kept)
+    assert run("next", "c", record, "--no-figures")[0] == 0
+    told = run("next", "nowhere", record)[2]
+    assert "run-missing" in told
+    assert "idesign campaign SPEC" in told

@@ -130,9 +130,11 @@ def _begins_flat(basis: Basis) -> bool:
 
 
 def _anywhere(question: Question, problem: Problem, powers: Array) -> Problem:
-    experiment = question.experiment
+    experiment = problem.experiment
+    if question.anywhere is not None:
+        experiment = replace(experiment, band=question.anywhere)
     lines = LinesBasis.anywhere(*experiment.band, experiment.inputs).in_units(np.sqrt(powers))
-    return replace(problem, basis=lines, densities=(), finer=None)
+    return replace(problem, experiment=experiment, basis=lines, densities=(), finer=None)
 
 
 def _stopped(design: Design) -> OutOfTimeError:

@@ -34,7 +34,8 @@ class Question:
 
     `goal_requirements` are what the goal "factor" improves on (a criterion, or all requirements);
     `side` must hold besides. The other goals meet all of them. All of that is asked of the nominal plant,
-    that of `experiment`, and of each of the `others`; `paid` as in `Problem`.
+    that of `experiment`, and of each of the `others`; `paid` as in `Problem`. `anywhere` is the band of every
+    spectrum, where the best is only approached at an end of that of the experiment.
     """
 
     experiment: Experiment
@@ -47,6 +48,7 @@ class Question:
     densities: Sequence[DensityLimit] = ()
     others: Sequence[Alternative] = ()
     paid: Paid = "nominal"
+    anywhere: tuple[float, float] | None = None
 
     @property
     def plants(self) -> list[Alternative]:

@@ -14,6 +14,8 @@ from inputdesign_cli.specification.yaml.reader import Tree, read
 KEY = "include"
 # These describe one thing: what two files say of it cannot be put together.
 _WHOLE = ("plant", "noise")
+# What is estimated holds at its own sample time only: two files may say the same one.
+_CLOCK = ("sample_time", "time_unit")
 
 
 def apply_includes(tree: Tree, folder: FilePath, *, known: Collection[str], confine: FilePath | None) -> None:
@@ -78,12 +80,19 @@ def _join(tree: Tree, included: Tree, path: Path, value: Plain) -> None:
     elif len(path) == 1 and key not in _WHOLE and isinstance(holder[key], dict) and isinstance(value, dict):
         for inner, item in value.items():
             _join(tree, included, (*path, inner), item)
-    else:
+    elif not (key in _CLOCK and holder[key] == value):
         mark = included.places.mark(path, at_key=True)
         where = tree.places.location(mark)
         place = f"{where.file}, line {where.line}" if where else "the included file"
+        message = f"{{key}} stands here and in {place}"
         hint = "remove one of them: the spec and what it includes are put together"
-        tree.diagnostics.extend(_error(tree, path, f"{{key}} stands here and in {place}", hint).diagnostics)
+        if key in _CLOCK:
+            message = f"{{key}} is {holder[key]} here and {value} in {place}"
+            hint = (
+                f"remove {key} here: what a file includes holds at the sample time of its data; to sample "
+                "otherwise, write plant and noise here"
+            )
+        tree.diagnostics.extend(_error(tree, path, message, hint).diagnostics)
         tree.broken.add(path)
 
 

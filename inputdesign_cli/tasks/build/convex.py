@@ -11,8 +11,9 @@ from inputdesign_cli.runs.results import Result
 from inputdesign_cli.signal.settings import FROM_LEVELS
 from inputdesign_cli.specification import Spec
 from inputdesign_cli.specification.models.uncertainty import Uncertainty
-from inputdesign_cli.spectrum import Basis, PolynomialBasis
+from inputdesign_cli.spectrum import Basis, LinesBasis, PolynomialBasis
 from inputdesign_cli.tasks.build.demand import check_design
+from inputdesign_cli.tasks.build.endless import check_reach
 from inputdesign_cli.tasks.build.foresight import build_foresight
 from inputdesign_cli.tasks.build.free_directions import check_every_direction_counts
 from inputdesign_cli.tasks.build.header import build_header
@@ -65,6 +66,13 @@ def build_convex(spec: Spec) -> ConvexTask:
         paid="nominal" if plants is None else plants.paid,
     )
     check_every_direction_counts(spec, question)
+    reach, solver = check_reach(spec, question), spec.solver
+    if reach.band is not None:
+        question = _approaching(question, reach.band)
+    # What no spectrum attains is proved as what every spectrum reaches.
+    loose = basis.free and goal == "factor" and not reach.attained
+    tolerance = max(solver.tolerance, solver.any_spectrum_tolerance) if loose else solver.tolerance
+    bounded = solver.any_spectrum and reach.bounded
     alpha, calibration = model_error_alpha(spec, experiment.model), build_calibration(spec)
     return ConvexTask(
         header=build_header(spec),
@@ -75,8 +83,9 @@ def build_convex(spec: Spec) -> ConvexTask:
         exact=None
         if calibration is None
         else ExactConfidence(calibration, alpha, question, build_simulator(spec, experiment)),
-        tolerance=spec.solver.tolerance,
-        any_spectrum_tolerance=spec.solver.any_spectrum_tolerance if spec.solver.any_spectrum else None,
+        tolerance=tolerance,
+        any_spectrum_tolerance=solver.any_spectrum_tolerance if bounded else None,
+        reach=reach,
         most_samples=spec.limits.samples,
         plants=plants,
         ellipses=spec.report.ellipses,
@@ -88,6 +97,14 @@ def build_convex(spec: Spec) -> ConvexTask:
         simulation=build_simulation(spec, experiment),
         foresight=build_foresight(spec, experiment, _designed_alone),
     )
+
+
+def _approaching(question: Question, band: tuple[float, float]) -> Question:
+    """The question with every spectrum, and a free one, on this band."""
+    if not question.basis.free:
+        return replace(question, anywhere=band)
+    experiment = replace(question.experiment, band=band)
+    return replace(question, experiment=experiment, basis=LinesBasis.anywhere(*band, experiment.inputs))
 
 
 def _designed_alone(spec: Spec) -> Result:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from inputdesign_cli.design.convex.cost import weights_of
 from inputdesign_cli.design.convex.question import Question
 from inputdesign_cli.errors import IdesignError
 from inputdesign_cli.specification import Spec
-from inputdesign_cli.spectrum import matrices
+from inputdesign_cli.tasks.build.for_nothing import counted_powers, price_density
 
 # Where the price is looked at, in shares of the band: none is a frequency that a controller or plant favours.
 _PLACES = np.array([0.137, 0.293, 0.461, 0.618, 0.787, 0.911])
@@ -25,34 +24,16 @@ def check_every_direction_counts(spec: Spec, question: Question) -> None:
     Raises:
         SpecError: `no-cost` or `needs-limits`.
     """
-    density = _price(question)
-    if density is None:
+    counted = counted_powers(question)
+    if counted is None:
         return
+    lo, hi = question.experiment.band
+    density = price_density(question.experiment, counted, lo + (hi - lo) * _PLACES)
     size = np.sqrt(np.einsum("naa->na", density).real)
     unit = np.where(size > 0.0, size, 1.0)
     correlation = density / (unit[:, :, None] * unit[:, None, :])
     if np.linalg.eigvalsh(correlation)[:, 0].max() <= _SINGULAR:
         raise _complaint(spec, np.flatnonzero(np.all(size == 0.0, axis=0)))
-
-
-def _price(question: Question) -> NDArray | None:
-    """(n, r, r): the density of all that is paid for, or of all powers with an upper limit.
-
-    None where the density of the excitation is limited itself.
-    """
-    if question.goal == "cost":
-        counted = weights_of(question.cost)
-    elif any(density.upper for density in question.densities):
-        return None
-    else:
-        counted = [(limit.kind, limit.channel, 1.0 / limit.bound) for limit in question.limits if limit.upper]
-    lo, hi = question.experiment.band
-    w = lo + (hi - lo) * _PLACES
-    parts = [
-        weight * matrices(question.experiment.power_density(kind, w, channel))
-        for kind, channel, weight in counted
-    ]
-    return np.sum(parts, axis=0)
 
 
 def _complaint(spec: Spec, silent: NDArray[np.intp]) -> IdesignError:

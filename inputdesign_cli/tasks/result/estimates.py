@@ -12,6 +12,7 @@ from inputdesign_cli.identification.stability import without_integrators
 from inputdesign_cli.plant import Model
 from inputdesign_cli.plant.polynomial import roots_in_z
 from inputdesign_cli.runs.results import Json
+from inputdesign_cli.runs.units import Units
 from inputdesign_cli.tasks.result.blocks import blocks_of, predictor_of
 from inputdesign_cli.tasks.result.refutations import contradictions, unsettled
 from inputdesign_cli.tasks.result.remedies import vague_notes
@@ -160,11 +161,13 @@ def prior_notes(estimate: Estimate, *, stated: bool) -> list[str]:
     return [counted, *contradictions(estimate)]
 
 
-def model_text(model: Model, estimate: Estimate) -> str:
-    """The blocks to paste, with the covariance and what the next experiment may take as its prior."""
+def model_text(units: Units, model: Model, estimate: Estimate) -> str:
+    """The blocks to paste, with the clock of the data, and what the next experiment may take as its prior."""
     lines = [
         f"# Estimated from {len(estimate.errors)} samples: paste in place of the blocks of the same names,",
         "# or write include: and the name of this file in a spec without them.",
+        f"sample_time: {units.sample_time!r}",
+        f"time_unit: {units.time_unit}",
     ]
     for key, block in blocks_of(model).items():
         lines += [f"{key}:", *(f"  {name}: {json.dumps(value)}" for name, value in block.items())]

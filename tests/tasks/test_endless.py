@@ -1,0 +1,205 @@
+"""Where excitation is neither paid for nor limited and still tells, no bound is told that is none."""
+
+import numpy as np
+import pytest
+
+from inputdesign_cli import parse_spec, solve
+from inputdesign_cli.errors import SpecError
+
+SAMPLES, VARIANCE, NODES = 500, 0.1, 1 << 14
+
+
+class Plant:
+    """(1 - q)(1 - a q) y = (b1 q + b2 q^2) u + e under u = r - K y, by the textbook."""
+
+    def __init__(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        a, b = rng.uniform(0.0, 0.6), rng.uniform([0.4, -0.3], [1.0, 0.3])
+        self.A, self.B = np.convolve([1.0, -1.0], [1.0, -a]), np.array([0.0, *b])
+        self.K = 0.2 * (1.0 - a)
+        roots = np.roots(self.A + self.K * self.B)
+        assert np.all(np.abs(roots) < 1.0)
+
+    def text(self, criterion: str, rest: str) -> str:
+        A, B = (p.tolist() for p in (self.A, self.B))
+        return f"""
+plant: {{A: {A}, B: {B}}}
+noise: {{variance: {VARIANCE}}}
+experiment: {{samples: {SAMPLES}, controller: {{numerator: [{self.K}], denominator: [1]}}}}
+objective: best_accuracy
+accuracy: {{criterion: {criterion}}}
+signal: {{samples: 100, seed: 1, candidates: 1}}
+{rest}
+"""
+
+    def _regressors(self, w, y, u):
+        q = np.exp(-1j * w)
+        return np.array([-q * y, -(q**2) * y, q * u, q**2 * u])
+
+    def _loop(self, w):
+        q = np.exp(-1j * w)
+        A, B = np.polyval(self.A[::-1], q), np.polyval(self.B[::-1], q)
+        return A, B, A + self.K * B
+
+    def informations(self, lines, shares):
+        """Of two lines (n, 2) that have these shares (2,) of an input of power one, beside the noise."""
+        w = 2.0 * np.pi * (np.arange(NODES) + 0.5) / NODES
+        A, B, below = self._loop(w)
+        y = np.sqrt(VARIANCE) / below
+        phi = self._regressors(w, y, -self.K * y)
+        known = SAMPLES / VARIANCE * (phi @ phi.conj().T).real / NODES
+        found = []
+        for pair in lines:
+            A, B, below = self._loop(pair)
+            phi = self._regressors(pair, B / A, np.ones(2))  # for a unit of the input
+            found.append(known + SAMPLES / VARIANCE * ((phi * shares) @ phi.conj().T).real)
+        return np.array(found)
+
+    def values(self, criterion, lines, shares=(0.5, 0.5)):
+        M = self.informations(lines, np.array(shares))
+        return {
+            "D": lambda: np.linalg.slogdet(M)[1],
+            "A": lambda: -np.trace(np.linalg.inv(M), axis1=1, axis2=2),
+            "E": lambda: np.linalg.eigvalsh(M)[:, 0],
+            "T": lambda: np.trace(M, axis1=1, axis2=2),
+        }[criterion]()
+
+
+RNG = np.random.default_rng(5)
+LINES = np.column_stack([RNG.uniform(0.2, 3.1, 60), 10.0 ** RNG.uniform(-4, 0, 60)])
+FAMILIES = ["{type: fir, order: 4}", "{type: white}", "{type: multisine, lines: 12}"]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("criterion", "DAET")
+@pytest.mark.parametrize("spectrum", FAMILIES)
+def test_what_is_told_of_every_spectrum_holds_for_two_lines(seed, criterion, spectrum):
+    plant = Plant(seed)
+    result = solve(
+        parse_spec(plant.text(criterion, f"limits: {{input_power: 1}}\nspectrum: {spectrum}"))
+    ).result
+    values = np.concatenate([plant.values(criterion, LINES, (p, 1.0 - p)) for p in (0.5, 0.99, 0.01)])
+    bound = result["objective"].get("any_spectrum_bound", np.inf)
+    assert values.max() <= bound + 1e-6 * abs(values.max())
+    near = plant.values(criterion, np.array([[1.0, 1e-3], [1.0, 1e-5]]))
+    endless = near[1] - near[0] > 0.1 * abs(near[0])
+    assert endless == ("any_spectrum_bound" not in result["objective"])
+    assert endless == any("no bound over every spectrum" in note for note in result.get("notes", []))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("criterion", "DT")
+def test_a_free_spectrum_without_an_end_is_refused(seed, criterion):
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(Plant(seed).text(criterion, "limits: {input_power: 1}\nspectrum: {type: free}")))
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.key) == ("needs-limits", "limits")
+    assert "at 0 rad/s" in found.message
+
+
+@pytest.mark.parametrize("criterion", "DAET")
+@pytest.mark.parametrize(
+    "limits",
+    [
+        "{input_power: 1, output_power: 20}",
+        "{input_power: 1, excitation_power: 5}",
+        "{input_power: 1, band: [0.0314, 3.14159]}",
+    ],
+)
+def test_the_remedies_give_a_bound(criterion, limits):
+    text = Plant(1).text(criterion, f"limits: {limits}\nspectrum: {{type: free}}")
+    found = solve(parse_spec(text)).result
+    assert found["status"] == "optimal"
+    assert found["objective"]["relative_gap"] <= 1e-6
+    if "band" in limits:
+        inside = LINES[LINES[:, 1] > 0.0314]
+        best = Plant(1).values(criterion, inside).max()
+        assert best <= found["objective"]["any_spectrum_bound"] * (1 + np.sign(best) * 1e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("criterion", "AE")
+def test_a_best_that_is_only_approached_is_told_as_such(seed, criterion):
+    plant = Plant(seed)
+    text = plant.text(criterion, "limits: {input_power: 1}\nspectrum: {type: free}")
+    found = solve(parse_spec(text)).result
+    assert found["objective"]["relative_gap"] <= 1e-4
+    assert any("approached" in note for note in found["notes"])
+    best = plant.values(criterion, LINES).max()
+    assert best <= found["objective"]["any_spectrum_bound"] + 1e-6 * abs(best)
+
+
+def refused(text: str, *overrides: str) -> str:
+    with pytest.raises(SpecError) as caught:
+        solve(parse_spec(text, overrides=list(overrides)))
+    return caught.value.diagnostics[0].code
+
+
+OPEN = """
+plant: {B: [0, 1, -1], A: [1, -0.5]}
+noise: {variance: 0.1}
+experiment: {samples: 500}
+signal: {samples: 100, seed: 1, candidates: 1}
+spectrum: {type: free}
+"""
+
+
+@pytest.mark.parametrize(
+    ("rest", "code"),
+    [
+        ("objective: best_accuracy\naccuracy: {criterion: D}\nlimits: {output_power: 1}", "needs-limits"),
+        ("objective: best_accuracy\naccuracy: {criterion: T}\nlimits: {output_power: 1}", "needs-limits"),
+        ("cost: {input_power: 0, output_power: 1}\naccuracy: {standard_deviation: {b1: 0.1}}", None),
+    ],
+)
+def test_a_zero_on_the_circle_hides_power_from_the_output(rest, code):
+    """b1 + b2 alone is told there, and b1 not better than b1 - b2 is."""
+    if code is None:
+        assert solve(parse_spec(OPEN + rest)).result["status"] == "optimal"
+    else:
+        assert refused(OPEN + rest) == code
+
+
+INSIDE = """
+plant: {B: [0, 1], A: [1, -0.5, 1]}
+noise: {variance: 0.1}
+experiment: {samples: 500, controller: {numerator: [-0.2, -0.1], denominator: [1]}}
+objective: best_accuracy
+limits: {input_power: 1}
+signal: {samples: 100, seed: 1, candidates: 1}
+"""
+
+
+@pytest.mark.parametrize("criterion", "DAET")
+def test_a_pole_inside_the_band_is_found(criterion):
+    text = f"{INSIDE}accuracy: {{criterion: {criterion}}}\n"
+    assert refused(text, "spectrum={type: free}") == "needs-limits"
+    on_it = f"spectrum={{type: multisine, frequencies: [0.4, {float(np.arccos(0.25))!r}, 2.0]}}"
+    assert refused(text, on_it) == "needs-limits"
+    fir = solve(parse_spec(text, overrides=["spectrum={type: fir, order: 2}"])).result
+    assert "any_spectrum_bound" not in fir["objective"]
+    beside = ["spectrum={type: free}", "limits.band=[1.35, 3.14159]"]
+    assert solve(parse_spec(text, overrides=beside)).result["status"] == "optimal"
+
+
+GAIN = """
+plant: {parameters: {k: 0.2}, B: [0, k], F: [1, -1]}
+noise: {variance: 0.1}
+experiment: {samples: 500, controller: {numerator: [0.3], denominator: [1]}}
+accuracy: {standard_deviation: {k: 0.001}}
+signal: {samples: 100, seed: 1, candidates: 1}
+"""
+
+
+def test_a_gain_that_costs_as_little_as_you_like():
+    """The information in k for a unit of the input is N / variance over |1 - q|^2."""
+    assert refused(GAIN, "cost={input_power: 1, output_power: 0}", "spectrum={type: free}") == "no-cost"
+    fir = solve(parse_spec(GAIN, overrides=["cost={input_power: 1, output_power: 0}"])).result
+    assert "any_spectrum_bound" not in fir["objective"]
+    limited = ["objective=shortest_experiment", "limits={input_power: 1}", "spectrum={type: free}"]
+    assert refused(GAIN, *limited) == "needs-limits"
+
+
+def test_lines_on_the_pole_are_refused():
+    spectrum = "spectrum={type: multisine, frequencies: [0, 0.5, 1.0]}"
+    assert refused(Plant(1).text("D", "limits: {input_power: 1}"), spectrum) == "needs-limits"
