@@ -57,6 +57,16 @@ def test_the_unit_of_time_is_on_the_axis(page):
     assert "(min)" in page(CURVES["signal"], "min").axes[0].get_xlabel()
 
 
+@pytest.mark.parametrize("name", CURVES)
+def test_every_row_of_panels_has_a_label(name, page):
+    """Of panels side by side the left one has it, for all."""
+    figure = page(CURVES[name])
+    shown = [axes for axes in figure.axes if axes.axison and not axes.images]
+    for axes in shown:
+        row = [one for one in shown if np.isclose(one.get_position().y0, axes.get_position().y0)]
+        assert any(one.get_ylabel() for one in row) or axes.get_title(), name
+
+
 NAMES = [r"$\frac{1}{0", "$$", "$x$", r"\$", "_u", "100 %", "{}", "日本", "a_b^c", "&<b>", "{0}", "°C"]
 
 
