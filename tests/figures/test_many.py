@@ -1,5 +1,6 @@
 """Nothing of what a run holds is left out of a figure, and no two things in it look alike."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -7,8 +8,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from inputdesign_cli.figures.trade import Trade, draw_trade
-from inputdesign_cli.runs.curves import BoundCurves, BoundPanel, OrderCurves
-from tests.support.curves import G, W, lines_by_label
+from inputdesign_cli.runs.curves import BoundCurves, BoundPanel, OrderCurves, ResponseCurves
+from tests.support.curves import SEEN, G, W, lines_by_label
 
 SIZES = np.array([2.0, 4.0])
 
@@ -59,3 +60,15 @@ def test_ratios_of_nine_entries_are_told_apart(page):
     drawn = lines_by_label(below)
     assert len(drawn) == 10  # the limit
     assert apart(list(drawn.values()))
+
+
+def test_the_sign_of_every_gain_is_seen(page):
+    """Of G and of -G the magnitudes are the same, and the phases are half a turn apart."""
+    panels = tuple(
+        replace(SEEN, G=s * SEEN.G, model=s * SEEN.model, entry=(0, j)) for j, s in enumerate((1, -1))
+    )
+    drawn = lines_by_label(page(ResponseCurves(panels)).axes[-1])
+    assert list(drawn) == ["G₁₁", "G₁₂"]
+    one, other = (line.get_ydata() for line in drawn.values())
+    np.testing.assert_allclose(np.abs(other - one), 180.0)
+    np.testing.assert_allclose(one, np.degrees(np.angle(SEEN.model)), atol=1e-9)

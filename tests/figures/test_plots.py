@@ -147,7 +147,7 @@ def test_a_limiting_frequency_far_outside_does_not_push_the_axes_aside():
     [
         (
             ResponseCurves(tuple(replace(SEEN, entry=entry) for entry in product(range(2), repeat=2))),
-            ["G₁₁, magnitude", "G₁₂, magnitude", "G₂₁, magnitude", "G₂₂, magnitude"],
+            [*(f"{entry}, magnitude" for entry in ("G₁₁", "G₁₂", "G₂₁", "G₂₂")), "phase (degrees)"],
         ),
         (
             FitCurves(T, (replace(FIT, label="level (m)"), replace(FIT, output=1))),
