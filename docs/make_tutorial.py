@@ -53,8 +53,9 @@ one part of the record, and judges them on the other:
 
 ![fit of the model to the log](images/tutorial_log_fit.png)
 
-The model that it chose explains {validated} of temperatures that it has not seen. It also writes
-`found/spec.yaml`: plant, noise, levels and limits as in the log, ready for a design. How good is the model?
+Estimated from the first part alone, the structure that it chose explains {validated} of the temperatures of
+the other; the parameters above are those of the whole log. The command also writes `found/spec.yaml`: plant,
+noise, levels and limits as in the log, ready for a design. How good is the model?
 The data alone say where G may be at each frequency (shaded), and how the model goes through it:
 
 ![frequency response of the log, without a model and by the model](images/tutorial_log_frequency_response.png)
@@ -84,8 +85,9 @@ recorded beside it, in `first.csv`. Do these data meet the target?
 
 They miss it: exit code 1. The log had told the fast part of the plant badly, so that the design stood on a
 wrong model; the new data tell it better, and at the new estimate the error is {ratio} times what is
-admitted. That is what assessing is for. The same command has designed what the new model still needs: the
-shortest record that, together with these data, meets the target if the structure of the model is right.
+admitted. That is what assessing is for; a note tells how far the plant is from that of the design. The same
+command has designed what the new model still needs: the shortest record that, together with these data, meets
+the target if the structure of the model is right.
 
 ![the error that the first experiment leaves](images/tutorial_first_data_bound.png)
 
@@ -99,7 +101,7 @@ Met: exit code 0. The model, with its covariance, is `second_assessed/model.yaml
 
 ![the error that both experiments leave](images/tutorial_second_bound.png)
 
-![fit of the model to both experiments](images/tutorial_second_fit.png)
+![fit of the model to both experiments, which a dotted line parts](images/tutorial_second_fit.png)
 
 What an accuracy may be is in [questions.md](questions.md), what verdicts rest on in
 [identification.md](identification.md); a response without any model is measured as
@@ -173,7 +175,7 @@ def tutorial(folder: Path, images: Path) -> str:
     (found["white"],) = re.findall(r"white excitation: (\d+)", said)
     (found["spectrum"],) = re.findall(r"spectrum alone would take (\d+)", said)
     (found["record"],) = re.findall(r"signal +(\d+) samples", said)
-    shown = ("estimate", "assessed", "verdict", "signal", "files")
+    shown = ("estimate", "assessed", "verdict", "signal", "note", "files")
     experiment(folder / "design" / "signal.csv", folder / "first.csv", seed=1)
     found["first"], said = terminal.run(
         *("assess", "design/spec.yaml", "first.csv", "-o", "first_assessed"), kept=shown, code=1

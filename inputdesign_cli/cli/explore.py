@@ -75,12 +75,7 @@ def explore(
         figure_format=figure_format,
         json_output=json_output,
         quiet=quiet,
+        page=validate is None,
     )
-    if not no_output and validate is None:
-        from inputdesign_cli.report.render import report_text
-        from inputdesign_cli.runs.record import PAGE
-        from inputdesign_cli.runs.run_directory import replace_text
-
-        replace_text(place.directory / PAGE, report_text(place.directory))
     if found.reasons:
         raise typer.Exit(EXIT_MISSED)

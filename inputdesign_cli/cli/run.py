@@ -94,8 +94,12 @@ def keep(
     figure_format: str = "png",
     json_output: bool,
     quiet: bool,
+    page: bool = False,
 ) -> None:
     """Write a run to its place, with figures or without, and print its result or its summary.
+
+    Args:
+        page: whether the page about it is written as well.
 
     Raises:
         OutputError: as `write_run`, and `output-is-the-spec`.
@@ -112,6 +116,7 @@ def keep(
         figure_format=figure_format,
         json_output=json_output,
         quiet=quiet,
+        page=page,
     )
 
 
@@ -124,11 +129,13 @@ def renew(
     figure_format: str = "png",
     json_output: bool,
     quiet: bool,
+    page: bool = False,
 ) -> None:
     """Write a run directory, and print its result or its summary.
 
     Args:
         origin: what the run is made from; None for one that goes on with what is in the directory.
+        page: whether the page about it is written as well.
 
     Raises:
         OutputError: as `write_run`.
@@ -144,7 +151,19 @@ def renew(
             drawings = draw_all(results, figure_format)
         replaced = has_other_values(directory, results.resolved_spec)
         files = write_run(results, directory, drawings, origin=origin)
+        if page:
+            files = [_page(directory), *files]
     show(results, files, replaced=replaced, json_output=json_output, quiet=quiet)
+
+
+def _page(directory: Path) -> Path:
+    """The page about the run in a directory, written anew."""
+    from inputdesign_cli.report.render import report_text
+    from inputdesign_cli.runs.record import PAGE
+    from inputdesign_cli.runs.run_directory import replace_text
+
+    replace_text(directory / PAGE, report_text(directory))
+    return directory / PAGE
 
 
 def show(

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
+from inputdesign_cli.figures.apart import stroke
 from inputdesign_cli.figures.panels import draw_panels
 from inputdesign_cli.figures.style import (
     BLACK,
@@ -107,7 +108,8 @@ def _plot_ratios(axes: Axes, panels: Sequence[BoundPanel]) -> list[Artist]:
         drawn = _drawn(curves)
         if len(panels) > 1:
             at = "" if curves.entry is None else f"G{curves.entry[0] + 1}{curves.entry[1] + 1}"
-            drawn = [_Error(at, curves.r_u, OTHERS[number % len(OTHERS)])]
+            color, style = stroke(number, OTHERS)
+            drawn = [_Error(at, curves.r_u, color, style=style)]
         for place, error in enumerate(drawn):
             ratio = error.values / positive(curves.r_adm)
             top = float(np.nanmax(ratio, initial=0.0))

@@ -3,58 +3,96 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from inputdesign_cli.figures.style import BLACK, BLUE, GREY, ORANGE, legend_above, legend_over_all
+from inputdesign_cli.figures.style import BLACK, BLUE, DOTTED, GREY, ORANGE, legend_above, legend_over_all
 from inputdesign_cli.runs.curves import FitCurves, FitPanel, ResidualCurves
 from inputdesign_cli.runs.results import Array
 
-SHOWN = 400
+# A record up to the first length is drawn whole, of a longer one so many samples.
+_WHOLE, SHOWN = 600, 400
 _AS_LIVELY = 0.5
 _LINE = 2e-3  # the width of a curve, as a share of what is drawn
 
 
+@dataclass(frozen=True)
+class _Shown:
+    """The samples that are drawn, and at which of them (counted from the first of these) a record begins."""
+
+    samples: slice
+    begins: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, curves: FitCurves) -> _Shown:
+        """Those in which the outputs move most."""
+        samples = stretch([panel.y for panel in curves.panels])
+        begins = np.cumsum(curves.lengths, dtype=np.int64)[:-1]
+        return cls(samples, begins[(begins > samples.start) & (begins < samples.stop)] - samples.start)
+
+    def broken(self, values: Array) -> Array:
+        """Values (n,) of all samples as they are drawn: no curve goes from one record to the next."""
+        return np.insert(values[self.samples], self.begins, np.nan)
+
+    def borders(self, time: Array) -> Array:
+        """Between which times (n,) of all samples a record ends and another one begins: the middle."""
+        own = time[self.samples]
+        return 0.5 * (own[self.begins - 1] + own[self.begins])
+
+
 def draw_fit(page: Figure, curves: FitCurves, time_unit: str) -> None:
-    """Each output with its simulation and its one-step prediction; below a single one its residuals."""
+    """Each output with its simulation and its one-step prediction; below a single one its residuals.
+
+    Records are parted: no curve goes from one to the next, and their borders are marked.
+    """
     single = len(curves.panels) == 1
     rows = 2 if single else len(curves.panels)
     axes = page.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[2, 1] if single else None)[:, 0]
-    shown = stretch([panel.y for panel in curves.panels])
-    time = curves.time[shown]
+    shown = _Shown.of(curves)
+    part, size = shown.samples, curves.time.size
     unit = time_unit
-    if curves.time.size > SHOWN:
-        part = f"samples {shown.start + 1} to {shown.stop}" if shown.start else f"first {SHOWN}"
-        unit = f"{time_unit}; {part} of {curves.time.size}{'' if shown.start else ' samples'}"
+    if part.stop - part.start < size:
+        told = f"samples {part.start + 1} to {part.stop}" if part.start else f"first {SHOWN}"
+        unit = f"{time_unit}; {told} of {size}{'' if part.start else ' samples'}"
     axes[-1].set_xlabel(f"time ({unit})")
-    axes[-1].set_xlim(time[0], time[-1])
-    same = all(_coincide(panel, shown) for panel in curves.panels)
+    axes[-1].set_xlim(curves.time[part][0], curves.time[part][-1])
+    time = shown.broken(curves.time)
+    borders: list[Artist] = [
+        place.axvline(at, color=GREY, linestyle=DOTTED, linewidth=1.2, label="another record begins")
+        for place in axes
+        for at in shown.borders(curves.time).tolist()
+    ][:1]
+    same = all(_coincide(panel, part) for panel in curves.panels)
     if single:
         (panel,) = curves.panels
         explained = "" if panel.fit is None else f" (fit {panel.fit:.1f} %)"
         handles = _plot(axes[0], time, panel, shown, "y", f"simulated from u{explained}", same=same)
         axes[0].set_ylabel(panel.label or "output")
-        axes[1].plot(time, (panel.y - panel.predicted)[shown], color=BLUE, linewidth=0.8)
+        axes[1].plot(time, shown.broken(panel.y - panel.predicted), color=BLUE, linewidth=0.8)
         axes[1].set_ylabel("residual")
-        legend_above(axes[0], handles)
+        legend_above(axes[0], [*handles, *borders])
         return
     longest: list[Artist] = []
     for panel, place in zip(curves.panels, axes, strict=True):
         handles = _plot(place, time, panel, shown, "recorded", "simulated from u", same=same)
         longest = max(longest, handles, key=len)
         explained = "" if panel.fit is None else f", fit {panel.fit:.1f} %"
-        name = panel.label or f"y{panel.output + 1}"
+        name = f"y{panel.output + 1}"
         place.set_title(f"{name}{explained}", loc="left", color=GREY)
-    legend_over_all(page, longest)
+        place.set_label(name)
+        place.set_ylabel(panel.label or "output")
+    legend_over_all(page, [*longest, *borders])
 
 
 def stretch(outputs: Sequence[Array]) -> slice:
     """The first samples of outputs (n,), or those in which they move most, if that is far more."""
     size = len(outputs[0])
-    if size <= SHOWN:
+    if size <= _WHOLE:
         return slice(0, size)
     begins = np.arange(0, size - SHOWN + 1, SHOWN // 4)
     moves = np.zeros(begins.size)
@@ -67,15 +105,17 @@ def stretch(outputs: Sequence[Array]) -> slice:
 
 
 def _plot(
-    axes: Axes, time: Array, panel: FitPanel, shown: slice, recorded: str, simulated: str, *, same: bool
+    axes: Axes, time: Array, panel: FitPanel, shown: _Shown, recorded: str, simulated: str, *, same: bool
 ) -> list[Artist]:
     """Curves of an output; one for prediction and simulation where these are the `same` in all panels."""
     handles: list[Artist] = []
-    handles += axes.plot(time, panel.y[shown], color=BLACK, linewidth=1.0, label=recorded)
+    handles += axes.plot(time, shown.broken(panel.y), color=BLACK, linewidth=1.0, label=recorded)
     label = f"predicted one step ahead, and {simulated}" if same else "predicted one step ahead"
-    handles += axes.plot(time, panel.predicted[shown], color=BLUE, linewidth=1.0, label=label)
+    handles += axes.plot(time, shown.broken(panel.predicted), color=BLUE, linewidth=1.0, label=label)
     if panel.simulated is not None and not same:
-        handles += axes.plot(time, panel.simulated[shown], color=ORANGE, linewidth=1.0, label=simulated)
+        handles += axes.plot(
+            time, shown.broken(panel.simulated), color=ORANGE, linewidth=1.0, label=simulated
+        )
     return handles
 
 

@@ -19,7 +19,7 @@ from inputdesign_cli.runs.curves import FanCurves
 
 # More lines than these are one grey area.
 _MOST_LINES = 200
-_MOST_NAMED = 5
+MOST_NAMED = 5
 _LEAST = 1e-3
 
 
@@ -37,7 +37,7 @@ def draw_fan(page: Figure, curves: FanCurves, time_unit: str) -> None:
         axes.plot(w, curves.ratios.max(axis=0), color=GREY, linewidth=width, label=largest)
         handles.append(Line2D([], [], color=GREY, linewidth=0.8, label=f"{len(curves.ratios)} plants"))
     handles += axes.plot(w, curves.nominal, color=BLACK, linewidth=1.4, label="plant of the spec")
-    named = list(curves.active.items())[:_MOST_NAMED]
+    named = list(curves.active.items())[:MOST_NAMED]
     for (name, ratio), color in zip(named, OTHERS, strict=False):
         handles += axes.plot(w, ratio, color=color, linewidth=1.4, label=name)
     shown = curves.nominal if not len(rows) else rows

@@ -59,7 +59,7 @@ def draw_panels(
         panels: what to draw, in any order.
         plot: draws one panel.
         time_unit: frequencies are labelled rad per this.
-        magnitude: the label of the vertical axis where one panel stands alone.
+        magnitude: the label of the vertical axes, of those at the left.
         title: says what all panels are about.
         below: draws one more panel under all others.
     """
@@ -76,11 +76,13 @@ def draw_panels(
         axes = page.add_subplot(cells[i, j])
         drawn.append((axes, plot(axes, panel)))
         frequency_axis(axes, panel.frequency, time_unit)
-        if single:
+        if not any(row == i and column < j for row, column in places):
             axes.set_ylabel(magnitude)
+        if single:
             title = ": ".join(filter(None, (title, panel.names)))
         else:
-            axes.set_title(f"G{lowered(i + 1, j + 1)} {panel.names}".strip(), loc="left", color=GREY)
+            axes.set_label(f"G{lowered(i + 1, j + 1)} {panel.names}".strip())
+            axes.set_title(str(axes.get_label()), loc="left", color=GREY)
         if below is not None or any(row > i and column == j for row, column in places):
             axes.tick_params(which="both", labelbottom=False)
             axes.set_xlabel("")

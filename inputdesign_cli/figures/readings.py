@@ -70,9 +70,15 @@ def _beside(axes: Axes) -> str:
     """What the vertical axis is called, and which panel it is of several."""
     page = axes.get_figure(root=True)
     assert page is not None
-    called = axes.get_ylabel() or page.get_supylabel()
-    several = axes.get_title(loc="left") if not axes.get_ylabel() else ""
+    row = (other.get_ylabel() for other in page.axes if _side_by_side(axes, other))
+    called = axes.get_ylabel() or next(filter(None, row), "") or page.get_supylabel()
+    several = str(axes.get_label()) or ("" if axes.get_ylabel() else axes.get_title(loc="left"))
     return ", ".join(filter(None, (several, called)))
+
+
+def _side_by_side(one: Axes, other: Axes) -> bool:
+    """Whether two panels stand in one row of a page."""
+    return bool(np.isclose(one.get_position().y0, other.get_position().y0))
 
 
 def _curves(axes: Axes, line: Line2D) -> Iterator[dict[str, Json]]:

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from inputdesign_cli.figures.apart import stroke
 from inputdesign_cli.figures.panels import draw_panels
-from inputdesign_cli.figures.style import BLACK, BLUE, frequency_axis, legend_above, log_axes
+from inputdesign_cli.figures.style import BLACK, BLUE, frequency_axis, legend_above, log_axes, lowered
 from inputdesign_cli.runs.curves import ResponseCurves, ResponsePanel
 
 
 def draw_response(page: Figure, curves: ResponseCurves, time_unit: str) -> None:
-    """The magnitudes, and between which two the true one is with 95 %; of a single entry also the phase."""
+    """The magnitudes, and between which two the true one is with 95 %; below them the phases."""
     if len(curves.panels) > 1:
-        draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude")
+        draw_panels(page, curves.panels, _magnitude, time_unit, magnitude="magnitude", below=_phases)
         return
     (panel,) = curves.panels
     above, below = page.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     legend_above(above, _magnitude(above, panel))
     above.set_ylabel("magnitude")
-    _phase(below, panel)
+    _phase(below, panel, BLUE, BLACK)
     below.set_ylabel("phase (degrees)")
     frequency_axis(below, panel.frequency, time_unit)
 
@@ -38,11 +42,24 @@ def _magnitude(axes: Axes, panel: ResponsePanel) -> list[Artist]:
     return handles
 
 
-def _phase(axes: Axes, panel: ResponsePanel) -> None:
+def _phases(axes: Axes, panels: Sequence[ResponsePanel]) -> list[Artist]:
+    """Those of all entries; a negative gain begins half a turn away from a positive one."""
+    handles: list[Artist] = []
+    for number, panel in enumerate(panels):
+        color, dashes = stroke(number)
+        row, column = panel.entry or (0, 0)
+        (line,) = _phase(axes, panel, color, color)
+        line.set(linestyle=dashes, label=f"G{lowered(row + 1, column + 1)}")
+        handles.append(line)
+    axes.set_ylabel("phase (degrees)")
+    return handles
+
+
+def _phase(axes: Axes, panel: ResponsePanel, of_data: str, of_model: str) -> list[Line2D]:
     """That of the model without jumps, and of the data, where it is known at all, on the nearest turn."""
     model = np.degrees(np.unwrap(np.angle(panel.model)))
     known = panel.radius < np.abs(panel.G)
     turn = np.degrees(np.angle(panel.G)) - model
     nearest = model + (turn + 180.0) % 360.0 - 180.0
-    axes.plot(panel.frequency[known], nearest[known], ".", color=BLUE, markersize=4)
-    axes.plot(panel.frequency, model, color=BLACK, linewidth=1.2)
+    axes.plot(panel.frequency[known], nearest[known], ".", color=of_data, markersize=4)
+    return axes.plot(panel.frequency, model, color=of_model, linewidth=1.2)

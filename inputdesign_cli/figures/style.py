@@ -47,7 +47,7 @@ PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 OTHERS = tuple(colour for colour in PALETTE if colour != ORANGE)  # beside what is admitted
 
 # Of a legend: letters that an inch holds, and what a handle takes beside its label.
-_LETTERS_PER_INCH, _BESIDE_LABEL = 12.0, 6
+_LETTERS_PER_INCH, _BESIDE_LABEL, _WIDER = 12.0, 6, 0.4
 _TITLE_PER_INCH = 13.0  # letters of a title that an inch of the page holds
 
 # A logarithmic axis that ends below so many times its beginning has even steps.
@@ -280,11 +280,16 @@ def _columns(labels: Sequence[str], inches: float) -> int:
     """The most columns of a legend, filled one after the other, that a page so wide has room for."""
     room = inches * _LETTERS_PER_INCH
     for columns in range(len(labels), 1, -1):
-        shared = np.array_split([len(label) for label in labels], columns)
-        widest = [int(max(lengths)) for lengths in shared]
+        shared = np.array_split([_width(label) for label in labels], columns)
+        widest = [float(max(widths)) for widths in shared]
         if sum(widest) + _BESIDE_LABEL * len(widest) <= room:
             return columns
     return 1
+
+
+def _width(label: str) -> float:
+    """In letters of usual width: capitals are wider."""
+    return len(label) + _WIDER * sum(letter.isupper() for letter in label)
 
 
 def title_above(page: Figure, title: str) -> None:

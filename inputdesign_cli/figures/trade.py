@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from inputdesign_cli.figures.style import BLACK, DASHED, PALETTE, legend_above, log_axes
+from inputdesign_cli.figures.apart import stroke
+from inputdesign_cli.figures.style import BLACK, DASHED, legend_above, log_axes
 from inputdesign_cli.figures.sweep_axes import curve, mark_failures, plain_numbers
 from inputdesign_cli.runs.results import Array
 
@@ -34,9 +35,12 @@ def draw_trade(trade: Trade, page: Figure) -> None:
     """Ratios to what is asked, which stands at one, or the criterion."""
     axes = page.add_subplot()
     handles = []
-    for text, row, colour in zip(trade.amplitudes, trade.values, PALETTE, strict=False):
+    for number, (text, row) in enumerate(zip(trade.amplitudes, trade.values, strict=True)):
         name = f"amplitude {text}" if text else "best record"
-        handles += curve(axes, trade.lengths, row, color=colour, marker="o", markersize=4, label=name)
+        colour, dashes = stroke(number)
+        handles += curve(
+            axes, trade.lengths, row, color=colour, linestyle=dashes, marker="o", markersize=4, label=name
+        )
     log_axes(axes, "x")
     axes.set_xticks(trade.lengths, [f"{length:g}" for length in trade.lengths])
     axes.xaxis.set_minor_locator(NullLocator())

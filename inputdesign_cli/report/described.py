@@ -7,15 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from inputdesign_cli.runs.curves import (
-    BoundCurves,
-    Curves,
-    FanCurves,
-    NyquistCurves,
-    OptimalityCurves,
-    SignalCurves,
-    SpectrumCurves,
-)
+from inputdesign_cli.figures.fan import MOST_NAMED
+from inputdesign_cli.runs import curves as of
+from inputdesign_cli.runs.curves import Curves
 
 OF_DATA = "data"  # what r_u of an estimate is called
 
@@ -26,13 +20,12 @@ def described(curves: Curves, time_unit: str) -> str | None:
     return None if tell is None else tell(curves, f"rad/{time_unit}")
 
 
-def captioned(curves: Curves) -> str | None:
-    """The caption, of what there is in this figure; None where one caption does for all of its kind."""
-    tell = _CAPTIONED.get(type(curves))
-    return None if tell is None else tell(curves)
+def captioned(curves: Curves) -> str:
+    """The caption, of what there is in this figure."""
+    return _CAPTIONED[type(curves)](curves)
 
 
-def _bound_caption(curves: BoundCurves) -> str:
+def _bound_caption(curves: of.BoundCurves) -> str:
     error = "the error that the model may have (r_u)"
     if curves.panels[0].label == OF_DATA:
         error = "the error that these data leave (r_u)"
@@ -50,7 +43,7 @@ def _bound_caption(curves: BoundCurves) -> str:
     )
 
 
-def _nyquist_caption(curves: NyquistCurves) -> str:
+def _nyquist_caption(curves: of.NyquistCurves) -> str:
     circle = "" if curves.circle is None else ", and the circle about -1 that it is to keep off"
     limiting = " The limiting frequencies are those at which a disc touches what is admitted."
     return f"The loop C G with the discs in which the data leave it{circle}." + limiting * bool(
@@ -58,12 +51,12 @@ def _nyquist_caption(curves: NyquistCurves) -> str:
     )
 
 
-def _spectrum_caption(curves: SpectrumCurves) -> str:
+def _spectrum_caption(curves: of.SpectrumCurves) -> str:
     white = "" if curves.white is None or curves.lines else ", and white excitation for comparison"
     return f"Where in frequency the excitation has its power{white}."
 
 
-def _signal_caption(curves: SignalCurves) -> str:
+def _signal_caption(curves: of.SignalCurves) -> str:
     if not curves.predicted:
         return "The signal to apply (signal.csv), and how its values are distributed."
     return (
@@ -72,7 +65,30 @@ def _signal_caption(curves: SignalCurves) -> str:
     )
 
 
-def _bound(curves: BoundCurves, unit: str) -> str:
+def _fan_caption(curves: of.FanCurves) -> str:
+    binding = len(curves.active)
+    named = "those that bind" if binding <= MOST_NAMED else f"{MOST_NAMED} of the {binding} that bind"
+    return (
+        "How near every plant that the true one might be comes to what is admitted: r_u / r_adm at each, "
+        f"{named} in colour. The plants are those that the uncertainty of the spec describes; nothing is "
+        "said of the true plant."
+    )
+
+
+def _fit_caption(curves: of.FitCurves) -> str:
+    several = " Dotted lines part the records." if len(curves.lengths) > 1 else ""
+    return f"The recorded outputs, predicted one step ahead, and simulated from the input alone.{several}"
+
+
+def _orders_caption(curves: of.OrderCurves) -> str:
+    which = "" if curves.output is None else f" for y{curves.output + 1}"
+    return (
+        f"How well each structure that was tried{which}, estimated on one part of the record, simulates the "
+        "other."
+    )
+
+
+def _bound(curves: of.BoundCurves, unit: str) -> str:
     stated = [panel for panel in curves.panels if panel.r_adm is not None]
     if not stated:
         return "Model error r_u and the gain |G| against frequency."
@@ -80,7 +96,7 @@ def _bound(curves: BoundCurves, unit: str) -> str:
     return f"Model error r_u and admissible error r_adm against frequency; the largest ratio is {worst:.6g}."
 
 
-def _nyquist(curves: NyquistCurves, unit: str) -> str:
+def _nyquist(curves: of.NyquistCurves, unit: str) -> str:
     nearest = float((np.abs(1.0 + curves.loop) - curves.radius).min())
     told = f", of which {curves.circle:.4g} is asked" if curves.circle is not None else ""
     return (
@@ -89,7 +105,7 @@ def _nyquist(curves: NyquistCurves, unit: str) -> str:
     )
 
 
-def _spectrum(curves: SpectrumCurves, unit: str) -> str:
+def _spectrum(curves: of.SpectrumCurves, unit: str) -> str:
     power = np.trace(curves.spectrum, axis1=1, axis2=2).real
     peak = float(curves.frequency[int(np.argmax(power))])
     if curves.lines:
@@ -97,32 +113,81 @@ def _spectrum(curves: SpectrumCurves, unit: str) -> str:
     return f"Spectral density of the excitation against frequency, with its peak at {peak:.3g} {unit}."
 
 
-def _optimality(curves: OptimalityCurves, unit: str) -> str:
+def _optimality(curves: of.OptimalityCurves, unit: str) -> str:
     return f"Worth of a unit of cost against frequency; its maximum is {curves.ratio.max():.4g}."
 
 
-def _signal(curves: SignalCurves, unit: str) -> str:
+def _signal(curves: of.SignalCurves, unit: str) -> str:
     names = ", ".join(panel.name for panel in curves.predicted)
     below = f" Below: the output to be expected of {names}." if names else ""
     return f"The signal {', '.join(curves.channels)} against time, and the distribution of its values.{below}"
 
 
-def _fan(curves: FanCurves, unit: str) -> str:
+def _fan(curves: of.FanCurves, unit: str) -> str:
     worst = max(float(np.max(curves.ratios, initial=0.0)), float(curves.nominal.max()))
     return f"r_u / r_adm against frequency at {len(curves.ratios)} plants; the largest is {worst:.4g}."
 
 
+def _always(caption: str) -> Callable[[Curves], str]:
+    """One caption for all figures of a kind."""
+    return lambda _: caption
+
+
+# Every kind has its caption.
 _CAPTIONED: Mapping[type[Curves], Callable[[Any], str]] = {
-    BoundCurves: _bound_caption,
-    NyquistCurves: _nyquist_caption,
-    SignalCurves: _signal_caption,
-    SpectrumCurves: _spectrum_caption,
+    of.BoundCurves: _bound_caption,
+    of.CampaignCurves: _always(
+        "The worst ratio at the estimate and the energy applied, after each part of the campaign."
+    ),
+    of.CloudCurves: _always("The estimates of all runs, with the ellipses of theory."),
+    of.DeviationCurves: _always(
+        "The standard deviation of the measured frequency response at every line, against what is admitted."
+    ),
+    of.DirectionCurves: _always(
+        "The gains of the plant, and how the design shares its power among their directions."
+    ),
+    of.EllipseCurves: _always("The confidence ellipses that the design buys, for pairs of parameters."),
+    of.ErrorBandCurves: _always("The errors |G_hat - G_0| of the models of all runs, against r_u and r_adm."),
+    of.ErrorCurves: _always(
+        "The mean squared error against the energy of the regressors, bias and variance apart."
+    ),
+    of.EstimateCurves: _always(
+        "The estimates after each part of the campaign, with two standard deviations."
+    ),
+    of.FanCurves: _fan_caption,
+    of.FitCurves: _fit_caption,
+    of.LossCurves: _always("The loss in simulated experiments."),
+    of.MomentsCurves: _always("The second moments of the regressors."),
+    of.NyquistCurves: _nyquist_caption,
+    of.OptimalityCurves: _always(
+        "The certificate of the bound over every spectrum: what a unit of cost buys at each frequency, "
+        "relative to the best. It is nowhere above one, and one where power pays."
+    ),
+    of.OrderCurves: _orders_caption,
+    of.RatioCurves: _always(
+        "The largest r_u / r_adm of the true plant in simulated campaigns and in experiments in one shot: "
+        "beyond one what is asked is missed, far below one power was wasted."
+    ),
+    of.ResidualCurves: _always(
+        "Correlations of the residuals with themselves and with past inputs; chance leaves them within the "
+        "grey."
+    ),
+    of.ResponseCurves: _always(
+        "What the data say of G without a model, with the range that holds |G| with 95 % at each frequency, "
+        "beside the model. Chance takes a right model out of the range, too, at up to 5 % of the frequencies."
+    ),
+    of.SignalCurves: _signal_caption,
+    of.SpectrumCurves: _spectrum_caption,
+    of.TradeCurves: _always(
+        "What campaigns and experiments in one shot cost, against the share of runs whose model is within "
+        "r_adm of the true plant."
+    ),
 }
 _TOLD: Mapping[type[Curves], Callable[[Any, str], str]] = {
-    BoundCurves: _bound,
-    FanCurves: _fan,
-    NyquistCurves: _nyquist,
-    OptimalityCurves: _optimality,
-    SignalCurves: _signal,
-    SpectrumCurves: _spectrum,
+    of.BoundCurves: _bound,
+    of.FanCurves: _fan,
+    of.NyquistCurves: _nyquist,
+    of.OptimalityCurves: _optimality,
+    of.SignalCurves: _signal,
+    of.SpectrumCurves: _spectrum,
 }

@@ -52,13 +52,20 @@ def estimate_facts(result: Result) -> Iterator[Fact]:
         simulation, prediction = (
             _per_cent(unseen[f"{way}_fit_percent"]) for way in ("simulation", "prediction")
         )
-        text = f"simulation explains {simulation}, one-step prediction {prediction} of data not used before"
+        text = f"simulation explains {simulation}, one-step prediction {prediction} of {_judging(result)}"
         yield "validated", text, ""
     tests = [
         f"{name} {found[name]['probability']:.2g}" for name in ("whiteness", "independence") if name in found
     ]
     if tests:
         yield "residuals", f"probability of {', of '.join(tests)}", ""
+
+
+def _judging(result: Result) -> str:
+    """What `validation` is about: all data for a model that was given, or a part and an estimate without."""
+    if "exploration" not in result:
+        return "these data"
+    return "one part, estimated from the other alone (the parameters above: from the whole record)"
 
 
 def _per_cent(fit: Json) -> str:
@@ -74,18 +81,24 @@ def estimate_answer(result: Result) -> str:
         number = result["frequency_response"]["frequencies"]
         return f"The frequency response was measured at {number} frequencies."
     if assessment is None:
-        return f"The model was estimated from {result['samples']} samples{_explained(result)}."
+        estimated = f"The model was estimated from {result['samples']} samples{_explained(result)}."
+        return " ".join([estimated, *_unseen(result)])
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in verdict(result))
 
 
 def _explained(result: Result) -> str:
-    """How much of the output a simulation of the model explains, of unseen data if there are any."""
-    unseen = result.get("validation")
-    fit = unseen["simulation_fit_percent"] if unseen else result["identification"].get("fit_percent")
+    """How much of the output a simulation of the model explains."""
+    fit = result["identification"].get("fit_percent")
     if fit is None:
         return ""
-    of = "data that it has not seen" if unseen else "these data"
-    return f"; simulated from the input alone, it explains {_per_cent(fit)} of {of}"
+    return f"; simulated from the input alone, it explains {_per_cent(fit)} of these data"
+
+
+def _unseen(result: Result) -> Iterator[str]:
+    """The same of an estimate that has not seen what it is judged by, if there is one."""
+    if "validation" in result:
+        explained = _per_cent(result["validation"]["simulation_fit_percent"])
+        yield f"The same structure, estimated from one part of them alone, explains {explained} of the other."
 
 
 # Why data leave a verdict open, by `assessment.causes`.

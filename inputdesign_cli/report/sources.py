@@ -50,7 +50,7 @@ def assumptions(question: Question, result: Result) -> list[str]:
         ]
     elif "identification" in result:
         from_spec = "Orders and delay are those of the spec; the numbers were estimated from the data."
-        chosen = "Orders and delays were chosen by what the model simulates of data that it has not seen."
+        chosen = "Orders and delays were chosen by what estimates from one part simulate of the other."
         said = [chosen if "exploration" in result else from_spec]
     elif "robust" in result:
         said = [

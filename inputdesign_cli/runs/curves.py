@@ -251,6 +251,7 @@ class FitCurves(Curves):
 
     time: Array
     panels: tuple[FitPanel, ...]
+    lengths: tuple[int, ...] = ()  # samples of each record, one after the other; empty: of one
 
 
 @dataclass(frozen=True)

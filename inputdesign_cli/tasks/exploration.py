@@ -241,7 +241,7 @@ def judge(model: Model, header: Header, paths: Sequence[Path], preparation: Prep
     at = np.cumsum(data.lengths)[:-1]
     parts = list(zip(np.split(data.u, at), np.split(data.y, at), strict=True))
     found = fits(model, parts)
-    table, curves = validation_curves(header.units, data.time, data.u, data.y, found)
+    table, curves = validation_curves(header.units, data, found)
     result: dict[str, Json] = {
         "format": 1,
         "title": header.title or f"How the model does on {' and '.join(path.name for path in paths)}",

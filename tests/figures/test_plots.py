@@ -4,7 +4,7 @@ import struct
 import sys
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, product
 
 import matplotlib as mpl
 import numpy as np
@@ -13,10 +13,11 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from inputdesign_cli.figures.plots import draw, draw_all
+from inputdesign_cli.figures.readings import readings
 from inputdesign_cli.figures.style import TYPE_SIZE
-from inputdesign_cli.runs.curves import BoundPanel, FitCurves, NyquistCurves, SignalCurves
+from inputdesign_cli.runs.curves import BoundPanel, FitCurves, NyquistCurves, ResponseCurves, SignalCurves
 from inputdesign_cli.runs.results import Results
-from tests.support.curves import CURVES, FIT, G, T, W, bound
+from tests.support.curves import CURVES, FIT, SEEN, G, T, W, bound
 
 
 @cache
@@ -55,6 +56,16 @@ def test_no_global_state():
 def test_the_unit_of_time_is_on_the_axis(page):
     assert "rad/min" in page(CURVES["spectrum"], "min").axes[0].get_xlabel()
     assert "(min)" in page(CURVES["signal"], "min").axes[0].get_xlabel()
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_every_row_of_panels_has_a_label(name, page):
+    """Of panels side by side the left one has it, for all."""
+    figure = page(CURVES[name])
+    shown = [axes for axes in figure.axes if axes.axison and not axes.images]
+    for axes in shown:
+        row = [one for one in shown if np.isclose(one.get_position().y0, axes.get_position().y0)]
+        assert any(one.get_ylabel() for one in row) or axes.get_title(), name
 
 
 NAMES = [r"$\frac{1}{0", "$$", "$x$", r"\$", "_u", "100 %", "{}", "日本", "a_b^c", "&<b>", "{0}", "°C"]
@@ -129,3 +140,22 @@ def test_a_limiting_frequency_far_outside_does_not_push_the_axes_aside():
     L = 0.05 / (1j * frequency)
     curves = NyquistCurves(frequency, L, 0.1 * np.abs(L), limiting=frequency[[0, 200]], circle=0.5)
     assert draw(curves).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("curves", "told"),
+    [
+        (
+            ResponseCurves(tuple(replace(SEEN, entry=entry) for entry in product(range(2), repeat=2))),
+            [*(f"{entry}, magnitude" for entry in ("G₁₁", "G₁₂", "G₂₁", "G₂₂")), "phase (degrees)"],
+        ),
+        (
+            FitCurves(T, (replace(FIT, label="level (m)"), replace(FIT, output=1))),
+            ["y1, level (m)", "y2, output"],
+        ),
+    ],
+)
+def test_who_reads_values_is_told_of_which_panel_and_axis(curves, told):
+    found = []
+    draw(curves, seen=lambda page: found.extend(readings(page)))
+    assert [panel["y"] for panel in found] == told

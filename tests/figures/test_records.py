@@ -59,6 +59,32 @@ def test_a_single_output_has_its_residuals_below_and_two_outputs_a_panel_each(pa
     assert [axes.get_title(loc="left") for axes in panels] == ["y1, fit 83.2 %", "y2"]
 
 
+@pytest.mark.parametrize("outputs", [1, 2])
+@pytest.mark.parametrize("lengths", [(), (500,), (240, 260), (100, 150, 250)])
+def test_no_curve_goes_from_one_record_to_the_next(page, lengths, outputs):
+    """Between two records every curve has a gap, and their border is marked there; no sample is lost."""
+    y = np.arange(500.0)
+    figure = page(FitCurves(y, (FitPanel(y, y + 5.0, y - 5.0, 80.0),) * outputs, lengths))
+    begins = np.cumsum(lengths)[:-1]
+    for axes in figure.axes:
+        curves = [line for line in axes.lines if line.get_transform() == axes.transData]
+        for x, values in (line.get_data() for line in curves):
+            assert np.isnan(x).sum() == np.isnan(values).sum() == len(begins)
+            np.testing.assert_array_equal(x[~np.isnan(values)], y)
+            np.testing.assert_array_equal(x[np.flatnonzero(np.isnan(values)) + 1], begins)
+        marks = [line.get_xdata()[0] for line in axes.lines if line not in curves]
+        np.testing.assert_array_equal(marks, begins - 0.5)
+    (legend,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    told = [text.get_text() for text in legend.get_texts()]
+    assert ("another record begins" in told) == bool(len(begins))
+
+
+def test_records_whose_border_is_not_shown_have_no_mark(page):
+    y = np.sin(np.arange(3000.0))
+    axes = page(FitCurves(np.arange(3000.0), (FitPanel(y, y, y),), (1500, 1500))).axes[0]
+    assert all(line.get_transform() == axes.transData for line in axes.lines)
+
+
 @pytest.mark.parametrize("apart", [0.0, 0.1])
 @pytest.mark.parametrize("outputs", [1, 2])
 def test_a_prediction_that_is_the_simulation_is_one_curve_and_is_said_to_be(page, apart, outputs):

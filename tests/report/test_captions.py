@@ -3,16 +3,27 @@
 import numpy as np
 import pytest
 
+from inputdesign_cli.compute.executor import InProcess
+from inputdesign_cli.report.charts import run_charts
 from inputdesign_cli.report.described import captioned
 from inputdesign_cli.runs.curves import (
     BoundCurves,
     BoundPanel,
+    Curves,
+    FanCurves,
+    FitCurves,
     NyquistCurves,
+    OrderCurves,
     PredictedPanel,
     SignalCurves,
     SpectrumCurves,
 )
+from inputdesign_cli.runs.curves_file import curves_json
+from inputdesign_cli.runs.record import FIGURES
+from tests.support.curves import CURVES
 
+# What was told of figures of which nobody knows what they show.
+PLACEHOLDER = "The figure"
 W = np.array([0.1, 1.0])
 ONES = np.ones(2)
 
@@ -43,6 +54,16 @@ def nyquist(**entries):
         (nyquist(circle=0.5, limiting=W), "circle about -1", ""),
         (nyquist(), "leave it.", "circle"),
         (nyquist(), "leave it.", "limiting"),
+        (FitCurves(W, (), (1, 1)), "Dotted lines part the records", ""),
+        (FitCurves(W, (), (2,)), "from the input alone.", "Dotted"),
+        (OrderCurves({}, (1.0, 2.0), 1), "was tried for y2, estimated on one part", ""),
+        (OrderCurves({}, (1.0, 2.0)), "was tried, estimated on one part", "y1"),
+        (FanCurves(W, ONES[None], ONES, dict.fromkeys("abc", ONES)), "those that bind in colour", "5 of"),
+        (
+            FanCurves(W, ONES[None], ONES, dict.fromkeys("abcdefg", ONES)),
+            "each, 5 of the 7 that bind in colour",
+            "each, those",
+        ),
         (SignalCurves(W, {"u1": ONES}), "values are distributed.", "output"),
         (
             SignalCurves(W, {"u1": ONES}, predicted=(PredictedPanel("y1", ONES, ONES),)),
@@ -55,3 +76,27 @@ def test_a_caption_names_no_more_than_is_drawn(curves, there, missing):
     said = captioned(curves)
     assert there in said
     assert not missing or missing not in said
+
+
+def test_every_kind_of_figure_has_a_caption():
+    """Whatever a run calls its files."""
+    assert {type(one) for one in CURVES.values()} == set(Curves.__subclasses__())
+    for curves in CURVES.values():
+        assert not captioned(curves).startswith(PLACEHOLDER)
+
+
+@pytest.mark.parametrize(
+    ("stem", "name", "said"),
+    [
+        ("structures_2", "structures", "for y2"),
+        ("data_fit", "fit", "predicted one step ahead"),
+        ("errors_white", "error bands", "r_adm: white."),
+        ("cloud_shift_register", "cloud", "theory: shift register."),
+        ("disturbance_design", "signal", "does to the loop: design."),
+        ("frequency_response", "response without a model", "at up to 5 % of the frequencies"),
+    ],
+)
+def test_figures_of_a_run_are_captioned_by_what_they_show(stem, name, said, tmp_path):
+    (tmp_path / FIGURES).write_bytes(curves_json({stem: CURVES[name]}))
+    chart = run_charts(tmp_path, {}, "s", InProcess())[stem]
+    assert said in chart.caption

@@ -114,6 +114,7 @@ CURVES = {
     "error bands of entries": ErrorBandCurves((replace(BANDS, entry=(0, 0)), replace(BANDS, entry=(1, 0)))),
     "fit": FitCurves(T, (FIT,)),
     "fit of two outputs": FitCurves(T, (FIT, FitPanel(T, T + 1, output=1))),
+    "fit of two records": FitCurves(T, (replace(FIT, label="level (m)"),) * 2, (240, 260)),
     "residuals": correlations(1, 1),
     "residuals of two outputs": correlations(2, 1),
     "ellipses": EllipseCurves(
@@ -130,6 +131,12 @@ CURVES = {
     "many moments": MomentsCurves(np.eye(12), 4, np.array([0.0, 2.8]), np.array([1.0, 0.3])),
     "response without a model": ResponseCurves((SEEN,)),
     "responses of entries": ResponseCurves((replace(SEEN, entry=(0, 0)), replace(SEEN, entry=(1, 0)))),
+    "many structures": OrderCurves(
+        dict.fromkeys(
+            ("ARMAX", "ARX", "BJ", "FIR", "FOPDT", "OE", "SOPDT", "TOPDT"), (T[2:8], 10 * T[2:8] - 40)
+        ),
+        (3.0, 33.0),
+    ),
     "structures": OrderCurves({"ARX": (T[2:8], 10 * T[2:8]), "OE": (T[2:4], 11 * T[2:4])}, (3.0, 33.0), 1),
     "fan": FanCurves(W, np.stack([0.3 * G, 0.5 * G]), 0.4 * G, {"plant 2": 0.5 * G}),
     "campaign": CampaignCurves(T[20:80:20], 60.0 / T[20:80:20], T[20:80:20], 200),

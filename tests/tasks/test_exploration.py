@@ -1,5 +1,6 @@
 """From a raw log to a model and a spec that solves, and a verdict on other data."""
 
+import html
 import json
 import re
 from pathlib import Path
@@ -280,3 +281,60 @@ def test_a_dead_time_of_nothing_is_zero_with_its_limit(tmp_path):
     (told,) = [note for note in found.result["notes"] if note.startswith("L of a dead time")]
     deviation = found.result["identification"]["standard_deviation"]["L"]
     assert float(told.split(": ")[1].split()[0]) == pytest.approx(1.96 * deviation, rel=0.01)
+
+
+def test_what_is_said_of_the_choice_is_true(run):
+    """Best is only what no other structure exceeds; the figure is that of an estimate from one part."""
+    result = json.loads((run / "result.json").read_text())
+    (output,) = result["exploration"]["outputs"]
+    fits = [one["simulation_fit_percent"] for one in output["structures"]]
+    own = next(
+        one["simulation_fit_percent"]
+        for one in output["structures"]
+        if (one["family"], one["orders"], one["delay"])
+        == (output["structure"]["family"], output["structure"]["orders"], output["structure"]["delay"])
+    )
+    better = max(fit for fit in fits if fit is not None) - own
+    (note,) = (note for note in result["notes"] if note.startswith("y: "))
+    said = re.search(rf"chosen of {len(fits)} structures, of which (.*)", note)[1]
+    if better > 0.0:
+        assert float(re.search(r"by (\S+) points better", said)[1]) == pytest.approx(better, rel=0.06)
+    else:
+        assert "judges best" in said
+    told = summary(result, "min", [])
+    assert "estimated from the other alone (the parameters above: from the whole record)" in told
+    page = html.unescape((run / "report.html").read_text())
+    assert "estimated from one part of them alone, explains" in page
+    assert "not seen" not in told + page
+
+
+def test_the_page_is_among_the_files_that_are_named(tmp_path):
+    log = record(tmp_path / "log.csv")
+    done = CliRunner().invoke(app, ["explore", str(log), "-o", str(tmp_path / "run"), "--no-figures"])
+    (named,) = re.findall(r"^files +.*?: (.*(?:\n .*)*)", done.stdout, re.MULTILINE)
+    there = {path.name for path in (tmp_path / "run").iterdir()}
+    assert set(re.split(r",\s+", named.strip())) == there
+    assert "report.html" in there
+
+
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_the_amplitude_of_the_spec_is_the_range_of_the_log(inputs, tmp_path):
+    rng = np.random.default_rng(3)
+    u = 1e5 + np.repeat(rng.choice([0.0, 1.0, 5.0], (60, inputs), p=[0.6, 0.3, 0.1]), 5, axis=0)
+    y = scipy.signal.lfilter([0, 1], [1, -0.8], (u - 1e5).sum(axis=1)) + 0.1 * rng.standard_normal(300)
+    log = tmp_path / "log.csv"
+    head = [*(f"u{j + 1}" for j in range(inputs)), "y"]
+    np.savetxt(log, np.column_stack([u, y]), delimiter=",", header=",".join(head), comments="", fmt="%.10g")
+    text = explore(log, Preparation(sample_time=1.0)).results.resolved_spec
+    assert parse_spec(text).limits.amplitude is None
+    allowed = parse_spec(text.replace("  # amplitude:", "  amplitude:"))
+    half, level = (np.atleast_1d(one) for one in (allowed.limits.amplitude.input, allowed.signal.offset))
+    np.testing.assert_allclose([level - half, level + half], [u.min(axis=0), u.max(axis=0)], atol=1e-4)
+
+
+def test_files_that_a_model_is_judged_by_follow_each_other(run, tmp_path):
+    files = [record(tmp_path / f"{seed}.csv", seed=seed, samples=100) for seed in (1, 2)]
+    judged = explore(files, model=load_spec(run / "model.yaml", design=False)).results
+    assert judged.curves["fit"].lengths == (100, 100)
+    np.testing.assert_allclose(judged.curves["fit"].time, 0.5 * np.arange(200.0))
+    np.testing.assert_array_equal(judged.tables["fit"].columns["record"], np.repeat([1.0, 2.0], 100))

@@ -9,6 +9,7 @@ import scipy.signal
 
 from inputdesign_cli import identify, parse_spec
 from inputdesign_cli.errors import DataError, SpecError
+from inputdesign_cli.tasks.build.log import read_log
 from inputdesign_cli.tasks.build.preparation import Preparation
 
 STRUCTURE = "sample_time: 2\ntime_unit: min\nplant: {B: [0, 1], F: [1, -0.7]}\n"
@@ -190,3 +191,22 @@ def test_spellings_of_one_unit_are_no_difference(one, other, same, tmp_path):
     spec = parse_spec(f"{STRUCTURE}channels: {{y1: {{name: level, unit: '{one}'}}}}\n", design=False)
     told = " ".join(identify(spec, path).result.get("notes", []))
     assert ("not converted" in told) is not same
+
+
+@pytest.mark.parametrize(("unit", "agrees"), [("s", True), ("min", False), ("h", False)])
+@pytest.mark.parametrize("times", ["seconds", "dates"])
+def test_a_unit_that_contradicts_the_file_is_refused_by_every_command(unit, agrees, times, tmp_path):
+    """Else a plant sixty times too fast would look like any other."""
+    path = tmp_path / "d.csv"
+    stamps = [datetime(2024, 2, 28) + timedelta(minutes=2 * k) for k in range(len(U))]
+    told = [s.isoformat() for s in stamps] if times == "dates" else [120 * k for k in range(len(U))]
+    rows = "".join(f"{t},{u!r},{y!r}\n" for t, u, y in zip(told, U.tolist(), Y.tolist(), strict=True))
+    path.write_text(f"{'timestamp' if times == 'dates' else 'Time (s)'},u,y\n{rows}")
+    spec = parse_spec(STRUCTURE, design=False)
+    for read in (lambda said: read_log(path, said), lambda said: identify(spec, path, preparation=said)):
+        if agrees:
+            assert read(Preparation(time_unit=unit))
+            continue
+        with pytest.raises(DataError, match=f"--time-unit says {unit}") as raised:
+            read(Preparation(time_unit=unit))
+        assert raised.value.diagnostics[0].code == "data-wrong-unit"

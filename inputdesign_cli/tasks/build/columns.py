@@ -90,11 +90,38 @@ def time_unit_in(sheet: Sheet, name: str) -> str | None:
     said = sheet.pace.unit
     if time_unit_of(name) or not said:
         return time_unit_of(name)
-    unit = _UNITS.get(said.strip().lower())
+    unit = _plain_time(said)
     if unit is None:
         message = f"{sheet.path.name} states its times in {said!r}, which is none of {', '.join(TIME_UNITS)}"
         raise DataError(sheet.error("data-wrong-unit", message, "say which it is: --time-unit s"))
     return unit
+
+
+def counted_unit(sheet: Sheet, name: str, preparation: Preparation, *, dated: bool) -> str | None:
+    """The unit of the times by the option, or of dates; None where neither says it.
+
+    Args:
+        name: of the column of times, if any.
+        dated: whether it holds dates, which are counted in seconds.
+
+    Raises:
+        DataError: `data-wrong-unit`, the option contradicts what the file says.
+    """
+    said, own = preparation.time_unit, "s" if dated else time_unit_of(name) or _plain_time(sheet.pace.unit)
+    if said is None:
+        return "s" if dated else None
+    if own is not None and own != said:
+        holds = "holds dates, which are counted in s" if dated else f"states its times in {own}"
+        message = f"{sheet.path.name} {holds}, and --time-unit says {said}"
+        hint = "leave --time-unit out"
+        if not dated:
+            hint += f" or say {own}: it tells what the times are counted in; or write {said} into the file"
+        raise DataError(sheet.error("data-wrong-unit", message, hint))
+    return said
+
+
+def _plain_time(unit: str | None) -> str | None:
+    return None if unit is None else _UNITS.get(unit.strip().lower())
 
 
 def with_names(sheet: Sheet, units: Units, preparation: Preparation) -> Preparation:

@@ -17,6 +17,7 @@ from inputdesign_cli.runs.shares import per_cent
 from inputdesign_cli.runs.units import Units
 from inputdesign_cli.specification.models.units import SECONDS
 from inputdesign_cli.tasks.build.columns import (
+    counted_unit,
     other_units,
     reference_columns,
     time_unit_in,
@@ -227,7 +228,7 @@ def _read(path: Path, units: Units, preparation: Preparation, *, named: bool) ->
     signals, joined = joined_rows(
         signals_of(sheet, units.inputs, units.outputs, preparation, references), resample=preparation.resample
     )
-    unit = "s" if signals.dated else preparation.time_unit
+    unit = counted_unit(signals.sheet, signals.name, preparation, dated=signals.dated)
     if unit is not None and signals.name:
         signals = replace(signals, time=signals.time * (SECONDS[unit] / SECONDS[units.time_unit]))
     _check_steps(signals, units, preparation)

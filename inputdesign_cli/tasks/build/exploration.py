@@ -19,6 +19,7 @@ from inputdesign_cli.tasks.identification import Identification
 from inputdesign_cli.tasks.result.blocks import blocks_of
 
 _MOST_SAMPLES = 100_000
+_DIGITS = 6
 
 
 def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
@@ -26,7 +27,15 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
     power = [float(x) for x in np.mean((log.u - log.u.mean(axis=0)) ** 2, axis=0)]
     most = max(power)
     power = [x if x > 0.0 else most for x in power]
-    levels = [float(f"{x:.6g}") for x in log.u.mean(axis=0)]
+    low, high = log.u.min(axis=0), log.u.max(axis=0)
+    half = 0.5 * (high - low)
+    half = np.where(half > 0.0, half, half.max())
+    # Six digits of what the input moves by: a level far from zero takes more.
+    places = [_DIGITS - 1 - int(np.floor(np.log10(x))) for x in half]
+    levels, widths = (
+        [round(float(x), n) for x, n in zip(values, places, strict=True)]
+        for values in (0.5 * (low + high), half)
+    )
     single = len(power) == 1
     blocks = blocks_of(found.model)
     structures = ", ".join(
@@ -44,7 +53,8 @@ def spec_text(log: Log, found: Found, sources: Sequence[Path]) -> str:
         if channel != "time"
     )
     samples = min(len(log.y), _MOST_SAMPLES)
-    limit = _number(power[0]) if single else f"[{', '.join(map(_number, power))}]"
+    limit, amplitude = _numbers([float(f"{x:.6g}") for x in power]), _numbers(widths)
+    ranges = " and ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True))
     offset = levels[0] if single else levels
     source = " and ".join(path.name for path in sources)
     text = f"""\
@@ -70,18 +80,20 @@ experiment:
 #   accuracy: {{model_error: {{relative: 0.05, confidence: 0.95}}}}  # add band: [..] if you like
 accuracy: {{criterion: D}}
 limits:
-  input_power: {limit}            # mean square about the level, as in the record
-  # amplitude: {_number(3.0 * max(power) ** 0.5)}         # what the actuator can do about its level
+  input_power: {limit}            # mean square about the mean, as in the record
+  # amplitude: {amplitude}         # with it every sample stays within the range of the log, {ranges}
 
-# The family of spectra to search, and the signal to apply: about the level of the record.
+# The family of spectra to search, and the signal to apply: about the middle of the range of the log.
 spectrum: {{type: fir, order: 20}}
 signal: {{type: filtered_noise, seed: 1, offset: {json.dumps(offset)}}}
 """
     return text
 
 
-def _number(x: float) -> str:
-    return f"{x:.6g}"
+def _numbers(values: Sequence[float]) -> str:
+    """One number as it is, or a list."""
+    listed = ", ".join(f"{x:.10g}" for x in values)
+    return listed if len(values) == 1 else f"[{listed}]"
 
 
 def build_explored(text: str) -> Identification:

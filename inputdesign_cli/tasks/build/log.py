@@ -11,7 +11,8 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError
 from inputdesign_cli.plant.polynomial import Array
-from inputdesign_cli.tasks.build.columns import time_unit_in, with_headers
+from inputdesign_cli.tasks.build.column_hints import columns_option
+from inputdesign_cli.tasks.build.columns import counted_unit, time_unit_in, with_headers
 from inputdesign_cli.tasks.build.copies import check_different
 from inputdesign_cli.tasks.build.data import Recorded, prepared, recorded_in
 from inputdesign_cli.tasks.build.files import Sheet, read_sheet
@@ -70,7 +71,8 @@ def read_log(path: Path, preparation: Preparation) -> Log:
     counts = {letter: _count(sheet, letter, columns) for letter in "uy"}
     given = with_headers(sheet, replace(preparation, columns=columns))
     signals, told = joined_rows(signals_of(sheet, counts["u"], counts["y"], given), resample=given.resample)
-    unit = "s" if signals.dated else preparation.time_unit or time_unit_in(sheet, signals.name) or "s"
+    unit = counted_unit(signals.sheet, signals.name, preparation, dated=signals.dated)
+    unit = unit or time_unit_in(sheet, signals.name) or "s"
     stated = stated_step(sheet, preparation)
     if signals.name and not preparation.sample_time:
         step = _typical(signals.time)
@@ -91,7 +93,7 @@ def read_log(path: Path, preparation: Preparation) -> Log:
         ]
     if not np.isfinite(step):
         message = f"{path.name} has one time only, which tells no sample time"
-        hint = "give it: --sample-time 0.5; or say which column holds the time: --columns time=1"
+        hint = "give it: --sample-time 0.5; or say which column holds the time (--columns)"
         raise DataError(sheet.error("data-not-uniform", message, hint, 0))
     segments, notes = prepared(signals, step, unit, given)
     return Log(
@@ -161,8 +163,16 @@ def _count(sheet: Sheet, letter: str, columns: Mapping[str, str]) -> int:
     if named:
         listed = ", ".join(sorted(named))
         message = f"the {what}s are {listed}, but they are numbered {letter}1, {letter}2, .."
-    hint = 'name them, or give their numbers: --columns "time=1,u1=2,y1=3"'
+    missing = [channel for channel in _first_of(columns) if channel not in columns]
+    kept = {channel: name for channel, name in columns.items() if channel in ("time", *_first_of(columns))}
+    hint = f"name them, or give their numbers, such as {columns_option(sheet, kept, missing)}"
     raise DataError(sheet.error("data-missing-column", message, hint))
+
+
+def _first_of(columns: Mapping[str, str]) -> list[str]:
+    """The channels that so many named inputs and outputs are, one of each at least: u1, u2, y1."""
+    counts = {letter: sum(name.startswith(letter) for name in columns) for letter in "uy"}
+    return [f"{letter}{i + 1}" for letter in "uy" for i in range(max(counts[letter], 1))]
 
 
 def _typical(time: Array) -> float:

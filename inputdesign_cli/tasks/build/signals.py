@@ -9,6 +9,7 @@ import numpy as np
 
 from inputdesign_cli.errors import DataError, Location
 from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.tasks.build.column_hints import called, rising
 from inputdesign_cli.tasks.build.columns import channel_columns, time_column
 from inputdesign_cli.tasks.build.extremes import check_range
 from inputdesign_cli.tasks.build.files import Sheet
@@ -110,9 +111,11 @@ def _check_rising(sheet: Sheet, time: Array) -> None:
             f"{time[row]:.10g}"
         )
         hint = (
-            "sort the rows, keep one of those with the same time, write times with enough digits to differ, "
-            "or say which column holds the time: --columns time=1"
+            "sort the rows, keep one of those with the same time, or write times with enough digits to differ"
         )
+        others = [called(sheet, at) for at in rising(sheet)]
+        if others:
+            hint += f"; or is the time in column {others[0]}, which rises? Then --columns time={others[0]}"
         raise DataError(sheet.error("data-not-uniform", message, hint, int(row)))
 
 

@@ -44,7 +44,7 @@ def data_curves(
     residuals |= {"cross_correlation_lag": cross.lags[:shared]}
     residuals |= _pairs(units, "cross_correlation", cross.correlation[:shared])
     curves: dict[str, Curves] = {
-        "fit": FitCurves(instants, tuple(panels)),
+        "fit": FitCurves(instants, tuple(panels), tuple(estimate.lengths)),
         "residuals": ResidualCurves(
             white.lags,
             white.correlation,

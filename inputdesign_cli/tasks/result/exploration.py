@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from inputdesign_cli.identification.explore import Candidate, Fits, Found, levelled
-from inputdesign_cli.plant.polynomial import Array
+from inputdesign_cli.identification.explore import Candidate, Chosen, Fits, Found, levelled
 from inputdesign_cli.runs.curves import Curves, FitCurves, FitPanel, OrderCurves
 from inputdesign_cli.runs.results import Json, Table
 from inputdesign_cli.runs.units import Units
+from inputdesign_cli.tasks.build.data import Data
 from inputdesign_cli.tasks.build.log import Log
 from inputdesign_cli.tasks.result.refutations import chance
 
@@ -113,8 +113,8 @@ def exploration_notes(
             for j, delay, (low, high) in zip(found.moving, taken.orders.delays, ranges, strict=True)
         )
         notes.append(
-            f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; estimated on one part it "
-            f"simulates {taken.validation:.1f} % of the other, best of {len(chosen.candidates)} structures"
+            f"{name}: {taken.orders.family} ({orders}), delay in samples {delays}; chosen of "
+            f"{len(chosen.candidates)} structures, {_beside_the_best(chosen, taken)}"
         )
     notes += [
         f"{'y' if single else f'y{i + 1}'}: no {' or '.join(chosen.dropped)} model could be estimated: the "
@@ -145,6 +145,14 @@ def exploration_notes(
     if found.interleaved:
         notes.append("an input rests in one part of the record: blocks in turn estimate and judge")
     return notes
+
+
+def _beside_the_best(chosen: Chosen, taken: Candidate) -> str:
+    """By how much another structure simulates the part that judges better: other rules count, too."""
+    better = max(c.validation for c in chosen.candidates) - taken.validation
+    if better <= 0.0:
+        return "of which it simulates the part that judges best"
+    return f"of which the best simulates the part that judges by {better:.2g} points better"
 
 
 def _least_moved(log: Log, found: Found) -> str:
@@ -178,11 +186,12 @@ def structure_curves(found: Found) -> dict[str, Curves]:
     return curves
 
 
-def validation_curves(
-    units: Units, instants: Array, u: Array, y: Array, found: Fits
-) -> tuple[Table, FitCurves]:
-    """fit.csv with its figure: a given model against data at these times (n,)."""
-    columns = {units.time_header: instants}
+def validation_curves(units: Units, data: Data, found: Fits) -> tuple[Table, FitCurves]:
+    """fit.csv with its figure: a given model against data. In the figure files follow each other."""
+    u, y, lengths = data.u, data.y, data.lengths
+    columns = {units.time_header: data.time}
+    if len(lengths) > 1:
+        columns["record"] = np.repeat(np.arange(1.0, len(lengths) + 1), lengths)
     panels = []
     for j, values in enumerate(u.T):
         columns["u" if units.single else f"u{j + 1}"] = values
@@ -199,6 +208,9 @@ def validation_curves(
                 found.simulated[:, i] if runs else None,
                 found.simulation[i] if runs else None,
                 i,
+                units.label(f"y{i + 1}"),
             )
         )
-    return Table(columns), FitCurves(instants, tuple(panels))
+    one = bool(np.all(np.diff(data.time) > 0.0))
+    instants = data.time if one else units.sample_time * np.arange(len(y), dtype=np.float64)
+    return Table(columns), FitCurves(instants, tuple(panels), lengths)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inputdesign_cli.identification import FrequencyResponse
 from inputdesign_cli.plant import Model
@@ -38,7 +39,7 @@ def response_of_data(
     w = found.frequency / units.sample_time
     G = model.plant_at(w * units.frequency)
     columns: dict[str, Array] = {units.frequency_header: w}
-    panels, outside = [], np.zeros(w.size, dtype=bool)
+    panels, outside = [], list[NDArray[np.bool_]]()
     for i in range(units.outputs):
         for k, j in enumerate(range(units.inputs) if inputs is None else inputs):
             own, radius, modelled = found.G[:, i, k], found.radius[:, i, k], G[:, i, j]
@@ -47,13 +48,14 @@ def response_of_data(
             columns |= {f"{name}{units.suffix(i, j)}": values for name, values in listed.items()}
             entry = None if units.single else (i, j)
             panels.append(ResponsePanel(w, own, radius, modelled, entry, units.passage((i, j))))
-            outside |= np.abs(own - modelled) > radius
+            outside.append(np.abs(own - modelled) > radius)
         number = "" if units.single else f"_{i + 1}"
         columns |= {f"noise_spectrum{number}": found.noise[:, i], f"coherence{number}": found.coherence[:, i]}
     told: dict[str, Json] = {
         "method": found.method,
         "excitation": "r" if by_reference else "u",
         "frequencies": int(w.size),
+        "entries": len(panels),
         "model_outside": float(np.mean(outside)),
     }
     if (units.closed_loop or loop) and not by_reference:
@@ -65,8 +67,9 @@ def response_note(told: dict[str, Json]) -> list[str]:
     """What a user should know of it, in sentences."""
     share = told["model_outside"]
     usual = "" if "caveat" in told else " (a right model: at about 5 %)"
+    entries = "" if told["entries"] == 1 else f", counted over {told['entries']} entries of G"
     sentence = (
         "frequency_response.csv has what the data say of G without a model, with discs of 95 %: the model is "
-        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies{usual}"
+        f"outside at {100 * share:.0f} % of {told['frequencies']} frequencies{entries}{usual}"
     )
     return [sentence, *([told["caveat"]] if "caveat" in told else [])]
