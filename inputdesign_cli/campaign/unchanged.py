@@ -46,7 +46,8 @@ def check_files(
     numbers = {record.file: n for n, record in enumerate(found.records, 1)}
     out = {r.file for n, r in enumerate(found.records, 1) if r.withdrawn or n == withdrawing}
     known = found.digests | {SPEC: result.get("spec_sha256"), SIGNAL: result.get("signal_sha256")}
-    due = getattr(found.rounds[-1].plan, "file", None)
+    plan = found.rounds[-1].plan
+    due = None if plan is None else plan.file
     for name, content in files.items():
         digest = known.get(name)
         if name in out or digest is None or digest == _sha256(content):
