@@ -18,6 +18,7 @@ STANDARD_FILES = (
     SPEC,
     *(f"{stem}.{kind}" for stem in ("spectrum", "signal", "bound") for kind in ("csv", "png")),
 )
+_LONGEST_NAME = 255  # bytes, of a file system
 # How each page that `idesign report` writes begins: one of the user's own is not removed.
 PAGE_MARK = b'<meta name="generator" content="idesign '
 
@@ -87,4 +88,9 @@ def _finite(text: str) -> float:
 
 def is_plain(name: Json) -> bool:
     """Whether it names a file in the directory itself, and none elsewhere."""
-    return isinstance(name, str) and name not in ("", os.curdir, os.pardir) and not set(name) & {"/", "\0"}
+    if not isinstance(name, str) or name in ("", os.curdir, os.pardir) or set(name) & {"/", "\0"}:
+        return False
+    try:
+        return len(os.fsencode(name)) <= _LONGEST_NAME
+    except UnicodeEncodeError:
+        return False

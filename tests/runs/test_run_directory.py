@@ -275,6 +275,8 @@ def test_a_nan_in_the_result_is_a_mistake_of_ours_and_writes_nothing(tmp_path):
         ({"result.json": "[" * 100_000}, "run-unreadable"),
         ({"result.json": '{"format": 1, "files": [1, null]}'}, "run-unreadable"),
         ({"result.json": '{"format": 1, "files": 7}'}, "run-unreadable"),
+        ({"result.json": json.dumps({"format": 1, "files": ["x" * 300]})}, "run-unreadable"),
+        ({"result.json": json.dumps({"format": 1, "files": ["\ud800"]})}, "run-unreadable"),
         ({"result.json": '{"format": %s}' % ("1" * 10_000)}, "run-unreadable"),
         ({"result.json": '{"format": 1, "files": ["spec.yaml"]}'}, "run-incomplete"),
     ],
