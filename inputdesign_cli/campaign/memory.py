@@ -20,11 +20,10 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import chain
-from math import isfinite
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -41,6 +40,7 @@ from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.record import RESULT, SPEC, load_result, unreadable
 from inputdesign_cli.runs.results import Json
 from inputdesign_cli.runs.run_directory import output_errors, read_run
+from inputdesign_cli.runs.text_formats import csv_columns
 
 VERSION = 1
 _FROM_A_COPY = (
@@ -238,10 +238,10 @@ class _Campaign(_Kept):
 def _rows(content: bytes) -> int:
     """Of a table of numbers; -1 where it is none."""
     try:
-        rows = [[float(cell) for cell in row.split(",")] for row in content.decode().splitlines()[1:]]
+        columns = list(csv_columns(content).values())
     except ValueError:
         return -1
-    return len(rows) if all(map(isfinite, chain.from_iterable(rows))) else -1
+    return len(columns[0]) if columns and np.isfinite(columns).all() else -1
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from inputdesign_cli.plant.polynomial import Array
 from inputdesign_cli.regular_file import read_regular
 from inputdesign_cli.runs.curves import Curves, SignalCurves
 from inputdesign_cli.runs.results import Json, Results, Table
-from inputdesign_cli.runs.text_formats import csv_text
+from inputdesign_cli.runs.text_formats import csv_columns, csv_text
 from inputdesign_cli.tasks.campaign_rounds import Decision, Part, Past
 
 Decide = Callable[[Past], Decision]
@@ -148,8 +148,8 @@ def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) ->
     """(r,): the last sample that was planned of what was applied."""
     if not records:
         return None
-    rows = files[records[-1]["plan"]].decode().splitlines()
-    return np.array(rows[int(records[-1]["samples"])].split(",")[1:], dtype=float)
+    _, *samples = csv_columns(files[records[-1]["plan"]]).values()
+    return np.array([values[int(records[-1]["samples"]) - 1] for values in samples])
 
 
 @contextmanager
