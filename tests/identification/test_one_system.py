@@ -66,7 +66,9 @@ def test_a_first_experiment_of_few_samples_changes_nothing(samples, seed):
     """It has no information in most directions, exactly none in some."""
     u, y = recorded(1.0, 200, seed)
     with np.errstate(all="raise", under="ignore"):
-        found = identify(SYSTEMS["arx"], u[:, None], y[:, None], experiments=[samples, 200 - samples], rest=True)
+        found = identify(
+            SYSTEMS["arx"], u[:, None], y[:, None], experiments=[samples, 200 - samples], rest=True
+        )
     matrix = np.stack([shifted(-y, 1), shifted(-y, 2), shifted(u, 1), shifted(u, 2)], axis=1)
     np.testing.assert_allclose(found.theta, np.linalg.lstsq(matrix, y, rcond=None)[0], rtol=1e-6)
     assert np.all(np.array(found.alike) > 0.01)
