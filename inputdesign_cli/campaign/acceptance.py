@@ -196,8 +196,7 @@ def _of_another(
     found = {
         plan["file"]: abs(_matched(memory, plan, part, excitation).likeness)
         for plan in _plans(memory)
-        if plan["file"] != due["file"]
-        and len(csv_rows(memory.files.get(plan["file"], b""))) > part.samples
+        if plan["file"] != due["file"] and len(csv_rows(memory.files.get(plan["file"], b""))) > part.samples
     }
     likest = max(found, key=found.__getitem__, default=None)
     return likest if likest is not None and found[likest] > max(LIKE, abs(likeness)) else None

@@ -117,7 +117,7 @@ def _again(
         past = Past(
             records=paths,
             done=sum(int(record["samples"]) for record in records),
-            ended=_ended(files, records),
+            applied=_applied(files, records),
             last=None if last is None else np.array(list(last.values()), dtype=float),
             first_cost=campaign.get("first_cost"),
             seed=seed,
@@ -144,12 +144,13 @@ def _refuted(directory: Path, records: Sequence[Mapping[str, Json]], done: int, 
     )
 
 
-def _ended(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
-    """(r,): the last sample that was planned of what was applied."""
-    if not records:
-        return None
-    _, *samples = csv_columns(files[records[-1]["plan"]]).values()
-    return np.array([values[int(records[-1]["samples"]) - 1] for values in samples])
+def _applied(files: Mapping[str, bytes], records: Sequence[Mapping[str, Json]]) -> Array | None:
+    """(n, r): what was applied, as it was planned."""
+    parts = [
+        np.stack(list(csv_columns(files[record["plan"]]).values())[1:], axis=1)[: int(record["samples"])]
+        for record in records
+    ]
+    return np.concatenate(parts) if parts else None
 
 
 @contextmanager
@@ -251,6 +252,7 @@ def _decided(
             "power": plan.power,
             "part_power": float(np.sum(np.mean(moved**2, axis=0))),
             "cost": plan.cost,
+            "part_cost": plan.part_cost,
             "kind": plan.kind,
             "capped": plan.capped,
             "seed": seed,
